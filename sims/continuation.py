@@ -114,7 +114,7 @@ class Branch:
         if self.sweep.model != NAME:
             raise InputError(f"model {self.sweep.model} cannot go on from a state", allowed=NAME)
         if len(self.sweep.axes) != 1:
-            raise InputError(f"{len(self.sweep.axes)} things are varied", allowed="one", remedy="give --vary once")
+            raise InputError(f"{len(self.sweep.axes)} quantities are varied", allowed="one", remedy="give --vary once")
         for profile, name in ((self.sweep.speed_rpm, "speed_rpm"), (self.sweep.torque_nm, "torque_nm")):
             if profile is not None and np.ptp(profile.values) > 0.0:
                 raise InputError(f"{name} changes with time", allowed="constant: the motion must become steady")

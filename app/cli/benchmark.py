@@ -39,7 +39,7 @@ def gap(
     ] = None,
     same_simulator: Annotated[
         bool,
-        typer.Option("--same-simulator", help="The same cases from the diagnosing simulator as well, and the drop."),
+        typer.Option("--same-simulator", help="Also cases made by the diagnosing simulator, and the drop."),
     ] = False,
     diagnosers: Annotated[
         list[str] | None,
@@ -56,10 +56,10 @@ def gap(
     ] = None,
     least_level: Annotated[
         float,
-        typer.Option("--least-level", help="0 to 1: levels of effects go from here to 1 (strong); default 0: all."),
+        typer.Option("--least-level", help="0 to 1: the weakest effects, where 1 is strong; default 0: all."),
     ] = 0.0,
     model: Annotated[
-        str, typer.Option("--model", help="cracked, or forging: blind starts and stops, from a drive of their own.")
+        str, typer.Option("--model", help="cracked, or forging: blind starts and stops of an independent drive.")
     ] = "cracked",
     processes: Annotated[int, typer.Option("--processes", "-j", help="Cases at a time.")] = 2,
 ) -> None:
@@ -104,7 +104,7 @@ def speed(
     ] = None,
     longest: Annotated[
         float,
-        typer.Option("--longest", metavar="SECONDS", min=0.0, help="What takes longer is given no longer signal."),
+        typer.Option("--longest", metavar="SECONDS", min=0.0, help="A method that takes longer gets no longer signal."),
     ] = 20.0,
 ) -> None:
     """Time each method beside what a user would take instead, in one run: growth, agreement, distance to a limit.

@@ -197,7 +197,7 @@ def trend(
     fleet = _open(store)
     if not indicator:
         if over != "time":
-            raise InputError(f"--over {over} is of one indicator", remedy="name it after the machine")
+            raise InputError(f"--over {over} takes one indicator", remedy="name it after the machine")
         table = fleet.series(machine, point)
         if json:
             _print_records(table)
@@ -308,17 +308,17 @@ def watch(
     point: PointOption = "",
     rig: options.RigOption = None,
     fs: options.SamplingRateOption = None,
-    interval: Annotated[float, typer.Option("--interval", metavar="S", help="Seconds between two looks.")] = 5.0,
+    interval: Annotated[float, typer.Option("--interval", metavar="S", help="Seconds between two looks at it.")] = 5.0,
     settle: Annotated[
         float, typer.Option("--settle", metavar="S", help="Seconds for which a file must not change.")
     ] = 10.0,
-    once: Annotated[bool, typer.Option("--once", help="End when all that is there has been taken.")] = False,
+    once: Annotated[bool, typer.Option("--once", help="End once all that is there has been added.")] = False,
     jobs: options.JobsOption = None,
     cluster: options.ClusterOption = "",
     memory: options.MemoryOption = 2.0,
     json: Annotated[bool, typer.Option("--json", help="A line of JSON for each recording.")] = False,
 ) -> None:
-    """Take new recordings as they appear, with a line for each, until it is stopped (Ctrl-C or SIGTERM).
+    """Add new recordings as they appear, with a line for each, until it is stopped (Ctrl-C or SIGTERM).
 
     A file is taken when it has stopped changing. Several watches on one folder share the work; after a restart it goes
     on where it was. The exit code is 0 when it was stopped, 1 if with --once some recordings failed.

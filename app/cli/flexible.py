@@ -29,12 +29,13 @@ def flexible(
     preset: options.PresetOption = "",
     settings: options.SetOption = None,
     effects: options.EffectOption = None,
-    torques: Annotated[str, typer.Option("--torques", metavar="LIST", help="Of the sweeps.")] = "85,170,340Nm",
-    speeds: Annotated[str, typer.Option("--speeds", metavar="RANGE", help="Of the sweeps, up and down.")] = (
+    torques: Annotated[str, typer.Option("--torques", metavar="LIST", help="Torques of the sweeps.")] = "85,170,340Nm",
+    speeds: Annotated[str, typer.Option("--speeds", metavar="RANGE", help="Speeds to sweep, up and down.")] = (
         "900..4100rpm"
     ),
     duration: Annotated[
-        str, typer.Option("--duration", metavar="TIME", help="Of one sweep; 15s up and 15s down are six million steps.")
+        str,
+        typer.Option("--duration", metavar="TIME", help="Length of a sweep; 15s up and down are six million steps."),
     ] = "15s",
     spreading: Annotated[
         bool, typer.Option("--spreading", help="Also check contact at single nodes against patches (RBE3).")
@@ -109,13 +110,11 @@ def gear_body(
     held: Annotated[
         str, typer.Option("--held", help="free, bore or springs: how the gear is held for its modes.")
     ] = "free",
-    radial: Annotated[str, typer.Option("--radial", metavar="STIFFNESS", help="Springs at the hub, across.")] = SPRINGS[
-        "radial"
-    ],
-    axial: Annotated[str, typer.Option("--axial", metavar="STIFFNESS", help="Along the shaft.")] = SPRINGS["axial"],
+    radial: Annotated[str, typer.Option("--radial", metavar="STIFFNESS", help="Radial springs.")] = SPRINGS["radial"],
+    axial: Annotated[str, typer.Option("--axial", metavar="STIFFNESS", help="Axial springs.")] = SPRINGS["axial"],
     tilt: Annotated[str, typer.Option("--tilt", metavar="STIFFNESS", help="Against tilting.")] = SPRINGS["tilt"],
     twist: Annotated[str, typer.Option("--twist", metavar="STIFFNESS", help="About the shaft.")] = SPRINGS["twist"],
-    force: Annotated[str, typer.Option("--force", metavar="FORCE", help="On one tooth, for the stress.")] = "1000N",
+    force: Annotated[str, typer.Option("--force", metavar="FORCE", help="Force on a tooth, for stress.")] = "1000N",
     reduce: Annotated[bool, typer.Option("--reduce", help="Also reduce the gear, with its errors.")] = False,
     fresh: Annotated[
         bool, typer.Option("--fresh", help="Clear away reduced gears that another version of gearsig kept.")
@@ -192,13 +191,15 @@ def growth(
     depth: Annotated[str, typer.Option("--depth", metavar="LENGTH", help="Present depth: 1mm, or 1..1.6mm.")],
     preset: options.PresetOption = "",
     settings: options.SetOption = None,
-    torque: Annotated[str, typer.Option("--torque", metavar="TORQUE", help="Of the driver; the preset's.")] = "",
-    speed: Annotated[str, typer.Option("--speed", metavar="SPEED", help="Of the driver; the preset's.")] = "",
+    torque: Annotated[
+        str, typer.Option("--torque", metavar="TORQUE", help="On the driver; default: the preset's.")
+    ] = "",
+    speed: Annotated[str, typer.Option("--speed", metavar="SPEED", help="Of the driver; default: the preset's.")] = "",
     gear: Annotated[str, typer.Option("--gear", help="driver or driven: whose tooth is cracked.")] = "driver",
     angle: Annotated[float, typer.Option("--angle", help="Degrees between crack and the tooth's centre line.")] = 45.0,
     load_factor: Annotated[
         float,
-        typer.Option("--load-factor", help="How much greater the load is than the torque's: K_A K_v."),
+        typer.Option("--load-factor", help="Load over that of the torque alone: K_A K_v."),
     ] = 1.0,
     paris: Annotated[
         str,

@@ -85,7 +85,7 @@ DatumOption = Annotated[
     typer.Option(
         "--datum",
         metavar="auto|zero|LENGTH",
-        help="Compression at which the teeth stand in the middle of the play: found, zero, or e.g. 12um.",
+        help="Compression at which the teeth stand in the middle of the play; auto: read from the motion.",
     ),
 ]
 
@@ -98,7 +98,7 @@ def force(
     unwrap: options.UnwrapOption = False,
     datum: DatumOption = "auto",
     noise: Annotated[
-        bool, typer.Option("--noise", help="Also: how much noise until the piecewise model is no longer nearer.")
+        bool, typer.Option("--noise", help="Also find the noise up to which the piecewise model is the nearer one.")
     ] = False,
     fs: options.SamplingRateOption = None,
     json: options.JsonOption = False,

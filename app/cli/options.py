@@ -97,8 +97,8 @@ MemoryOption = Annotated[
         "--memory",
         metavar="GB",
         min=0.25,
-        help="What the analysis of a recording may take. A longer one is read in blocks: levels and spectra of all of "
-        "it, the detectors on its most telling parts.",
+        help="Memory for the analysis of one recording. A longer one is read in blocks: levels and spectra of all "
+        "of it, the detectors on its most telling parts.",
     ),
 ]
 ClusterOption = Annotated[
@@ -106,7 +106,7 @@ ClusterOption = Annotated[
     typer.Option(
         "--cluster",
         metavar="ADDRESS",
-        help="Dask scheduler whose workers do it instead, e.g. tcp://10.0.0.5:8786; they see the same files. "
+        help="Run on the workers of a Dask scheduler, e.g. tcp://10.0.0.5:8786, which see the same files. "
         "Code is sent both ways: name only one that you trust.",
     ),
 ]

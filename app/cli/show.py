@@ -36,8 +36,8 @@ def _common(
             "--memory",
             metavar="GB",
             min=0.25,
-            help="What may be taken. Of a longer recording density, maps, average and envelope are computed in blocks; "
-            "others ask for a part.",
+            help="Memory for one recording. Of a longer one, density, maps, average and envelope are computed in "
+            "blocks; the others ask for a part.",
         ),
     ] = 2.0,
     json: options.JsonOption = False,

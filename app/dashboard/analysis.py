@@ -245,7 +245,7 @@ def show_speed(analysis: Analysis) -> None:
 
 
 STARTS_AND_STOPS = (
-    "The machine starts and stops: spectra, orders and averages want a speed that lasts. Backlash, impacts and forces "
+    "The machine starts and stops: spectra, orders and averages need a lasting speed. Backlash, impacts and forces "
     "stand under Starts and stops, where the motion of both gears was recorded."
 )
 
@@ -410,7 +410,7 @@ def indicator_frame(indicators: tuple[Indicator, ...], compared: tuple[Indicator
             "of": i.gear or i.bearing or i.shaft or i.band,
             "computed on": i.computed_on,
             "band": i.band,
-            "remark": i.note,
+            "note": i.note,
         }
         for i in indicators
     ]
@@ -509,7 +509,7 @@ def show_report(analysis: Analysis, request: AnalysisRequest) -> None:
     """Offer the page that `gearsig report` writes, and the command that repeats the analysis."""
     st.markdown(
         "One page: verdict, findings, figures, indicators, and where everything came from. As HTML it is one file that "
-        "opens without a network and holds no scripts; as PDF it is to be printed, without the table of indicators."
+        "opens without a network and holds no scripts; as PDF it is for printing, without the table of indicators."
     )
     stem = safe_file_name(request.name).split(".")[0] or "recording"
     key = state.view_key("report", analysis)

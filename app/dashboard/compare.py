@@ -433,7 +433,7 @@ def _show_lines(comparison: Comparison, channel: ChannelComparison) -> None:
             "line": [line.label for line in shown],
             "difference (dB)": [line.level.difference_db for line in shown],
             "± (dB)": [2 * line.level.repeatability_db for line in shown],
-            "remark": [missing_words(line) or ("" if line.level.is_beyond else "within the scatter") for line in shown],
+            "note": [missing_words(line) or ("" if line.level.is_beyond else "within the scatter") for line in shown],
             "recorded (dB)": [line.level.recorded_db for line in shown],
             "simulated (dB)": [line.level.simulated_db for line in shown],
             "order": [line.order for line in shown],

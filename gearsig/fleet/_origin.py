@@ -148,9 +148,9 @@ def _compile(text: str) -> tuple[re.Pattern[str], str]:
         if name and name not in FIELDS:
             raise InputError(f"{{{name}}} is not known", where=where, allowed=", ".join(f"{{{n}}}" for n in FIELDS))
         if name in names:
-            raise InputError(f"{{{name}}} stands twice", where=where)
+            raise InputError(f"{{{name}}} occurs twice", where=where)
         if bool(field["form"]) != (name == "date"):
-            raise InputError(f"{field[0]} has no date's form", where=where, remedy="write for example {date:%Y%m%d}")
+            raise InputError(f"{field[0]} has no date format", where=where, remedy="write for example {date:%Y%m%d}")
         names.add(name)
         if name == "date":
             form = field["form"]

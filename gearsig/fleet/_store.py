@@ -127,7 +127,7 @@ class Store:
             self.folder.mkdir(parents=True, exist_ok=True)
             present = {path.name for path in self.folder.iterdir()}
             if present and not present & {MANIFEST, SEGMENTS}:
-                raise InputError("holds other things", where=str(self.folder), remedy="choose another with --store")
+                raise InputError("holds other files", where=str(self.folder), remedy="choose another with --store")
             for name in (SEGMENTS, NEW, CLAIMS):  # the first tells the others that this is a store
                 (self.folder / name).mkdir(exist_ok=True)
             if MANIFEST not in present:

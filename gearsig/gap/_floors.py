@@ -203,7 +203,7 @@ class StructuralFloor:
         missing = [name for name in names if name not in self._row]
         if missing:
             raise InputError(
-                f"the structural floor knows nothing of {', '.join(missing[:3])}",
+                f"the structural floor lacks {', '.join(missing[:3])}",
                 remedy="make the floor's table with the present features",
             )
         return np.array([self._row[name] for name in names], dtype=np.intp)

@@ -406,7 +406,7 @@ def _part_text(part: UnexpectedFinding, rig: Rig) -> str:
 
 NO_GEAR_PAIR = (
     "The rig has no gear pair, so that no simulator could be set to it: nothing was simulated, and no effect of gears "
-    "is weighed. How large the gap is, how severe its cause and how far it shrinks cannot be told; there is no twin. "
+    "is tried. How large the gap is, how severe its cause and how far it shrinks cannot be told; there is no twin. "
     "Damaged races of the bearings were looked for; unbalance, misalignment, clearance, drive and load were not."
 )
 HOW_SURE = (

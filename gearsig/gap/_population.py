@@ -173,7 +173,7 @@ def _read(path: Path, left_out: str) -> Population:
         return whole.of_rows(whole.simulators != left_out)
     arrays = read_arrays(path, MAX_BYTES)
     if arrays is None:
-        raise InputError("the population is not there, or damaged", where=path.name, remedy=MAKE_POPULATION)
+        raise InputError("the population is missing or damaged", where=path.name, remedy=MAKE_POPULATION)
     of_rigs = np.searchsorted(arrays["simulated_rigs"], arrays["rigs"])
     tables = {
         name: np.asarray(arrays[name], dtype=np.float64)
@@ -305,7 +305,7 @@ def _learned(left_out: str) -> Learned:
     if not left_out:
         learned = read_learned(LEARNED_FILE)
         if learned is None:
-            raise InputError("is not there, or damaged", where=LEARNED_FILE.name, remedy="install gearsig anew")
+            raise InputError("is missing or damaged", where=LEARNED_FILE.name, remedy="install gearsig again")
         return learned
     population = load_population()
     code = modules_digest(f"gearsig.gap.{name}" for name in ("_change", "_features", "_floors", "_recognition"))

@@ -276,7 +276,7 @@ def load_known_tooth_errors() -> KnownToothErrors:
     arrays = read_arrays(TOOTH_ERRORS_FILE, MAX_BYTES)
     if arrays is None:
         raise InputError(
-            "the known changes of transmission errors are not there, or damaged",
+            "the known changes of transmission errors are missing or damaged",
             where=TOOTH_ERRORS_FILE.name,
             remedy=MAKE_TOOTH_ERRORS,
         )

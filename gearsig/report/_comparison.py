@@ -266,10 +266,10 @@ def _channel_table(comparison: Comparison, channel: ChannelComparison) -> list[s
     return rows
 
 
-def _level_row(label: str, level: LevelPair, remark: str = "") -> str:
+def _level_row(label: str, level: LevelPair, note: str = "") -> str:
     recorded, simulated, difference, scatter = _level_texts(level)
     row = f"{label[:30]:<30} {recorded:>10} {simulated:>10} {difference:>11} ± {scatter}"
-    return f"{row}  {remark}" if remark else row
+    return f"{row}  {note}" if note else row
 
 
 def _level_texts(level: LevelPair) -> tuple[str, str, str, str]:
@@ -293,7 +293,7 @@ class LevelRow:
     simulated: str
     difference: str
     scatter: str
-    remark: str
+    note: str
     is_beyond: bool
 
 
@@ -393,7 +393,7 @@ def _record_rows(facts: RecordFacts) -> Rows:
         ("length", f"{readable(facts.duration_s, 5)} s at {readable(facts.sampling_rate_hz, 7)} Hz"),
         ("speed", f"{readable(facts.mean_speed_rpm, 6)} rpm, {low} to {high} ({facts.speed_method})"),
         ("revolutions", readable(facts.n_revolutions, 4)),
-        *(("remark", note) for note in facts.notes),
+        *(("note", note) for note in facts.notes),
     )
 
 

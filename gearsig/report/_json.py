@@ -234,7 +234,7 @@ def _typed(value: Any, kind: type, where: str, or_null: str = "") -> Any:
 
 
 def _fail(what: str) -> NoReturn:
-    raise InputError(what, remedy="make the file anew")
+    raise InputError(what, remedy="make the file again")
 
 
 # --------------------
@@ -516,7 +516,7 @@ def read_gap_json(path: str | Path) -> GapReport:
     try:
         return gap_from_dict(content)
     except InputError as error:
-        raise InputError(f"is damaged or not complete ({error.what})", where=where, remedy="make it anew") from None
+        raise InputError(f"is damaged or not complete ({error.what})", where=where, remedy="make it again") from None
 
 
 def gap_from_dict(content: Json) -> GapReport:

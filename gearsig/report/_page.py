@@ -385,7 +385,7 @@ class PictureGroup:
 
 @dataclass(frozen=True)
 class Gallery:
-    """All pictures of a page, and a remark on those left out."""
+    """All pictures of a page, and a note on those left out."""
 
     groups: tuple[PictureGroup, ...]
     left_out: str = ""
@@ -792,7 +792,7 @@ def page_pdf(analysis: Analysis, *, command: str = "", methods: Sequence[str] | 
             }
             for group in parts["gallery"].groups
         ],
-        "facts": [*parts["machine"], *parts["speed"], *(("remark", text) for text in parts["warnings"])],
+        "facts": [*parts["machine"], *parts["speed"], *(("warning", text) for text in parts["warnings"])],
         "provenance": parts["provenance"],
     }
     return compiled("page.typ", data, pictures)

@@ -272,7 +272,7 @@ def speed_rows(angle: ShaftAngle | CannotTell) -> Rows:
         ),
         ("how it was found", METHODS[angle.method] + f"; quality {readable(angle.quality, 2)} of 1"),
         ("revolutions", readable(angle.n_revolutions, 5)),
-        *(("remark on the speed", with_minus(f"{note[:1].upper()}{note[1:]}")) for note in angle.notes),
+        *(("note on the speed", with_minus(f"{note[:1].upper()}{note[1:]}")) for note in angle.notes),
     )
 
 

@@ -241,7 +241,7 @@ def pair_facts(rig: Rig, torque_nm: float | None) -> PairFacts:
         known = {"driver_teeth": driver, "driven_teeth": driven, "module_mm": module_mm, "face_width_mm": width_mm}
         missing = [name for name, value in (known | {"torque_nm of the operating point": torque}).items() if not value]
         raise RefusalError(
-            f"the rig file does not give {', '.join(missing)}: the size of a crack's effect hangs on it",
+            f"the rig file does not give {', '.join(missing)}: the size of a crack's effect depends on it",
             remedy="complete the rig file; the torque may be given with the call",
         )
     angle = pair.pressure_angle_deg
@@ -273,7 +273,7 @@ def acceleration_channels(recording: Recording, chosen: tuple[str, ...], whose: 
         raise InputError(f"{unknown[0]!r} is no acceleration channel", where="channels", allowed=allowed)
     if not accelerations:
         raise RefusalError(
-            "there is no acceleration channel, and the calibration has no others",
+            "there is no acceleration channel, and the calibration is for accelerations alone",
             remedy="name the channel's quantity with a [[sensor]] in the rig file",
         )
     names = chosen or accelerations

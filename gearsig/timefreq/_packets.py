@@ -90,7 +90,7 @@ def node_path(band: int, level: int) -> str:
     ['aa', 'ad', 'dd', 'da']
     """
     if not 0 <= band < 1 << count(level, "level"):
-        raise InputError(f"band {band} is not there", where="band", allowed=f"0 to {(1 << level) - 1}")
+        raise InputError(f"band {band} does not exist", where="band", allowed=f"0 to {(1 << level) - 1}")
     return f"{band ^ (band >> 1):0{level}b}".replace("0", "a").replace("1", "d")
 
 
@@ -172,7 +172,7 @@ def packet_inverse(packets: WaveletPackets, bands: list[int] | None = None) -> F
     if bands is not None:
         for band in bands:
             if not 0 <= band < packets.n_bands:
-                raise InputError(f"band {band} is not there", where="bands", allowed=f"0 to {packets.n_bands - 1}")
+                raise InputError(f"band {band} does not exist", where="bands", allowed=f"0 to {packets.n_bands - 1}")
         kept[np.setdiff1d(np.arange(packets.n_bands), bands)] = 0.0
     rows = list(kept)
     while len(rows) > 1:

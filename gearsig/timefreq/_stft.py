@@ -354,7 +354,7 @@ def _frames(
     high = x.highest_valid if highest is None else positive(highest, "highest")
     if not 0.0 <= low < high <= x.highest_valid * (1 + 1e-9):
         raise InputError(
-            f"lines from {low:g} to {high:g} {x.position_unit} are asked",
+            f"lines from {low:g} to {high:g} {x.position_unit} are asked for",
             where="lowest, highest",
             allowed=f"0 <= lowest < highest <= {x.highest_valid:g} {x.position_unit}",
         )

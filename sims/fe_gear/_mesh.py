@@ -252,7 +252,7 @@ def sector_mesh(blank: GearBlank, size: MeshSize, crack: CrackLine | None = None
     Raises
     ------
     InputError
-        If the mesh is too coarse for the fillet or has a folded cell.
+        If the mesh is too coarse for the fillet or has an inverted cell.
     """
     check_fillet(blank, size)
     plane = sector_plane(blank, size, crack)
@@ -727,12 +727,12 @@ def mesh_quality(mesh: SectorMesh) -> MeshQuality:
 
 
 def check_jacobians(mesh: SectorMesh) -> None:
-    """Refuse a mesh with a folded cell."""
+    """Refuse a mesh with an inverted cell."""
     determinants = cell_fields(mesh.points_m, mesh.cells).determinants
     folded = int(np.count_nonzero(determinants.min(axis=1) <= 0.0))
     if folded:
         raise InputError(
-            f"{folded} of {len(determinants)} cells are folded",
+            f"{folded} of {len(determinants)} cells are inverted",
             allowed="none",
             remedy="change the numbers of cells, or the rim and hub thickness",
         )

@@ -216,7 +216,7 @@ class _DriveRun:
         """Make room for the signals, and put the drive into its first state."""
         n = ceil(duration_s / interval_s - 1e-9)
         if n > MAX_POINTS:
-            raise InputError(f"{n} points are wanted", allowed=f"up to {MAX_POINTS}", remedy="shorten the run")
+            raise InputError(f"{n} points are too many", allowed=f"up to {MAX_POINTS}", remedy="shorten the run")
         select = np.array([SIGNALS.index(one_of(name, "signals", SIGNALS)) for name in signals], dtype=np.int64)
         contacts = np.zeros((1000 + int(CONTACTS_PER_SECOND * duration_s), len(CONTACT_COLUMNS)))
         y, mode, counts = np.zeros(N_STATES), np.zeros(3), np.zeros(4, dtype=np.int64)

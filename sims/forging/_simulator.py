@@ -366,7 +366,9 @@ class ForgingManipulator(Simulator):
         within(duration_s, "duration_s", *DURATION_RANGE_S, "s")
         within(sampling_rate_hz, "sampling_rate_hz", *SAMPLING_RATE_RANGE_HZ, "Hz")
         if sampling_rate_hz * duration_s > MAX_SAMPLES:
-            raise InputError(f"{sampling_rate_hz * duration_s:.3g} samples are wanted", allowed=f"up to {MAX_SAMPLES}")
+            raise InputError(
+                f"{sampling_rate_hz * duration_s:.3g} samples are too many", allowed=f"up to {MAX_SAMPLES}"
+            )
         ready = self.prepare(setup)
         rig = build_rig(
             ready.drive,

@@ -139,7 +139,7 @@ def balanced(
             part /= 2.0
         p = p - part * step
     raise RefusalError(
-        f"the static balance of a bearing's rolling elements was not found (out of balance by {np.hypot(*slope):.1g})",
+        f"the static balance of a bearing's elements does not converge (out of balance by {np.hypot(*slope):.1g})",
         remedy="take another clearance or load",
     )
 

@@ -449,7 +449,7 @@ class PairTwin:
         """
         plausible, machine = effect(name).plausible_range, self._facts
         if not plausible.choices(machine):
-            raise RefusalError(f"the rig has nothing that {name} could be in", remedy="describe its bearings")
+            raise RefusalError(f"the rig describes no part that {name} could be in", remedy="describe its bearings")
         options = plausible.drawn(machine, rng)
         low, high = effect(name).plausible_severities(machine, options)
         return Added(name, log_uniform(rng, low * (high / low) ** above, high), options)

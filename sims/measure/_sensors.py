@@ -268,7 +268,7 @@ class ModalPath:
         object.__setattr__(self, "direct", _gains(self.direct))
         object.__setattr__(self, "modes", tuple(self.modes))
         if not self.direct and not any(mode.gains for mode in self.modes):
-            raise InputError("the path leads from nowhere", remedy='give direct={"position": 1.0} or a mode with gains')
+            raise InputError("the path has no source", remedy='give direct={"position": 1.0} or a mode with gains')
 
     @property
     def settling_s(self) -> float:

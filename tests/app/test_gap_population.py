@@ -124,7 +124,7 @@ def test_an_unbalance_is_heard_where_the_housing_yields() -> None:
 def test_a_damaged_population_is_named(tmp_path) -> None:
     (tmp_path / "population.npz").write_bytes(LEARNED_FILE.read_bytes()[:10_000])
     assert read_learned(tmp_path / "population.npz") is None
-    with pytest.raises(InputError, match=r"population\.npz: the population is not there, or damaged"):
+    with pytest.raises(InputError, match=r"population\.npz: the population is missing or damaged"):
         load_population(tmp_path / "population.npz")
 
 

@@ -227,7 +227,7 @@ def test_who_makes_a_store_forgets_nothing_that_another_added_meanwhile(make_rec
 
 def test_other_folders_are_not_taken_for_a_store(tmp_path):
     (tmp_path / "a.txt").write_text("mine")
-    with pytest.raises(InputError, match="other things"):
+    with pytest.raises(InputError, match="other files"):
         open_fleet(tmp_path, create=True)
     with pytest.raises(InputError, match="no fleet"):
         open_fleet(tmp_path / "absent")

@@ -116,7 +116,7 @@ def test_scatter_is_drawn_towards_that_of_the_family() -> None:
 
 
 def test_an_unknown_feature_is_an_error() -> None:
-    with pytest.raises(InputError, match=r"nothing of mesh\.new"):
+    with pytest.raises(InputError, match=r"lacks mesh\.new"):
         FLOOR.of(("mesh.new",))
     with pytest.raises(InputError, match="above 0"):
         StructuralFloor(("a",), np.zeros(1))

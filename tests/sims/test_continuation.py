@@ -151,7 +151,7 @@ def test_what_cannot_be_run_is_refused(change, words):
 
 def test_a_branch_needs_one_axis_and_steady_speed():
     axes = (Axis("speed_rpm", (500.0,)), Axis("torque_nm", (10.0,)))
-    with pytest.raises(InputError, match="2 things are varied"):
+    with pytest.raises(InputError, match="2 quantities are varied"):
         Branch(Sweep("cracked", axes))
     ramp = Profile.of((0.0, 1.0), (300.0, 900.0))
     with pytest.raises(InputError, match="speed_rpm changes with time"):

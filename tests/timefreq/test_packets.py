@@ -87,7 +87,7 @@ def test_energies_of_the_nodes_add_up_to_the_signal(swept_angle_signal):
 
 
 def test_a_node_that_is_not_there_is_named():
-    with pytest.raises(InputError, match="band 4 is not there"):
+    with pytest.raises(InputError, match="band 4 does not exist"):
         node_path(4, 2)
 
 

@@ -283,7 +283,7 @@ def show_finished(finished: Finished) -> None:
     report = finished.report
     _show_verdict(report)
     _show_panels(report)
-    _show_remarks(report)
+    _show_notes(report)
     _show_downloads(finished)
     views = (_show_where, _show_which, _show_how_far, _show_next)
     for tab, view in zip(address.tabs(TABS, key=TAB), views, strict=True):
@@ -369,7 +369,7 @@ def _reach(steps: Sequence[ChartRow]) -> tuple[float, float]:
     return 0.0, 1.06 * max([1.2, *ends])
 
 
-def _show_remarks(report: GapReport) -> None:
+def _show_notes(report: GapReport) -> None:
     for warning in report.warnings:
         st.warning(f"**{CHECK_FIRST}.** {as_typed(warning)}", icon=":material/report:")
     advice = condition_advice(report)

@@ -231,7 +231,7 @@ def cut_cycles(motion: motions.PairMotion) -> PreparedCycles:
     segments = motions.motion_segments(motion.driver_angle_rad, rate)
     if not motions.is_start_stop(segments) and segments.standing_part < 0.05:
         raise RefusalError(
-            f"{where} turns all the time: no start and stop is in it, and the start–stop diagnosis rests on them",
+            f"{where} turns all the time: it holds none of the starts and stops that the start–stop diagnosis rests on",
             remedy="record starts and stops; compare stationary running with --model cracked or reduced-fe",
         )
     n = len(segments.moving)

@@ -259,7 +259,7 @@ def _messages(diagnosis: DriveDiagnosis, clearest: DriveComparison, evidence: Dr
         why = "only a healthy reference tells what is ordinary"
         if lacking:
             why = f"no torque was recorded in {', '.join(lacking)}"
-        yield f"Not weighed, as {why}: {', '.join(missing)}. Such a cause ends in none or unknown."
+        yield f"Not considered, as {why}: {', '.join(missing)}. Such a cause ends in none or unknown."
     if every[0].reference is not None:
         yield (
             "Tooth and order count from the zero of the pinion's encoder, which must be the same in both recordings. "

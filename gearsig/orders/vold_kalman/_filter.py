@@ -212,7 +212,7 @@ def _check_record_length(tracks: Tracks, bandwidth: FloatArray, valid: BoolArray
         width = float(np.median(np.broadcast_to(bandwidth[k], valid[k].shape)[valid[k]]))
         if width * duration < 1.0:
             raise InputError(
-                f"the bandwidth of order {name!r} is {width:.4g} {tracks.unit}, and the order is there for "
+                f"the bandwidth of order {name!r} is {width:.4g} {tracks.unit}, and the order lasts "
                 f"{duration:.4g} {tracks.duration_unit} only",
                 where="bandwidth",
                 allowed=f"at least {1 / duration:.4g} {tracks.unit}",

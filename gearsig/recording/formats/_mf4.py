@@ -47,7 +47,7 @@ def read_mf4(path: Path) -> RawTable:
         return call_apart(_read, path, longest_s=4.0 + 1e-6 * path.stat().st_size)
     except (BrokenProcessPool, MemoryError):
         raise InputError(
-            "is damaged: its reader dies of it, finds no end, or asks for far more memory than it can hold",
+            "is damaged: its reader crashes, finds no end, or asks for far more memory than it can hold",
             where=where,
             allowed="a complete MF4 file",
         ) from None
