@@ -300,7 +300,7 @@ class Score:
     n: int
 
 
-NOTHING = Score(float("nan"), float("nan"), float("nan"), 0)
+NO_SCORE = Score(float("nan"), float("nan"), float("nan"), 0)
 
 
 def share(n_hits: int, n: int) -> Score:
@@ -312,7 +312,7 @@ def share(n_hits: int, n: int) -> Score:
     1927).
     """
     if n == 0:
-        return NOTHING
+        return NO_SCORE
     p, z2 = n_hits / n, Z**2
     middle = (p + z2 / (2 * n)) / (1 + z2 / n)
     half = Z * sqrt(p * (1 - p) / n + z2 / (4 * n**2)) / (1 + z2 / n)
@@ -336,7 +336,7 @@ def resampled(
     """
     value = statistic(rows) if rows else float("nan")
     if not isfinite(value):
-        return NOTHING
+        return NO_SCORE
     picks = rng.integers(len(rows), size=(N_RESAMPLES, len(rows)))
     resamples = [resampled_value for pick in picks if isfinite(resampled_value := statistic([rows[i] for i in pick]))]
     low, high = np.quantile(resamples, (0.05, 0.95))
@@ -670,7 +670,7 @@ FIGURES: tuple[Figure, ...] = (
 
 def scores(rows: Rows, seed: int, figures: Sequence[Figure] = FIGURES) -> dict[str, Score]:
     """Return every figure of these rows; nothing where no row applies."""
-    return {f.key: f.measure(rows, np.random.default_rng(seed)) if rows else NOTHING for f in figures}
+    return {f.key: f.measure(rows, np.random.default_rng(seed)) if rows else NO_SCORE for f in figures}
 
 
 def strong_only(rows: Rows, min_strength: float) -> list[Row]:

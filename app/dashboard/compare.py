@@ -15,11 +15,11 @@ from app.dashboard.laboratory.setup import MODEL, Setup, shown_name
 from app.dashboard.state import AnalysisRequest, ChosenFile, Content
 from app.dashboard.widgets.charts import (
     download,
-    looked_at,
     offer_page,
     padded_limits,
     show_differences,
     show_lines,
+    zoomed_range,
 )
 from app.dashboard.widgets.chooser import (
     FILE,
@@ -391,7 +391,7 @@ def _show_angle(comparison: Comparison, channel: ChannelComparison) -> None:
             beyond,
             f"angle of {name} (deg)",
             f"teeth of {key}",
-            looked_at(key, whole),
+            zoomed_range(key, whole),
             "simulated − recorded",
         )
         st.caption(f"Tooth by tooth, at the middle of each.{doubt_text(comparison, shaft.shaft)}")

@@ -13,7 +13,7 @@ from app import gear_body
 from app.dashboard import address
 from app.dashboard.components import component_of
 from app.dashboard.theme import is_dark
-from app.dashboard.widgets.charts import download, packed, show_figure, show_map
+from app.dashboard.widgets.charts import download, encoded, show_figure, show_map
 from app.dashboard.widgets.texts import as_typed, capitalised, show_words
 from app.dashboard.work import kept
 from app.gear_body import GearBodyStudy
@@ -114,10 +114,10 @@ def show_gear() -> None:
     _solid(
         key="gear that is turned",
         data={
-            "points": packed(view.points_mm.ravel()),
-            "quads": packed(view.quads.ravel().astype(np.float64)),
-            "motion": packed((motion / largest).ravel()),
-            "values": packed(np.clip(values / top, 0.0, 1.0)),
+            "points": encoded(view.points_mm.ravel()),
+            "quads": encoded(view.quads.ravel().astype(np.float64)),
+            "motion": encoded((motion / largest).ravel()),
+            "values": encoded(np.clip(values / top, 0.0, 1.0)),
             "stretch": SWING * study.mesh.blank.geometry.tip_radius_mm * (shown != STRESS),
             "swings": shown != STRESS,
             "colours": level_colours(dark=is_dark())[50:240:24].tolist(),

@@ -45,7 +45,7 @@ CRACKS_MM = (0, 1, 2, 3, 4)
 CRACKED_TOOTH = 20  # from 0, as mesh cycles count; the parameter counts from 1
 SEED = 1
 SETTLING_S = 0.5
-FELT = 0.01
+REACH_THRESHOLD = 0.01
 """The reach of a crack ends where the change stays below this part of the healthy gear's rms for a mesh cycle."""
 PUBLISHED_LINES_HZ = (17.9, 26.9, 39.4, 59.1, 89.6, 133.4, 200.5, 300.8, 451.2, 667.7, 1016.0, 1524.0)
 SOURCE = (
@@ -59,7 +59,7 @@ def machine(**changed: ParameterValue) -> Machine:
     return build_machine(complete_values(PARAMETERS, PRESET.parameters, changed))
 
 
-SOFTER: Mapping[str, ParameterValue] = {"bending_stiffness_n_per_m": 2e7, "bearing_stiffness_n_per_m": 2e7}
+SOFT_SUPPORTS: Mapping[str, ParameterValue] = {"bending_stiffness_n_per_m": 2e7, "bearing_stiffness_n_per_m": 2e7}
 """A tenth of what the preset assumes of shafts and bearings."""
 
 
@@ -73,12 +73,12 @@ def cracked(depth_mm: float) -> Machine:
     return machine(crack_depth_mm=depth_mm, crack_tooth=CRACKED_TOOTH + 1)
 
 
-def named(depth_mm: float) -> str:
+def crack_name(depth_mm: float) -> str:
     """Name a crack."""
     return f"crack {depth_mm:g} mm" if depth_mm else "no crack"
 
 
-def rq(roughness_um: float) -> str:
+def rq_name(roughness_um: float) -> str:
     """Name a roughness."""
     return f"{roughness_um:.2f} µm"
 
@@ -108,7 +108,7 @@ def friction_curves() -> tuple[FloatArray, dict[str, FloatArray]]:
     for roughness in ROUGHNESS_UM:
         friction = friction_over_mesh(mesh, TORQUE_NM, RPM, viscosity, roughness, cycles)
         signed = friction.coefficient * np.sign(friction.sliding_mps)
-        curves[rq(roughness)] = signed[np.arange(len(cycles)), np.minimum(slot, mesh.n_slots - 1)]
+        curves[rq_name(roughness)] = signed[np.arange(len(cycles)), np.minimum(slot, mesh.n_slots - 1)]
     return cycles, curves
 
 
@@ -164,8 +164,8 @@ def backlash_lines() -> tuple[FloatArray, dict[str, FloatArray], FloatArray, dic
         change = profile.height_m(time)
         spectrum = amplitude_spectrum(change, rate_hz)
         shown = (spectrum.positions > 12.0) & (spectrum.positions < 2500.0)
-        curves[rq(roughness)] = half_m + change[time < 0.4]
-        amplitudes[rq(roughness)] = spectrum.values[shown]
+        curves[rq_name(roughness)] = half_m + change[time < 0.4]
+        amplitudes[rq_name(roughness)] = spectrum.values[shown]
         positions, lines = spectrum.positions[shown], profile.frequencies_hz.tolist()
     return time[time < 0.4], curves, positions, amplitudes, lines
 
@@ -197,7 +197,7 @@ def _backlash() -> PaperFigure:
     levels = [float(np.sqrt(np.sum(values**2) / 2.0)) for values in amplitudes.values()]
     grows = judged(
         "the backlash varies more with the roughness",
-        f"rms of the lines {', '.join(f'{1e6 * v:.2g}' for v in levels)} µm at {', '.join(map(rq, ROUGHNESS_UM))}",
+        f"rms of the lines {', '.join(f'{1e6 * v:.2g}' for v in levels)} µm at {', '.join(map(rq_name, ROUGHNESS_UM))}",
         agrees=bool(np.all(np.diff(levels) > 0.0)),
     )
     return PaperFigure(
@@ -245,16 +245,16 @@ def _friction_inside() -> PaperFigure:
     mesh = machine().mesh
     ratio, cycles = mesh.pair.contact_ratio, np.linspace(0.0, 2.0, 1201)
     shown = {
-        rq(r): (stiffness_with_friction(r, cycles) if r else mesh_stiffness(mesh, cycles).total_n_per_m) / 1e8
+        rq_name(r): (stiffness_with_friction(r, cycles) if r else mesh_stiffness(mesh, cycles).total_n_per_m) / 1e8
         for r in ROUGHNESS_UM
     }
-    smooth = shown.pop(rq(0.0))
+    smooth = shown.pop(rq_name(0.0))
     changes = {name: values / smooth - 1.0 for name, values in shown.items()}
     squared = {r: stiffness_with_friction(r, cycles, squared=True) / 1e8 / smooth - 1.0 for r in ROUGHNESS_UM[1:]}
-    printed, change = squared[1.40], changes[rq(1.40)]
+    printed, change = squared[1.40], changes[rq_name(1.40)]
     figure = curves_figure(
         [
-            CurvePanel(cycles, {rq(0.0): smooth} | shown, "mesh cycles", "stiffness (10⁸ N/m)"),
+            CurvePanel(cycles, {rq_name(0.0): smooth} | shown, "mesh cycles", "stiffness (10⁸ N/m)"),
             CurvePanel(
                 cycles,
                 {name: 100.0 * values for name, values in (changes | {"1.40 µm as printed": printed}).items()},
@@ -307,7 +307,7 @@ def mesh_stiffness_cracks() -> Figure:
     """Draw the stiffness while the cracked tooth passes; tooth 20 enters at 20 mesh cycles, drawn as 0."""
     mesh = machine().mesh
     cycles = np.linspace(-1.5, 3.0, 1801)
-    curves = {named(d): mesh_stiffness(cracked(d).mesh, cycles + CRACKED_TOOTH).total_n_per_m for d in CRACKS_MM}
+    curves = {crack_name(d): mesh_stiffness(cracked(d).mesh, cycles + CRACKED_TOOTH).total_n_per_m for d in CRACKS_MM}
     alone = (mesh.pair.contact_ratio - 1.0 + mesh.ramp / 2.0, 1.0 - mesh.ramp / 2.0)
     title = "Mesh stiffness of 55/75 teeth while a cracked pinion tooth passes (it enters at 0)"
     return plot.mesh_stiffness_figure(cycles, curves, single_pair=alone, title=title)
@@ -442,7 +442,7 @@ def _responses() -> PaperFigure:
     mesh = mesh_frequency_hz()
     # The same on softer shafts tells the resonance of a bending mode from what the mesh does.
     harmonics = [_at(cases[0], k * mesh) for k in (1, 2, 3, 4)]
-    softer = [_at(response_case(0.0, **SOFTER), k * mesh) for k in (1, 2, 3, 4)]
+    softer = [_at(response_case(0.0, **SOFT_SUPPORTS), k * mesh) for k in (1, 2, 3, 4)]
     natural = eigenfrequencies_hz(machine(), TORQUE_NM / (1e-3 * machine().mesh.pair.driver.base_radius_mm))
     mode = float(natural[np.argmin(np.abs(natural - 3.0 * mesh))])
     # The roughness's own lines, but for the one that the mesh frequency hides.
@@ -462,7 +462,7 @@ def _responses() -> PaperFigure:
         ),
         judged(
             "twelve further lines, whose amplitudes grow with the roughness",
-            f"together {', '.join(f'{1e9 * g:.3g}' for g in grown)} nm at {', '.join(map(rq, ROUGHNESS_UM))}",
+            f"together {', '.join(f'{1e9 * g:.3g}' for g in grown)} nm at {', '.join(map(rq_name, ROUGHNESS_UM))}",
             agrees=bool(np.all(np.diff(grown) > 0.0)),
         ),
         judged(
@@ -514,7 +514,7 @@ def _friction_force() -> PaperFigure:
 # Cracks in time and over time and frequency: figures 16, 18 and 20.
 
 
-def felt_until(cycles: FloatArray, change: FloatArray, threshold: float) -> float:
+def cycles_until_below(cycles: FloatArray, change: FloatArray, threshold: float) -> float:
     """Mesh cycles from the cracked tooth's entry until the change stays below `threshold` for a whole mesh cycle."""
     last = 0.0
     while last < 30.0:
@@ -533,13 +533,15 @@ def crack_reach(signal: str = "driver y acceleration") -> tuple[FloatArray, dict
     for depth in CRACKS_MM:
         run = steady(cracked(depth), 1.1, "driver angle", signal)
         turned = run["driver angle"] / (2.0 * np.pi)
-        values[named(depth)] = CubicSpline(turned, run[signal])(revolutions)
-    healthy = values[named(0)]
+        values[crack_name(depth)] = CubicSpline(turned, run[signal])(revolutions)
+    healthy = values[crack_name(0)]
     cycles = (revolutions - 5.0 - CRACKED_TOOTH / n_teeth) * n_teeth
     # Of an acceleration that of its rms, of a transmission error that of its swing.
     size = np.std(healthy) if "acceleration" in signal else np.ptp(healthy)
-    threshold = FELT * float(size)
-    reach = {name: felt_until(cycles, a - healthy, threshold) for name, a in values.items() if name != named(0)}
+    threshold = REACH_THRESHOLD * float(size)
+    reach = {
+        name: cycles_until_below(cycles, a - healthy, threshold) for name, a in values.items() if name != crack_name(0)
+    }
     return revolutions, values, reach
 
 
@@ -553,7 +555,7 @@ def crack_comparison() -> Figure:
         values,
         impacts_rev=[4.0 + entry, 5.0 + entry, 6.0 + entry],
         n_teeth=n_teeth,
-        change_mps2={name: a - values[named(0)] for name, a in values.items() if name != named(0)},
+        change_mps2={name: a - values[crack_name(0)] for name, a in values.items() if name != crack_name(0)},
         reach_cycles=reach,
         zoom_cycles=(-2.0, 8.0),
         title=f"Acceleration of the pinion along the line of action, {RPM:g} rpm, {TORQUE_NM:g} N·m, Rq 0.45 µm",
@@ -563,8 +565,8 @@ def crack_comparison() -> Figure:
 def _cracks() -> PaperFigure:
     _, values, _ = crack_reach()
     _, _, reach = crack_reach("transmission_error_m")
-    strength = [float(np.abs(values[named(d)] - values[named(0)]).max()) for d in CRACKS_MM[1:]]
-    cycles = [reach[named(d)] for d in CRACKS_MM[1:]]
+    strength = [float(np.abs(values[crack_name(d)] - values[crack_name(0)]).max()) for d in CRACKS_MM[1:]]
+    cycles = [reach[crack_name(d)] for d in CRACKS_MM[1:]]
     claims = (
         judged(
             "an impact per revolution that is enhanced with the crack",
@@ -605,8 +607,8 @@ def _crack_maps() -> tuple[PaperFigure, PaperFigure]:
         rate = 1.0 / run.interval_s / step
         x = kept[round(0.4 * rate) :][: round(0.5 * rate)]
         time = np.arange(len(x)) / rate
-        panels.append(CurvePanel(time, {named(depth): x}, "time (s)", "acceleration (m/s²)", named(depth)))
-        maps[depth] = squeezed_cwt_map(UniformSignal(x, rate, unit="m/s^2", source=named(depth)), lowest=100.0)
+        panels.append(CurvePanel(time, {crack_name(depth): x}, "time (s)", "acceleration (m/s²)", crack_name(depth)))
+        maps[depth] = squeezed_cwt_map(UniformSignal(x, rate, unit="m/s^2", source=crack_name(depth)), lowest=100.0)
         levels.append(x)
     figure = curves_figure(panels, title="Acceleration of the pinion, 1000 rpm", height_in=1.5)
     spread = [float(np.std(x - levels[0])) / float(np.std(levels[0])) for x in levels[1:]]

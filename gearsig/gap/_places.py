@@ -640,7 +640,7 @@ def _channel(comparison: ComparedPair, row: int) -> str:
 
 MIN_SPEED_CHANGE = 3e-4
 """Relative; a steadier speed is as good as constant."""
-PILED_UP = 1e-3
+CLIPPED_SHARE = 1e-3
 """Share of samples within half a percent of the extreme; of a vibration with random peaks, some 1e-5 lie there."""
 
 
@@ -689,7 +689,7 @@ def locate_tail(comparison: ComparedPair) -> GapPlace:
     change = comparison.change_db[name]
     channel = max(comparison.now.channels, key=lambda c: float(comparison.now.channels[c].tail[:, 2].mean()))
     if name == "raw.near_the_extreme":
-        piled = float(comparison.now.channels[channel].tail[:, 2].mean()) > PILED_UP
+        piled = float(comparison.now.channels[channel].tail[:, 2].mean()) > CLIPPED_SHARE
         clipping = ", as clipping makes them" if change > 0 and piled else ""
         title = f"samples close to the largest amplitude{clipping}, {by_decibels(change)}"
         return GapPlace(PlaceKind.TAIL, title, change, channel=channel, follows=not clipping)

@@ -459,7 +459,7 @@ def _pattern(
 SAME_PREDICTION = 0.8
 """Cosine of the angle between two predictions, in floors, from which they say the same."""
 
-MIN_OWN_FEATURE = 1.5
+MIN_AFFECTED = 1.5
 """Floors that an effect must change a feature by for it to be its own."""
 
 
@@ -507,10 +507,10 @@ class _Score:
     predicted: float
 
 
-def own_features(fit: Fit, observed: ObservedChange) -> FloatArray:
+def affected_features(fit: Fit, observed: ObservedChange) -> FloatArray:
     """Return 1 for the features that the fitted effect changes, 0 for the others; its strongest one at least."""
     predicted = np.abs(fit.at(observed.condition) / observed.floors)
-    used: FloatArray = (predicted >= min(MIN_OWN_FEATURE, float(predicted.max()))).astype(np.float64)
+    used: FloatArray = (predicted >= min(MIN_AFFECTED, float(predicted.max()))).astype(np.float64)
     return used
 
 
@@ -549,7 +549,7 @@ def closed_shares(fits: Mapping[str, Sequence[Fit]], folds: Sequence[Fold]) -> d
         shown = [fit for fit in fits_of_fold.values() if _largest_predicted(fit, fold.scored) >= MIN_PREDICTED]
         if not shown:
             continue
-        used = np.max([own_features(fit, fold.scored) for fit in shown], axis=0)
+        used = np.max([affected_features(fit, fold.scored) for fit in shown], axis=0)
         for name, fit in fits_of_fold.items():
             shares[name].append(_before_and_after(fit, fold.scored, used)[2])
     return {name: float(np.mean(values)) for name, values in shares.items() if values}
@@ -632,11 +632,11 @@ def _shrink_across_conditions(paths: Sequence[EffectPath], fold: Fold) -> float 
     for change in fold.fitted:
         if change.condition == fold.scored.condition:
             fit = fit.at_level_of(change)
-    return _before_and_after(fit, fold.scored, own_features(fit, fold.scored))[2]
+    return _before_and_after(fit, fold.scored, affected_features(fit, fold.scored))[2]
 
 
 def _score(paths: Sequence[EffectPath], fold: Fold, excluded: Sequence[EffectPath], fit: Fit) -> _Score:
-    used = own_features(fit, fold.scored)
+    used = affected_features(fit, fold.scored)
     wrong = [fit_path(path, fold.fitted) for path in (*paths, *excluded) if path.options != fit.path.options]
     placebos = [
         _before_and_after(wrong_fit, fold.scored, used)[2]

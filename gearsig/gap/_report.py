@@ -426,7 +426,7 @@ def rivals(causes: Sequence[GapCause]) -> tuple[str, ...]:
     return tuple(cause.name for cause in effects[: int(np.clip(n, 2, MAX_RIVALS))])
 
 
-OWN_LABELS = "your own labels"
+USER_LABELS = "your own labels"
 """Group of causes that only the user's labelled recordings know."""
 
 KIND_TITLES = {
@@ -436,7 +436,7 @@ KIND_TITLES = {
     "drive and load": "the drive or the load",
     "bearing": "a bearing",
     "measurement chain": "the measurement chain",
-    OWN_LABELS: "what you have labelled",
+    USER_LABELS: "what you have labelled",
 }
 """Group of effects → the kind of fault, in words; of another group, its name."""
 
@@ -787,7 +787,7 @@ def named_cause(name: str, probability: float, effects: Mapping[str, GapEffect],
         e = effects[name]
         return GapCause(name, e.group, e.title, e.unit, probability, place=place, is_nuisance=e.is_nuisance)
     if name not in (NONE, UNKNOWN):
-        return GapCause(name, OWN_LABELS, f"“{name.replace('_', ' ')}”", "", probability)
+        return GapCause(name, USER_LABELS, f"“{name.replace('_', ' ')}”", "", probability)
     title = "nothing beyond what healthy machines differ by" if name == NONE else "nothing in the catalogue"
     return GapCause(name, name, title, "", probability)
 

@@ -16,9 +16,9 @@ from sims.cracked._kernels import MAX_LATE, integrate
 from sims.gear_pair import (
     BEARING_FIELDS,
     COORDINATES,
+    DEFLECTIONS,
     FRICTION_FIELDS,
     MACHINE_FIELDS,
-    YIELDS,
     PairResponse,
     RunPlan,
     StepConvergence,
@@ -52,13 +52,13 @@ SIGNALS = (
     "mesh_force_n",
     "friction_n",
     "backlash_change_m",
-    *YIELDS,
+    *DEFLECTIONS,
 )
 """What a run can give, by the place in the kernel's row.
 
 transmission_error_m: r_b1 θ1 − r_b2 θ2. compression_m: that plus what the gears' centres add. mesh_force_n: sum of the
 tooth pairs' normal forces, below 0 on the back flank. friction_n: sum of the friction forces. backlash_change_m: Δb
-of a roughness locked to time. For yields see `sims.gear_pair.YIELDS`.
+of a roughness locked to time. For yields see `sims.gear_pair.DEFLECTIONS`.
 """
 
 # The machine as plain numbers, which compiled code reads.

@@ -372,17 +372,17 @@ COORDINATES = (
 )
 """Places in rad and m; models give their velocities and accelerations, too."""
 ANGLES = COORDINATES[1:3]
-YIELDS = tuple(f"{name} yield" for name in COORDINATES[8:])
+DEFLECTIONS = tuple(f"{name} yield" for name in COORDINATES[8:])
 """By how much each bearing's spring is pressed, in m: its force over its stiffness without clearance, or over that at
 the load where balls carry one by one. That force moves the housing; where rolling elements pass, the shaft follows,
 and little of its motion reaches the housing."""
-POSITIONS = (*COORDINATES[4:], *YIELDS)
+POSITIONS = (*COORDINATES[4:], *DEFLECTIONS)
 """Places whose acceleration a path can start from, each with its direction."""
 POINTS_PER_CYCLE = 6
 """Of the fastest resonance in path and sensor, in the motion handed to the measurement chain."""
 MIN_MOTION_HZ = 80_000.0
 """Rate of that motion at least: what the model still holds above half of it would fold back."""
-GOES_ON_S = 0.1
+CONTINUED_LEAD_IN_S = 0.1
 """Of the lead-in that a run has to itself where it goes on from another."""
 SETTLING = 6.0
 """Time constants of the slowest start-up motion that are left out ahead of the recording."""
@@ -508,8 +508,8 @@ class Measurement(Generic[State]):
 
     @property
     def lead_in(self) -> dict[str, Any] | None:
-        """The same up to `GOES_ON_S` before the recording, if it begins earlier: runs in another state go on there."""
-        n_points = floor((self.lead_in_s - GOES_ON_S) / (self.step_s * self.stride))
+        """The same up to `CONTINUED_LEAD_IN_S` before the recording; runs in another state go on there."""
+        n_points = floor((self.lead_in_s - CONTINUED_LEAD_IN_S) / (self.step_s * self.stride))
         return {**self.motion, "duration_s": n_points * self.step_s * self.stride} if n_points > 0 else None
 
     @property
@@ -528,7 +528,7 @@ class Measurement(Generic[State]):
 
     def _rolls(self, position: str) -> bool:
         """Whether a bearing's shaft moves by itself as its rolling elements pass, else as the spring yields."""
-        return position in YIELDS and self.machine.bearings[YIELDS.index(position) // 2].elements_pass
+        return position in DEFLECTIONS and self.machine.bearings[DEFLECTIONS.index(position) // 2].elements_pass
 
     def _acceleration(self, response: PairResponse[State], position: str) -> FloatArray:
         """Return a place's acceleration; of a yield by differences of what it is less than the shaft's motion."""

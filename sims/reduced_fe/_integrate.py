@@ -216,7 +216,7 @@ def _sprung(k, row, x, y):
 
 @njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
 def _yields(k, inputs, q, angle, load, extras):
-    """Fill the yields of the bearings, see `sims.gear_pair.YIELDS`."""
+    """Fill the yields of the bearings, see `sims.gear_pair.DEFLECTIONS`."""
     for row in range(4):
         side, number = row // 2, 4 + 2 * (row % 2)
         x, y = on_input(inputs, side, number, q), on_input(inputs, side, number + 1, q)

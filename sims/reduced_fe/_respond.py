@@ -14,7 +14,7 @@ from gearsig.checks import FloatArray, closest_match_hint, count, positive
 from gearsig.errors import InputError
 from gearsig.results import Result
 from sims.fe_gear import MeshSize, ReductionPlan, Spread, one_thread, reduce_gear
-from sims.gear_pair import COORDINATES, YIELDS, PairResponse, RunPlan, StepConvergence, profile_points
+from sims.gear_pair import COORDINATES, DEFLECTIONS, PairResponse, RunPlan, StepConvergence, profile_points
 from sims.machine import Operation, Profile
 from sims.mesh import one_mesh_cycle
 from sims.reduced_fe._contact import force_map
@@ -139,9 +139,9 @@ STEPS_PER_CALL = 100_000
 """Compiled code cannot be interrupted: it comes back for a look every quarter of a second or so."""
 MOVING = COORDINATES
 """Places in rad and m, each also with " velocity" and " acceleration". Those of gears are of their hubs."""
-EXTRAS = ("mesh_force_n", "back_force_n", "mesh_cycles", "approach_m", "contact_torque_nm", "friction_n", *YIELDS)
+EXTRAS = ("mesh_force_n", "back_force_n", "mesh_cycles", "approach_m", "contact_torque_nm", "friction_n", *DEFLECTIONS)
 """Sum of the contact forces, the force behind, c, the greatest approach of flanks, torque of moving stiffness, friction
-along x on the driven gear, and `sims.gear_pair.YIELDS`."""
+along x on the driven gear, and `sims.gear_pair.DEFLECTIONS`."""
 TRANSMISSION_ERROR = "transmission_error_m"
 """r_b1 θ1 − r_b2 θ2 of the hubs."""
 KINDS = ("", " velocity", " acceleration")

@@ -189,7 +189,7 @@ def tiles(page: AppTest) -> list[str]:
 
 
 def numbers(values: str) -> np.ndarray:
-    """Return the numbers of a curve, which are packed."""
+    """Return the numbers of a curve, which are encoded."""
     return np.frombuffer(b64decode(values), "<f8")
 
 

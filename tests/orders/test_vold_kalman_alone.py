@@ -7,7 +7,7 @@ from gearsig.errors import RefusalError
 from gearsig.orders.vold_kalman import (
     envelope_alone,
     envelope_weight,
-    error_alone,
+    single_order_error,
     waveform_alone,
     waveform_weight,
 )
@@ -104,7 +104,7 @@ def test_no_digits_are_lost_in_narrow_bands(p, bandwidth):
     r = envelope_weight(np.array([bandwidth]), p)
     error = np.abs(envelope_alone(y, cycles, None, r, p, mirror=False) - 2 * exact_envelope(z, r[0], p)).max()
     assert error < {1e-6: 1e-9, 1e-4: 1e-11, 0.1: 1e-11}[bandwidth]
-    assert error < 2 * error_alone(np.array([bandwidth]))
+    assert error < 2 * single_order_error(np.array([bandwidth]))
 
 
 @pytest.mark.parametrize("p", [1, 2, 3])

@@ -10,8 +10,8 @@ from scipy.sparse.linalg import splu
 from gearsig.checks import FloatArray
 from gearsig.orders.vold_kalman import (
     accuracy_of,
-    closeness,
     envelope_weight,
+    rounding_growth,
     solve_envelopes,
 )
 
@@ -61,10 +61,12 @@ def test_orders_that_cross_swiftly_or_lie_apart_are_not_close() -> None:
     widths = np.full((2, 1), 10.0 / RATE_HZ)
     apart = np.stack([300.0 * TIME_S, 315.0 * TIME_S])
     crossing = np.stack([300.0 * TIME_S, 100.0 * TIME_S + 0.5 * 2700.0 * TIME_S**2])
-    assert closeness(apart, None, widths, 2) == 1.0
-    assert closeness(crossing, None, widths, 2) == 1.0
+    assert rounding_growth(apart, None, widths, 2) == 1.0
+    assert rounding_growth(crossing, None, widths, 2) == 1.0
     long_s = np.arange(20 * N) / RATE_HZ
-    assert closeness(np.stack([300.0 * long_s, 302.0 * long_s]), None, widths, 2) == pytest.approx(5.0**4, rel=1e-3)
+    assert rounding_growth(np.stack([300.0 * long_s, 302.0 * long_s]), None, widths, 2) == pytest.approx(
+        5.0**4, rel=1e-3
+    )
 
 
 @pytest.mark.parametrize(("bandwidth_hz", "slope_hz_per_s"), [(60.0, 40.0), (200.0, 200.0)])

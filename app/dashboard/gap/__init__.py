@@ -24,12 +24,12 @@ from app.dashboard.widgets.charts import (
     QUIET,
     Ring,
     download,
-    looked_at,
     offer_page,
     show_differences,
     show_lines,
     show_picture,
     show_rows,
+    zoomed_range,
 )
 from app.dashboard.widgets.spectrum import show_revolutions
 from app.dashboard.widgets.texts import as_typed, capitalised, show_checks, show_warnings, show_words
@@ -482,7 +482,7 @@ def _show_spectra(curves: SpectrumCurves, beside: str, *, scored: bool) -> None:
     seen = np.isfinite(gap)
     beyond = is_beyond(curves, gap) if scored else np.zeros(len(gap), dtype=bool)
     show_differences(
-        x[seen], gap[seen], beyond[seen], order, f"{key} gap", looked_at(key, whole), f"measured − {beside}"
+        x[seen], gap[seen], beyond[seen], order, f"{key} gap", zoomed_range(key, whole), f"measured − {beside}"
     )
 
 

@@ -17,7 +17,7 @@ from app.dashboard.laboratory.bifurcation import show_bifurcation
 from app.dashboard.laboratory.run import LaboratoryRun
 from app.dashboard.laboratory.setup import Setup, effect_text, slider_values
 from app.dashboard.theme import palette
-from app.dashboard.widgets.charts import FAULT, MEASURED, SHAFT, packed, padded_limits, show_lines
+from app.dashboard.widgets.charts import FAULT, MEASURED, SHAFT, encoded, padded_limits, show_lines
 from app.dashboard.widgets.spectrum import show_spectrum
 from app.dashboard.widgets.texts import as_typed, capitalised
 from gearsig.checks import FloatArray
@@ -335,7 +335,7 @@ def show_gears(healthy: LaboratoryRun, faulty: LaboratoryRun | None, channel: st
     values = [_over_cycles(run, channel, shown) for run in both]
     named = zip(("healthy", "faulty"), (colours.measured, colours.fault), values, forces, strict=False)
     lines = [
-        {"name": name, "colour": colour, "x": packed(shown), "y": packed(y), "force": packed(force)}
+        {"name": name, "colour": colour, "x": encoded(shown), "y": encoded(y), "force": encoded(force)}
         for name, colour, y, force in named
     ]
     cracked = dict.fromkeys(("driver", "driven"), 0) | dict(teeth)

@@ -136,7 +136,7 @@ N_COLUMNS = 1600
 MAP_COLUMNS, MAP_ROWS = 900, 360
 
 
-def looked_at(key: str, whole: tuple[float, float], first: tuple[float, float] | None = None) -> tuple[float, float]:
+def zoomed_range(key: str, whole: tuple[float, float], first: tuple[float, float] | None = None) -> tuple[float, float]:
     """Return the range of its axis that the figure of that key was zoomed to, `first` until then.
 
     The page's address keeps the last one, so that a view can be sent.
@@ -232,7 +232,7 @@ def show_lines(
     lines, is_plane = panel.lines, panel.is_plane
     limits = panel.x_limits or (min(float(line.x.min()) for line in lines), max(float(line.x.max()) for line in lines))
     ends = whole or limits
-    shown = looked_at(key, ends, limits)
+    shown = zoomed_range(key, ends, limits)
     data = _described(panel, key, shown, ends, height_px, has_tools=not is_plane) | {
         "lines": [_sent(line, None if is_plane else shown, alone=len(lines) == 1) for line in lines],
         "cursors": _cursor_rows(panel.cursors, palette(), lines[-1] if lines and not is_plane else None, shown),
@@ -280,7 +280,7 @@ def show_map(
     values, x, y = panel.levels, panel.at, panel.positions
     half = (x[-1] - x[0]) / max(len(x) - 1, 1) / 2
     ends = (float(x[0] - half), float(x[-1] + half))
-    span = looked_at(key, ends, shown)
+    span = zoomed_range(key, ends, shown)
     start = max(int(np.searchsorted(x, span[0] - half)), 0)
     stop = max(int(np.searchsorted(x, span[1] + half)), start + 2)
     part = values[:, start:stop]
@@ -335,7 +335,7 @@ def show_rows(panel: RowPanel, key: str, words: str, *, has_names_above: bool = 
         if np.isfinite(end)
     ]
     whole = panel.limits or padded_limits([np.array(ends)])
-    shown = looked_at(key, whole)
+    shown = zoomed_range(key, whole)
     rows = [
         {
             "name": one_line(row.name),
@@ -409,7 +409,7 @@ def _sent(line: ChartLine, shown: tuple[float, float] | None, *, alone: bool = T
     """Return a line as the component takes it, whole where `shown` is None; pale bands would hide other spectra."""
     x, y, *band = (line.x, line.y) if shown is None else _columns(line, shown)
     band = band if alone or line.band is not None else []
-    curves = {name: packed(values) for name, values in zip(("x", "y", "low", "high"), (x, y, *band), strict=False)}
+    curves = {name: encoded(values) for name, values in zip(("x", "y", "low", "high"), (x, y, *band), strict=False)}
     colour = _shown_colour(line.colour)
     return {"name": one_line(line.name), "colour": colour, "dotted": line.dotted, "dots": line.dots, **curves}
 
@@ -426,12 +426,12 @@ def _shown_colour(colour: int | str) -> str:
     hue, lightness, saturation = rgb_to_hls(*on_paper)
     # A scale of colours turned over ends in pale ones that nobody tells apart: they grow lighter by different amounts.
     shown = (
-        turned_over(on_paper) if saturation < 0.2 else np.array(hls_to_rgb(hue, 0.55 + 0.25 * lightness, saturation))
+        on_dark_ground(on_paper) if saturation < 0.2 else np.array(hls_to_rgb(hue, 0.55 + 0.25 * lightness, saturation))
     )
     return "#" + (255 * shown).astype(np.uint8).tobytes().hex()
 
 
-def packed(values: FloatArray) -> str:
+def encoded(values: FloatArray) -> str:
     """Return numbers as a component takes them."""
     return b64encode(np.ascontiguousarray(values, dtype="<f8").tobytes()).decode("ascii")
 
@@ -542,7 +542,7 @@ def show_svg(svg: str, words: str, key: str, *, turned: bool = False, ring: Ring
         What is read off around the picture's middle.
     """
     left, _, width, _ = (float(number) for number in _VIEW_BOX.findall(svg)[0].split())
-    looked_at(key, (left, left + width))  # which keeps it in the address
+    zoomed_range(key, (left, left + width))  # which keeps it in the address
     ends = _zoomed(key)
     data = {
         "svg": svg,
@@ -551,7 +551,7 @@ def show_svg(svg: str, words: str, key: str, *, turned: bool = False, ring: Ring
         "shown": ends if len(ends) == 4 else None,
         "ring": ring
         and {
-            "curves": [{"name": name, "values": packed(values)} for name, values in ring.curves.items()],
+            "curves": [{"name": name, "values": encoded(values)} for name, values in ring.curves.items()],
             "teeth": ring.teeth,
             "unit": ring.unit,
         },
@@ -590,7 +590,7 @@ def file_stem(key: str) -> str:
     return re.sub(r"[^\w-]+", "-", key.split(" of ", maxsplit=1)[0]).strip("-") or "figure"
 
 
-def turned_over(colours: FloatArray) -> FloatArray:
+def on_dark_ground(colours: FloatArray) -> FloatArray:
     """Return colours of paper, (…, 3) from 0 to 1, for a dark page: light and dark change places, hues stay."""
     turned: FloatArray = np.clip((1 - colours) @ HALF_TURN.T, 0, 1)
     return DARK_GROUND + (BRIGHTEST - DARK_GROUND) * turned
@@ -604,7 +604,7 @@ def picture_bytes(figure: PictureFigure, *, dark: bool) -> bytes:
     figure.savefig(pixels, format="png", dpi=DOTS_PER_INCH, pil_kwargs={"compress_level": 0})
     image = Image.open(pixels).convert("RGB")
     if dark:
-        image = Image.fromarray((255 * turned_over(np.asarray(image, dtype=np.float32) / 255)).astype(np.uint8))
+        image = Image.fromarray((255 * on_dark_ground(np.asarray(image, dtype=np.float32) / 255)).astype(np.uint8))
     image.save(buffer, format="png", compress_level=1)
     return buffer.getvalue()
 

@@ -14,10 +14,10 @@ from app.dashboard.theme import palette
 from app.dashboard.widgets.charts import (
     N_COLUMNS,
     Ring,
-    looked_at,
     offer_picture,
     show_lines,
     show_svg,
+    zoomed_range,
 )
 from app.dashboard.widgets.texts import as_typed, capitalised
 from gearsig.checks import FloatArray
@@ -104,7 +104,7 @@ def show_spectrum(
         label, chosen = _choose_looks(source, cursors, name, scale)
     chart, scaled = state.view_key(f"{name} chart", source), SCALES[label]
     whole = (float(first.positions[0]), float(first.positions[-1]))
-    low, high = looked_at(chart, whole, shown)
+    low, high = zoomed_range(chart, whole, shown)
     lines, shown_values = [], []
     for i, spectrum in enumerate(spectra):
         values = displayed_values(spectrum.values, spectrum.scaling, scaled, spectrum.unit)

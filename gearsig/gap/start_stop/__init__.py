@@ -7,11 +7,11 @@ from gearsig.gap.start_stop._attribution import (
     DriveFloor,
     FittedDriveCause,
     PredictedCause,
+    affected_features,
     attribute_drive,
     evidences,
     fit,
     load_floors,
-    own_features,
     shrink,
 )
 from gearsig.gap.start_stop._comparison import (
@@ -53,6 +53,7 @@ __all__ = [
     "PredictedCause",
     "PreparedCycles",
     "SimulatedDrive",
+    "affected_features",
     "attribute_drive",
     "change_of",
     "compare_drive",
@@ -62,7 +63,6 @@ __all__ = [
     "evidences",
     "fit",
     "load_floors",
-    "own_features",
     "predict",
     "prediction_errors",
     "read_cycles",

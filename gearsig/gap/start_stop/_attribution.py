@@ -268,7 +268,7 @@ def evidences(change: FloatArray, floor: DriveFloor, fits: Sequence[FittedDriveC
     return {fitted.name: fitted.log_evidence for fitted in fits} | {NONE: total, UNKNOWN: unknown}
 
 
-def own_features(predicted: FloatArray, change: FloatArray, floor: DriveFloor) -> NDArray[np.intp]:
+def affected_features(predicted: FloatArray, change: FloatArray, floor: DriveFloor) -> NDArray[np.intp]:
     """Return the places of changes that the effect predicts to exceed the floor; its largest where none does."""
     sizes = np.where(np.isfinite(change), np.abs(predicted) / floor.limit, -1.0)
     features = np.flatnonzero(sizes >= 1.0)
@@ -387,7 +387,7 @@ def _shrinkage(name: str, folds: Sequence[tuple[Mapping[str, PredictedCause], Dr
     values, placebos, variances = [], [], []
     for predicted, floor, fold in folds:
         guess = fit(predicted[name], fold.fitted, floor).predicted
-        features = own_features(guess, fold.scored, floor)
+        features = affected_features(guess, fold.scored, floor)
         values.append(shrink(fold.scored, guess, floor, features))
         rows = np.array([shrink(row, guess, floor, features)[:3] for row in fold.again])
         variances.append([_jackknife_variance(column, of_one_block=0.25) for column in rows.T])

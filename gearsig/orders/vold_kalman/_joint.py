@@ -63,7 +63,7 @@ class Problem:
         narrowest = np.pi * float(self.bandwidths.min())
         sine = min(np.sin(2 * np.pi * float(frequency.min())), np.sin(2 * np.pi * float(frequency.max())))
         strength = 4.0 * float(HALF_POWER) / (2.0 * narrowest * max(sine, narrowest))
-        return _sample_by_sample(strength, closeness(self.cycles, self.valid, self.bandwidths, 2))[1]
+        return _sample_by_sample(strength, rounding_growth(self.cycles, self.valid, self.bandwidths, 2))[1]
 
     @property
     def cheap_together(self) -> bool:
@@ -188,7 +188,7 @@ def solve_envelopes(
     weights = envelope_weight(_of_rows(bandwidths, n, p), p)
     if len(cycles) == 1:
         return envelope_alone(y, cycles[0], None if active is None else active[0], weights[0], p, mirror=mirror)[None]
-    solver, _ = chosen_solver(bandwidths, p, closeness(cycles, active, bandwidths, p))
+    solver, _ = chosen_solver(bandwidths, p, rounding_growth(cycles, active, bandwidths, p))
     if solver == "splines":
         return solve_by_splines(y, cycles, active, weights, p, cell_of(bandwidths, p), mirror=mirror)
     # As by splines: the complex x, or with mirror images the real coefficients of cos and -sin.
@@ -237,7 +237,7 @@ def solve_waveforms(y: FloatArray, cycles: FloatArray, active: BoolArray | None,
     data = np.ones(cycles.shape) if active is None else active.astype(np.float64)
     weights = waveform_weight(width, inside)
     # |D|, the largest gain of the stencil, is 2^p for differences and for the first generation at most that.
-    solver = _sample_by_sample(4.0 * float(weights.max()), closeness(cycles, active, bandwidths, 2))[0]
+    solver = _sample_by_sample(4.0 * float(weights.max()), rounding_growth(cycles, active, bandwidths, 2))[0]
     return solve_band(data, y.astype(np.float64), weights, stencils, forward=FORWARD[solver])
 
 
@@ -261,7 +261,7 @@ def cell_of(bandwidths: FloatArray, p: int) -> int:
 def chosen_solver(bandwidths: FloatArray, p: int, close: float) -> tuple[Solver, float]:
     """Return how several orders of the second generation are solved for, and the expected error.
 
-    Relative to the largest component of the signal; `close` is the factor of `closeness`.
+    Relative to the largest component of the signal; `close` is the factor of `rounding_growth`.
     """
     d = cell_of(bandwidths, p)
     solvers = [_sample_by_sample(2.0**p * float(envelope_weight(bandwidths.min()[None], p)[0]), close)]
@@ -281,16 +281,16 @@ def _sample_by_sample(strength: float, close: float) -> tuple[Solver, float]:
 def accuracy_of(cycles: FloatArray, active: BoolArray | None, bandwidths: FloatArray, p: int) -> float:
     """Return the expected error of `solve_envelopes`, relative to the largest component of the signal."""
     if len(bandwidths) == 1:
-        return error_alone(bandwidths)
-    return chosen_solver(bandwidths, p, closeness(cycles, active, bandwidths, p))[1]
+        return single_order_error(bandwidths)
+    return chosen_solver(bandwidths, p, rounding_growth(cycles, active, bandwidths, p))[1]
 
 
-def error_alone(bandwidths: FloatArray) -> float:
+def single_order_error(bandwidths: FloatArray) -> float:
     """Return the rounding error for one order: a rounding step per sample, as far as the filter's memory reaches."""
     return 1e-12 + 1e-15 / float(bandwidths.min())
 
 
-def closeness(cycles: FloatArray, active: NDArray[np.bool_] | None, bandwidths: FloatArray, p: int) -> float:
+def rounding_growth(cycles: FloatArray, active: NDArray[np.bool_] | None, bandwidths: FloatArray, p: int) -> float:
     """Return the factor by which rounding errors grow, 1 where no two orders stay within a bandwidth.
 
     Two orders at a distance g below the bandwidth B can exchange what they hold at the price of (g/B)^2p, which divides

@@ -286,7 +286,7 @@ Prepare = Callable[[int, int, Array, Array], tuple[FloatArray, FloatArray, Float
 """Return (data, q, kappa) of samples i to j of both halves, after writing front and back: (i, j, front, back)."""
 BLOCK_SAMPLES, GAIN_BYTES = 2**12, 256 * 2**20
 """Of each half in a block, so that it fits the cache; memory for the gains: longer signals compute parts twice."""
-SEEN_FROM_BEHIND = {
+TIME_REVERSAL = {
     1: np.array([[1.0]]),
     2: np.array([[1.0, -1.0], [0.0, -1.0]]),
     3: np.array([[1.0, -2.0, 1.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]]),
@@ -368,7 +368,7 @@ def _joined(p: int, front: State, back: State, q: float, *, pair: bool) -> tuple
     samples, and each row is in one of the forms. With one pole, the first half leaves the row across the middle to the
     second. With three, one row is in neither: the first half takes one more step, with ε = √q η as a further unknown.
     """
-    turn = SEEN_FROM_BEHIND[p]
+    turn = TIME_REVERSAL[p]
     n_steps = max(0, p - 2)
     to_back = np.concatenate([turn @ np.triu(np.ones((p, p))) if n_steps else turn, np.zeros((p, n_steps))], axis=1)
     if n_steps:

@@ -12,10 +12,10 @@ from gearsig.gap.start_stop import (
     NAMES,
     DriveFloor,
     PredictedCause,
+    affected_features,
     evidences,
     fit,
     load_floors,
-    own_features,
     shrink,
 )
 
@@ -86,7 +86,7 @@ def test_what_cannot_be_told_says_nothing():
 @given(st.floats(0.1, 30.0))
 def test_a_right_prediction_takes_all_away(size):
     change = direction(3, size)
-    own = own_features(change, change, FLOOR_OF_ONE)
+    own = affected_features(change, change, FLOOR_OF_ONE)
     before, after, taken, slope = shrink(change, change, FLOOR_OF_ONE, own)
     assert (after, taken) == (0.0, 1.0)
     assert before == pytest.approx(size / 1.96)  # floors are where 95 % of a normal distribution end

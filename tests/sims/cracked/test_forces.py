@@ -15,7 +15,7 @@ from sims.cracked import (
     prepare,
     respond,
 )
-from sims.gear_pair import COORDINATES, YIELDS, bearing_fields, bearing_loads_n, foot
+from sims.gear_pair import COORDINATES, DEFLECTIONS, bearing_fields, bearing_loads_n, foot
 from sims.machine import Lubrication, Machine, Operation, RaceDefect, Roughness
 from tests.sims.cracked.machines import conservative, frictionless
 from tests.sims.machines import spur_pair_machine
@@ -272,7 +272,11 @@ def test_yields_are_the_forces_that_a_side_gives_to_its_housing(
     force = STEADY.torque_nm.at(0.0) / (1e-3 * machine.mesh.pair.driver.base_radius_mm)
     stiffness = bearing_fields(loose, force, np.random.default_rng(0))["bearing_stiffness"]
     moving = [name for name in COORDINATES if name.endswith(" y")]
-    names = ("mesh_force_n", *YIELDS, *(f"{name}{what}" for name in moving for what in (" velocity", " acceleration")))
+    names = (
+        "mesh_force_n",
+        *DEFLECTIONS,
+        *(f"{name}{what}" for name in moving for what in (" velocity", " acceleration")),
+    )
     run = respond(loose, STEADY, duration_s=0.3, rng=np.random.default_rng(0), signals=names, start_s=-0.2)
     given = -run["mesh_force_n"]
     shaken = loose.wheels[0].mass_kg * run["driver y acceleration"]
