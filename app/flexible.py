@@ -1,4 +1,4 @@
-"""What a study of a flexible pair computes: maps over angle and torque, sweeps up and down, spectra over speed."""
+"""A study of a flexible pair: maps over angle and torque, sweeps up and down, spectra over speed."""
 
 from __future__ import annotations
 

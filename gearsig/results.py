@@ -1,4 +1,4 @@
-"""What all results share: a `repr` of a few lines, and a table for pandas."""
+"""The base of all results: a `repr` of a few lines, and a table for pandas."""
 
 from __future__ import annotations
 

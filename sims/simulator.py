@@ -1,4 +1,4 @@
-"""What every simulator offers: parameters with units and ranges, presets, effects, and recordings."""
+"""The interface of every simulator: parameters with units and ranges, presets, effects, and recordings."""
 
 from __future__ import annotations
 

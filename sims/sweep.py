@@ -1,4 +1,4 @@
-"""What a sweep is: a grid of simulations over parameters, effects, speed and torque."""
+"""Sweeps: grids of simulations over parameters, effects, speed and torque."""
 
 from __future__ import annotations
 

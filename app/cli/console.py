@@ -1,4 +1,4 @@
-"""What the commands share on the terminal: a progress bar, the command as it was typed, how a command ends."""
+"""The terminal of the commands: a progress bar, the command as it was typed, how a command ends."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What finite elements are asked for: a pair of gears, one gear's body, the growth of a root crack.
+"""Commands that compute with finite elements: a pair of gears, one gear's body, the growth of a root crack.
 
 `gearsig flexible`: maps, speed sweeps and spectra. `gearsig gear-body`: mesh, modes, stress, reduction. `gearsig
 growth`: how fast a root crack grows, and how many turns are left.

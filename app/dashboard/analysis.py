@@ -495,7 +495,7 @@ def _map_of(analysis: Analysis, channel: ChannelAnalysis, *, over_order: bool) -
 
 
 def show_start_stop(analysis: Analysis) -> None:
-    """Show course, planes of the teeth, impacts and force from motion, one below the other."""
+    """Show the speed profile, planes of the teeth, impacts and force from motion, one below the other."""
     from gearsig.report import start_stop_figures
 
     if analysis.motion is None:

@@ -1,4 +1,4 @@
-"""What gearsig is, one's own recording, three things to try, and the samples."""
+"""The start page: one's own recording, three things to try, and the samples."""
 
 from __future__ import annotations
 

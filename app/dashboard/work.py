@@ -1,4 +1,4 @@
-"""What may take longer than a moment: computed in a thread beside the page, kept for equal requests, and cancelled."""
+"""Work that may take longer than a moment: in a thread beside the page, kept for equal requests, and cancelled."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Value and slope of a noisy, densely sampled quantity at sparse knots, by local parabolas."""
+"""Shaft angle from an encoder, or from a speed channel: local parabolas through noisy, dense samples."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gearsig.errors import InputError, RefusalError
 def noise_of(x: FloatArray) -> float:
     """Standard deviation of the noise in a smooth quantity, from its third differences.
 
-    A third difference of independent errors has 1 + 9 + 9 + 1 = 20 times their variance; a smooth course has almost
+    A third difference of independent errors has 1 + 9 + 9 + 1 = 20 times their variance; a smooth profile has almost
     none.
     """
     if len(x) < 8:

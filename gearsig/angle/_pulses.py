@@ -359,7 +359,7 @@ def fit_within_ticks(t: FloatArray, counts: FloatArray, tick_s: float, breaks: I
     Minimise Σ wₖ(yₖ - kₖ)² + Σ λⱼ (Δ³y)ⱼ² where Δ³ is the third divided difference scaled by the local interval. Start
     with a large λ; wherever a pulse's residual, divided by the local speed, exceeds half a tick, λ is eased around it,
     until all residuals lie within. Constant acceleration passes unchanged. A single pulse that lies off its neighbours'
-    course gets weight wₖ = 0.
+    profile gets weight wₖ = 0.
 
     Parameters
     ----------

@@ -80,7 +80,7 @@ def kaiser_sinc(x: FloatArray, half_width: float) -> FloatArray:
 
 @njit(cache=True, nogil=True, fastmath=True)  # type: ignore[untyped-decorator,unused-ignore]
 def interpolate(x, positions, side, table, out):  # type: ignore[no-untyped-def]
-    """out[i] = value of x at positions[i] (in samples): the stretch needed is doubled, then delayed by a fraction.
+    """out[i] = value of x at positions[i] (in samples): the segment needed is doubled, then delayed by a fraction.
 
     Positions are sorted and lie REACH samples or more inside x. Doubling first costs little, as it runs along the
     samples, and lets twelve taps do what would take forty.

@@ -37,7 +37,7 @@ from gearsig.rig import Rig
 def track_speed(
     samples: FloatArray, rate: float, comb: CombLines, low: float, high: float, n_block: int, change: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the most likely course of speed: times of the blocks' middles, and the speed there.
+    """Return the most likely profile of the speed: times of the blocks' middles, and the speed there.
 
     `change` is the standard deviation of the change of log speed from block to block, or six steps of the grid if
     that is more. Blocks at half overlap are scored for all speeds; the path maximises Σ score - Σ min((Δ ln
@@ -246,7 +246,7 @@ def varying_speed(search: SpeedSearch, start: SpeedCandidate | None) -> SpeedCan
     for angle in _starts(search, start):
         candidate = _refined(search, angle)
         if candidate is not None and abs(candidate.decision.speed - 1.0) > 0.02:
-            # Over the true course of speed the comb is sharp at its true scale only: take it from there.
+            # Over the true profile of the speed the comb is sharp at its true scale only: take it from there.
             candidate = _refined(search, angle.of_shaft(angle.shaft, candidate.decision.speed))
         if candidate is not None and abs(candidate.decision.speed - 1.0) <= 0.02:
             candidates.append(candidate)
@@ -263,7 +263,7 @@ def varying_speed(search: SpeedSearch, start: SpeedCandidate | None) -> SpeedCan
 
 
 def _starts(search: SpeedSearch, start: SpeedCandidate | None) -> Iterator[ShaftAngle]:
-    """Yield the constant speed where there is one; unless that is beyond doubt, the courses followed as well."""
+    """Yield the constant speed where there is one; unless that is beyond doubt, the profiles followed as well."""
     if start is not None:
         yield start.angle
         if start.decision.quality >= CLEAR:
@@ -339,7 +339,7 @@ def _corrected(search: SpeedSearch, angle: ShaftAngle, span: float, n_blocks: in
     turned, factor = track_speed(signal.samples, n_per_rev, search.comb, 1 - span, 1 + span, n_block, 0.0)
     fine = np.linspace(angle.start_s, angle.end_s, max(len(angle.time_s), 4 * n_blocks))
     theta = angle.revolutions_at(fine)
-    # The "time" of this course is revolutions over the estimated angle.
+    # The "time" of this profile is revolutions over the estimated angle.
     factor = np.interp(theta, signal.start_revolution + turned, _smooth(factor))
     return _tachless(search.shaft, fine, cumulative_trapezoid(factor, theta, initial=0))
 
@@ -419,7 +419,7 @@ def estimate_shaft_angle(
     if usual is None:
         return _finished(search, candidate)
     low, high = 60.0 * search.low, 60.0 * search.high
-    if usual[1] - usual[0] > 0.9 * (high - low):  # the range is narrow already, and the course still jumps
+    if usual[1] - usual[0] > 0.9 * (high - low):  # the range is narrow already, and the profile still jumps
         raise RefusalError(
             "the speed that follows from the mesh lines jumps for moments, as no shaft does: the phase slips by cycles",
             remedy="give a tachometer, or a recording with less noise",
@@ -428,7 +428,7 @@ def estimate_shaft_angle(
 
 
 def _range_without_slips(angle: ShaftAngle) -> tuple[float, float] | None:
-    """Return the range of speeds (rpm) to search again if the course leaves its usual range for moments; else None.
+    """Return the range of speeds (rpm) to search again if the profile leaves its usual range for moments; else None.
 
     A phase that slips by a cycle shows as a short excursion far beyond the speeds of all other times.
     """
@@ -532,7 +532,7 @@ def _finished(search: SpeedSearch, candidate: SpeedCandidate) -> ShaftAngle:
     unit = "rev/s" if constant else "times the angle's speed"
     notes = [f"estimated from the vibration of {', '.join(search.channels)}: {decision.evidence(unit)}"]
     if not constant:
-        notes.append("the speed varies; its course follows the phase of the mesh harmonics")
+        notes.append("the speed varies; its profile follows the phase of the mesh harmonics")
     notes.append("the angle's zero is arbitrary")
     if smeared:
         uncertainty = 0.5 * decision.bin_width / (meshes[0] * decision.speed)

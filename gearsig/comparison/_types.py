@@ -1,4 +1,4 @@
-"""What a comparison of a simulation with a recording says: levels, agreement, and how well each figure repeats."""
+"""Results of a comparison of a simulation with a recording: levels, agreement, how well each figure repeats."""
 
 from __future__ import annotations
 

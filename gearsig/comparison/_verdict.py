@@ -1,4 +1,4 @@
-"""What differs between both records beyond their scatter, the largest first; what it comes to in a few sentences.
+"""The verdict of a comparison: differences beyond the scatter of both records, largest first, in a few sentences.
 
 Lines and teeth are ranked by one measure, the part of the vibration's mean square by which they differ: that of a
 revolution is the sum over its lines as it is over its teeth.

@@ -1,4 +1,4 @@
-"""What was tried to find the number of modes and the penalty, and why one pair is suggested."""
+"""Number of modes and penalty that are suggested for a signal, and the trials that they rest on."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What changed in a fleet since a date: new recordings, alarms raised and cleared, other diagnoses, new levels."""
+"""Changes of a fleet since a date: new recordings, alarms raised and cleared, other diagnoses, new levels."""
 
 from __future__ import annotations
 

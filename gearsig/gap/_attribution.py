@@ -1,4 +1,4 @@
-"""What speaks for each cause, as calibrated probabilities: the forests; of effects that they do not know, a trial.
+"""Calibrated probabilities of the causes: by the forests; of effects that they do not know, by a trial.
 
 The trials of effects that they do know say how far the gap shrinks. How well one explains it can weigh as well, and the
 calibration gives that the weight 0: on blind cases look-alikes shrink the gap as far as the true effect does.

@@ -1,4 +1,4 @@
-"""What is drawn of a gap: order spectra and energy over the angle, measured against simulated before and after."""
+"""Curves of a gap for its figures: order spectra and energy over the angle, measured, simulated before and after."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What speaks for an effect and what against it: predicted changes beside observed ones."""
+"""Evidence for and against an effect: predicted changes beside observed ones."""
 
 from __future__ import annotations
 

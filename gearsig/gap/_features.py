@@ -530,7 +530,7 @@ LOWEST_MESH_ORDER = 0.5
 """At and below which a machine moves as a whole."""
 
 PEAK_PITCHES = 0.25
-"""Within which the loudest part of a burst is sought, and by which its course is counted."""
+"""Within which the loudest part of a burst is sought, and by which its profile is counted."""
 
 COURSE_PITCHES = (-1.5, 3.0)
 """From the loudest part on; so are the ranges below. A tooth carries for one to two pitches, and what it strikes rings

@@ -1,4 +1,4 @@
-"""What a simulator says an effect would change, over its severity; and the severity that fits what was observed."""
+"""Changes that a simulator predicts of an effect over its severity; the severity that fits the observed ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a gap diagnosis answers: where the gap lies, which effect causes it, how far it shrinks, what to record next."""
+"""The gap report: where the gap lies, which effect causes it, how far it shrinks, what to record next."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a method is: its options, its answer, how it is applied to a part of one channel."""
+"""A method of the table: its options, its answer, how it is applied to a part of one channel."""
 
 from __future__ import annotations
 

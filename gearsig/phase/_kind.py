@@ -1,4 +1,4 @@
-"""What kind of motion it is: periodic, subharmonic, quasi-periodic, chaotic, or not to be told."""
+"""The kind of a motion: periodic, subharmonic, quasi-periodic, chaotic, or undecided."""
 
 from __future__ import annotations
 

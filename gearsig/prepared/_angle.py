@@ -146,7 +146,7 @@ def _from_meshes(recording: Recording, rig: Rig, stated: ShaftAngle) -> ShaftAng
         by_lines = estimate_shaft_angle(recording, rig, speed_range_rpm=limits, explained=False)
     except RefusalError:
         return None
-    # A course that is followed may leave the range: to where the mesh of wrong teeth is.
+    # A profile that is followed may leave the range: to where the mesh of wrong teeth is.
     return by_lines if limits[0] <= by_lines.mean_speed_rpm <= limits[1] else None
 
 

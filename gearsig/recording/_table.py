@@ -1,4 +1,4 @@
-"""What a file reader hands over: columns as they stand in the file, nothing judged yet."""
+"""Columns as a file reader hands them over, nothing judged yet."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a recording is: channels over time, with units, a speed source and where it came from."""
+"""A recording: channels over time, with units, a speed source and where it came from."""
 
 from __future__ import annotations
 

@@ -179,7 +179,7 @@ def _row(p: FittedParameter) -> str:
 #   ``signal`` in ``unit``; null where there was nothing to average
 # - ``compliance``: null, or per tooth of the driver ``extra_um``, ``uncertainty_um``, ``n_samples``;
 #   ``deflection_um`` and ``weak_teeth``
-# - ``orders``: of the same signal, forwards: ``order`` and ``amplitude`` (peak) as lists; null where no stretch holds a
+# - ``orders``: of the same signal, forwards: ``order`` and ``amplitude`` (peak) as lists; null where no segment holds a
 #   revolution
 # - ``refusals``: what could not be told; ``notes``: what was told in part
 MAX_ROWS = 12
@@ -187,7 +187,7 @@ MAX_ROWS = 12
 
 
 def start_stop_text(examined: StartStop) -> str:
-    """Return stretches, backlash, the hardest impacts and the indicators, in plain text."""
+    """Return segments, backlash, the hardest impacts and the indicators, in plain text."""
     segments, impacts = examined.segments.segments, examined.impacts
     lines = [f"{examined.motion.source or 'recording'}: {examined.segments.summary}", ""]
     lines += ["segment           from s     to s   turned rev   top rpm"]

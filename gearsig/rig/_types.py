@@ -1,4 +1,4 @@
-"""What the machine is: shafts, gear pairs, bearings, sensors, operating point. Only what is known need be given."""
+"""The machine: shafts, gear pairs, bearings, sensors, operating point. Only what is known need be given."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a transform works on, one channel at equal steps of time or angle; the maps, coefficients, ridges it gives."""
+"""One channel at equal steps of time or angle, and what transforms make of it: maps, coefficients, ridges."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a change to a scene is."""
+"""Changes to a blind scene: faults and tolerances of flanks, teeth, shafts, bearings and chain, and their catalogue."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an effect is: a change to a machine or to its measurement chain, with one severity in physical units.
+"""An effect: a change to a machine or to its measurement chain, with one severity in physical units.
 
 An effect's file holds all of it: physics, range and plausible severities, where it shows, what it means for the models
 that are no pair of gears between bearings, and how the literature says that it shows.
@@ -248,7 +248,7 @@ class Effect:
     is_on_every_tooth : bool
         Whether it sits on all teeth of a gear, on each by itself.
     profile_varies_with : str
-        Name of its severity or of an option with which the course of its change over a tooth's engagement varies
+        Name of its severity or of an option with which the profile of its change over a tooth's engagement varies
         steadily; empty: it varies with nothing.
     """
 

@@ -1,4 +1,4 @@
-"""What both models of a gear pair share: parameters, bearings, drive, measurement, and the twin of a rig."""
+"""Both models of a gear pair: parameters, bearings, drive, measurement, and the twin of a rig, which they share."""
 
 from sims.gear_pair._bearing import (
     BEARING_FIELDS,

@@ -1,4 +1,4 @@
-"""What is fitted to a pair beyond its parameters: names of shafts, bearings, sensors, housing, tachometer."""
+"""Fittings of a pair beyond its parameters: names of shafts, bearings, sensors, housing, tachometer."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What simulators of a gear pair have in common: preset and values → machine with effects → recording."""
+"""A simulator of a gear pair: preset and values → machine with effects → recording."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a geared drive is made of, for the simulators and the effects; see `sims.machine`."""
+"""The geared drive that simulators run and effects change: its parts, how it is run, and what a rig says of it."""
 
 from sims.machine._machine import (
     BEARING_LAWS,

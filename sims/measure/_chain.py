@@ -164,7 +164,7 @@ class AntiAlias:
             window=("kaiser", kaiser_beta(self.attenuation_db)),
             fs=up / step_s,
         )
-        # Only the stretch that these samples need; it starts at a common point of both grids.
+        # Only the segment that these samples need; it starts at a common point of both grids.
         start = max(0, floor((first * down / up - half / up) / down) * down)
         stop = min(signals.shape[1], ceil((first + n_samples) * down / up + half / up) + 1)
         skipped = start // down * up

@@ -1,4 +1,4 @@
-"""What measures: accelerometers with path, noise and converter; tachometers and encoders."""
+"""Sensors: accelerometers with path, noise and converter; tachometers and encoders."""
 
 from __future__ import annotations
 

@@ -625,7 +625,7 @@ def flexibility_per_pa(material_1: Material, material_2: Material) -> float:
 def part_inside(place_mm: FloatArray, low_mm: float, high_mm: float, half_width_mm: float) -> FloatArray:
     """Part of a zone of contact around each place that lies between two others, 0 to 1, with smooth edges.
 
-    A stretch shorter than the zone never takes all of it, so that the part goes to 0 with the stretch.
+    A part shorter than the zone never takes all of it, so that the part goes to 0 with it.
     """
     width = 2.0 * half_width_mm
     begun = smooth_step((place_mm - low_mm) / width + 0.5)

@@ -1,4 +1,4 @@
-"""What a flexible pair does: transmission error, forces, displacements, accelerations; its eigenfrequencies."""
+"""The response of a flexible pair: transmission error, forces, displacements, accelerations; its eigenfrequencies."""
 
 from __future__ import annotations
 

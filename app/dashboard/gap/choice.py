@@ -1,4 +1,4 @@
-"""What is to be diagnosed, as it was chosen on the page, and how it becomes files that the diagnosis reads."""
+"""The choice on the gap page: recordings, references, rig files, and how the diagnosis gets them as files."""
 
 from __future__ import annotations
 

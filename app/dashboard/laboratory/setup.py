@@ -1,4 +1,4 @@
-"""What is set on the page: a machine, how it runs, its effects, and how it is measured."""
+"""The set-up on the page: a machine, how it runs, its effects, and how it is measured."""
 
 from __future__ import annotations
 

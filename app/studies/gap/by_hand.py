@@ -1,4 +1,4 @@
-"""What is put into healthy recordings by hand: effects as the literature has them, and foreign vibration."""
+"""Effects put into healthy recordings by hand, as the literature has them; foreign vibration."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the cycles of a start–stop recording tell by their equations of motion, and how it differs between machines."""
+"""Features of start–stop cycles from their equations of motion, and how they differ between machines."""
 
 from __future__ import annotations
 

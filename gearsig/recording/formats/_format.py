@@ -1,4 +1,4 @@
-"""What one file format is to the rest of the program, and what gearsig writes beside the samples in each."""
+"""A file format as the rest of the program sees it, and what gearsig writes beside the samples in each."""
 
 from __future__ import annotations
 
