@@ -71,6 +71,12 @@ def _names(kinds: type | UnionType) -> list[str]:
     return [plain.get(kind, kind.__name__) for kind in get_args(kinds) or (kinds,)]
 
 
+def check_texts(owner: object, *names: str) -> None:
+    """Raise InputError on fields of an object that are no text."""
+    for name in names:
+        instance_of(getattr(owner, name), str, f"{name} of {short(owner)}")
+
+
 def listed(values: Iterable[T], name: str, of: type | UnionType, *, remedy: str = "") -> tuple[T, ...]:
     """Return several values as a tuple if each is of one of the kinds; a text or a single value is not several.
 

@@ -1,6 +1,6 @@
 """The machine: shafts, gear pairs, bearings, sensors, operating point, and the orders they imply."""
 
-from gearsig.rig._catalogue import CatalogueBearing, bearing_catalogue, catalogue_bearing
+from gearsig.rig._bearing import Bearing, CatalogueBearing, bearing_catalogue, catalogue_bearing
 from gearsig.rig._contact import (
     DAMPING_LAWS,
     PathOfContact,
@@ -25,7 +25,6 @@ from gearsig.rig._toml import (
 from gearsig.rig._types import (
     QUANTITIES,
     SIDES,
-    Bearing,
     ConstantSpeed,
     EncoderChannel,
     GearPair,

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from math import cos, isclose, radians
+from math import isclose, radians
 from os import PathLike
 
 from gearsig.checks import (
     FloatArray,
+    check_texts,
     closest_match_hint,
     count,
     frozen_array,
@@ -19,11 +20,10 @@ from gearsig.checks import (
     number,
     one_of,
     positive,
-    short,
     within,
 )
 from gearsig.errors import InputError, RefusalError
-from gearsig.rig._catalogue import catalogue_bearing
+from gearsig.rig._bearing import Bearing
 from gearsig.rig._contact import PathOfContact, ToothContact, standard_path
 
 # --------------------
@@ -114,7 +114,7 @@ class ConstantSpeed:
 
     def __post_init__(self) -> None:
         not_negative(self.speed_rpm, "speed_rpm", "rpm")
-        _check_names(self, "shaft")
+        check_texts(self, "shaft")
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ class PulseTimes:
     def __post_init__(self) -> None:
         object.__setattr__(self, "times_s", frozen_array(self.times_s, "tachometer pulse times", ndim=1))
         count(self.pulses_per_revolution, "pulses_per_revolution")
-        _check_names(self, "shaft")
+        check_texts(self, "shaft")
 
 
 @dataclass(frozen=True)
@@ -167,7 +167,7 @@ class TachometerChannel:
 
     def __post_init__(self) -> None:
         count(self.pulses_per_revolution, "pulses_per_revolution")
-        _check_names(self, "channel", "edge", "shaft")
+        check_texts(self, "channel", "edge", "shaft")
         for label, value in (("threshold", self.threshold), ("hysteresis", self.hysteresis)):
             if value is not None:
                 number(value, f"{label} of tachometer {self.channel!r}")
@@ -195,7 +195,7 @@ class EncoderChannel:
 
     def __post_init__(self) -> None:
         positive(self.units_per_revolution, "units_per_revolution")
-        _check_names(self, "channel", "shaft")
+        check_texts(self, "channel", "shaft")
 
 
 @dataclass(frozen=True)
@@ -208,7 +208,7 @@ class SpeedChannel:
 
     def __post_init__(self) -> None:
         positive(self.rpm_per_unit, "rpm_per_unit")
-        _check_names(self, "channel", "shaft")
+        check_texts(self, "channel", "shaft")
 
 
 SpeedSource = ConstantSpeed | PulseTimes | TachometerChannel | EncoderChannel | SpeedChannel
@@ -227,12 +227,6 @@ def check_speed_source(value: object, name: str = "speed") -> None:
     elif not isinstance(value, SpeedSource | None):
         remedy = "pulse times are gearsig.PulseTimes(times_s), a speed over time gearsig.SpeedChannel(channel)"
     instance_of(value, SpeedSource | None, name, remedy=remedy)
-
-
-def _check_names(owner: object, *names: str) -> None:
-    """Raise on names in a part of a rig that are no text."""
-    for name in names:
-        instance_of(getattr(owner, name), str, f"{name} of {short(owner)}")
 
 
 MAX_TEETH = 5000
@@ -273,7 +267,7 @@ class Shaft:
     direction: str = ""
 
     def __post_init__(self) -> None:
-        _check_names(self, "name")
+        check_texts(self, "name")
         if self.direction:
             one_of(self.direction, f"direction of shaft {self.name!r}", ("ccw", "cw"))
 
@@ -309,7 +303,7 @@ class GearPair:
     face_width_mm: float | None = None
 
     def __post_init__(self) -> None:
-        _check_names(self, "name", "driver", "driven")
+        check_texts(self, "name", "driver", "driven")
         for label, teeth in (("driver", self.driver_teeth), ("driven", self.driven_teeth)):
             if teeth is not None:
                 remedy = "leave it out if unknown"
@@ -332,78 +326,6 @@ class GearPair:
 
 
 @dataclass(frozen=True)
-class Bearing:
-    """A rolling-element bearing with a turning inner ring and a standing outer ring.
-
-    Give the name of one that the catalogue knows (`bearing = "6205"`), the geometry (`n_rolling_elements`, both
-    diameters, contact angle) or the orders from its maker; orders win over a geometry, and a geometry over that of the
-    name. Orders are cycles per revolution of the bearing's own shaft.
-    """
-
-    name: str
-    shaft: str
-    n_rolling_elements: int | None = None
-    rolling_element_diameter_mm: float | None = None
-    pitch_diameter_mm: float | None = None
-    contact_angle_deg: float = 0.0
-    bpfo_order: float | None = None
-    bpfi_order: float | None = None
-    bsf_order: float | None = None
-    ftf_order: float | None = None
-    bearing: str = ""
-
-    def __post_init__(self) -> None:
-        _check_names(self, "name", "shaft", "bearing")
-        where = f"of bearing {self.name!r}"
-        if self.bearing and self.n_rolling_elements is None and not any((self.bpfo_order, self.bpfi_order)):
-            known = catalogue_bearing(self.bearing)
-            for key in ("n_rolling_elements", "rolling_element_diameter_mm", "pitch_diameter_mm", "contact_angle_deg"):
-                object.__setattr__(self, key, getattr(known, key))
-        geometry = (self.n_rolling_elements, self.rolling_element_diameter_mm, self.pitch_diameter_mm)
-        if any(v is not None for v in geometry) and not all(v is not None for v in geometry):
-            raise InputError(
-                f"the geometry {where} is incomplete",
-                allowed="all three or none: n_rolling_elements, rolling_element_diameter_mm, pitch_diameter_mm",
-            )
-        if self.n_rolling_elements is not None:
-            count(self.n_rolling_elements, f"n_rolling_elements {where}", minimum=3)
-            ball = positive(self.rolling_element_diameter_mm or 0.0, f"rolling_element_diameter_mm {where}", "mm")
-            pitch = positive(self.pitch_diameter_mm or 0.0, f"pitch_diameter_mm {where}", "mm")
-            if ball >= pitch:
-                raise InputError(
-                    f"rolling elements {where} are not smaller than the pitch diameter ({ball:g} >= {pitch:g} mm)"
-                )
-        within(self.contact_angle_deg, f"contact_angle_deg {where}", 0, 89, "deg")
-        for key in ("bpfo_order", "bpfi_order", "bsf_order", "ftf_order"):
-            value = getattr(self, key)
-            if value is not None:
-                positive(value, f"{key} {where}")
-
-    def orders(self) -> dict[str, float]:
-        """Return the orders that are known, by name: BPFO, BPFI, BSF, FTF.
-
-        With n elements of diameter d on pitch diameter D and contact angle a, and g = d cos(a)/D:
-        BPFO = n(1 - g)/2, BPFI = n(1 + g)/2, BSF = (D/2d)(1 - g²), FTF = (1 - g)/2.
-        BSF is the rolling element's spin; a defect on it strikes both races: twice per spin.
-
-        Source: T. A. Harris, *Rolling Bearing Analysis*, 4th ed., ch. 2 (kinematics without slip).
-        """
-        orders: dict[str, float] = {}
-        if self.n_rolling_elements is not None:
-            ball, pitch = self.rolling_element_diameter_mm or 0.0, self.pitch_diameter_mm or 0.0
-            g = ball * cos(radians(self.contact_angle_deg)) / pitch
-            n = self.n_rolling_elements
-            orders = {
-                "BPFO": n * (1 - g) / 2,
-                "BPFI": n * (1 + g) / 2,
-                "BSF": pitch / (2 * ball) * (1 - g * g),
-                "FTF": (1 - g) / 2,
-            }
-        stated = {"BPFO": self.bpfo_order, "BPFI": self.bpfi_order, "BSF": self.bsf_order, "FTF": self.ftf_order}
-        return orders | {name: order for name, order in stated.items() if order is not None}
-
-
-@dataclass(frozen=True)
 class Sensor:
     """What a channel of the recordings measures: value = number in the file × scale + offset.
 
@@ -419,7 +341,7 @@ class Sensor:
     wraps: bool = False
 
     def __post_init__(self) -> None:
-        _check_names(self, "channel", "unit", "position")
+        check_texts(self, "channel", "unit", "position")
         if self.quantity:
             one_of(self.quantity, f"quantity of sensor {self.channel!r}", QUANTITIES)
         for label, value in (("scale", self.scale), ("offset", self.offset)):
@@ -551,7 +473,7 @@ class Rig:
 
     def _check_kinds(self) -> None:
         """Raise on parts that are of another kind; make lists tuples."""
-        _check_names(self, "name")
+        check_texts(self, "name")
         parts = (("shafts", Shaft), ("pairs", GearPair), ("bearings", Bearing), ("sensors", Sensor))
         for name, kind in (*parts, ("sources", str), ("assumed", str)):
             object.__setattr__(self, name, listed(getattr(self, name), f"rig.{name}", kind))

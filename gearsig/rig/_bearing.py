@@ -1,4 +1,4 @@
-"""Rolling bearings by name."""
+"""Rolling bearings: geometry, the orders that follow from it, and the catalogue by which they are known by name."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
+from math import cos, radians
 from types import MappingProxyType
 
+from gearsig.checks import check_texts, count, positive, within
 from gearsig.errors import InputError
 
 _MAKERS = re.compile(r"^(?:SKF|FAG|INA|NSK|NTN|SNR|NACHI|KOYO|JTEKT|NKE|TIMKEN|FAFNIR|ZVL|ZKL|C&U|HRB|RHP|FBJ)")
@@ -118,3 +120,80 @@ def catalogue_bearing(name: str) -> CatalogueBearing:
         remedy="give n_rolling_elements, rolling_element_diameter_mm and pitch_diameter_mm, or the orders, which the "
         "makers publish",
     )
+
+
+# --------------------
+# A bearing of a rig.
+# --------------------
+
+
+@dataclass(frozen=True)
+class Bearing:
+    """A rolling-element bearing with a turning inner ring and a standing outer ring.
+
+    Give the name of one that the catalogue knows (`bearing = "6205"`), the geometry (`n_rolling_elements`, both
+    diameters, contact angle) or the orders from its maker; orders win over a geometry, and a geometry over that of the
+    name. Orders are cycles per revolution of the bearing's own shaft.
+    """
+
+    name: str
+    shaft: str
+    n_rolling_elements: int | None = None
+    rolling_element_diameter_mm: float | None = None
+    pitch_diameter_mm: float | None = None
+    contact_angle_deg: float = 0.0
+    bpfo_order: float | None = None
+    bpfi_order: float | None = None
+    bsf_order: float | None = None
+    ftf_order: float | None = None
+    bearing: str = ""
+
+    def __post_init__(self) -> None:
+        check_texts(self, "name", "shaft", "bearing")
+        where = f"of bearing {self.name!r}"
+        if self.bearing and self.n_rolling_elements is None and not any((self.bpfo_order, self.bpfi_order)):
+            known = catalogue_bearing(self.bearing)
+            for key in ("n_rolling_elements", "rolling_element_diameter_mm", "pitch_diameter_mm", "contact_angle_deg"):
+                object.__setattr__(self, key, getattr(known, key))
+        geometry = (self.n_rolling_elements, self.rolling_element_diameter_mm, self.pitch_diameter_mm)
+        if any(v is not None for v in geometry) and not all(v is not None for v in geometry):
+            raise InputError(
+                f"the geometry {where} is incomplete",
+                allowed="all three or none: n_rolling_elements, rolling_element_diameter_mm, pitch_diameter_mm",
+            )
+        if self.n_rolling_elements is not None:
+            count(self.n_rolling_elements, f"n_rolling_elements {where}", minimum=3)
+            ball = positive(self.rolling_element_diameter_mm or 0.0, f"rolling_element_diameter_mm {where}", "mm")
+            pitch = positive(self.pitch_diameter_mm or 0.0, f"pitch_diameter_mm {where}", "mm")
+            if ball >= pitch:
+                raise InputError(
+                    f"rolling elements {where} are not smaller than the pitch diameter ({ball:g} >= {pitch:g} mm)"
+                )
+        within(self.contact_angle_deg, f"contact_angle_deg {where}", 0, 89, "deg")
+        for key in ("bpfo_order", "bpfi_order", "bsf_order", "ftf_order"):
+            value = getattr(self, key)
+            if value is not None:
+                positive(value, f"{key} {where}")
+
+    def orders(self) -> dict[str, float]:
+        """Return the orders that are known, by name: BPFO, BPFI, BSF, FTF.
+
+        With n elements of diameter d on pitch diameter D and contact angle a, and g = d cos(a)/D:
+        BPFO = n(1 - g)/2, BPFI = n(1 + g)/2, BSF = (D/2d)(1 - g²), FTF = (1 - g)/2.
+        BSF is the rolling element's spin; a defect on it strikes both races: twice per spin.
+
+        Source: T. A. Harris, *Rolling Bearing Analysis*, 4th ed., ch. 2 (kinematics without slip).
+        """
+        orders: dict[str, float] = {}
+        if self.n_rolling_elements is not None:
+            ball, pitch = self.rolling_element_diameter_mm or 0.0, self.pitch_diameter_mm or 0.0
+            g = ball * cos(radians(self.contact_angle_deg)) / pitch
+            n = self.n_rolling_elements
+            orders = {
+                "BPFO": n * (1 - g) / 2,
+                "BPFI": n * (1 + g) / 2,
+                "BSF": pitch / (2 * ball) * (1 - g * g),
+                "FTF": (1 - g) / 2,
+            }
+        stated = {"BPFO": self.bpfo_order, "BPFI": self.bpfi_order, "BSF": self.bsf_order, "FTF": self.ftf_order}
+        return orders | {name: order for name, order in stated.items() if order is not None}
