@@ -13,9 +13,9 @@ from typing import Any, get_args
 from gearsig.cache import write_whole
 from gearsig.checks import known_name, short, type_hints_of
 from gearsig.errors import InputError
+from gearsig.rig._bearing import Bearing
 from gearsig.rig._contact import ToothContact
 from gearsig.rig._types import (
-    Bearing,
     ConstantSpeed,
     EncoderChannel,
     GearPair,
