@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, permutations
+from itertools import combinations
 from math import log10
 
 import numpy as np
 
-from gearsig.checks import FloatArray
 from gearsig.diagnosis._lines import CLEAR_DB, mesh_is_confirmed, teeth_are_contradicted
 from gearsig.diagnosis._signals import AnalysisSignals, line_at
 from gearsig.diagnosis._types import WITH_ASSUMED_DATA, Finding, Kind, Strength, from_p_value, p_text
@@ -370,55 +369,33 @@ LARGEST_SPACING, SPACINGS = 1.9, 3
 """Widest spacing of sidebands that is looked for, and how many of them to either side of the mesh."""
 
 
-COMBINATIONS = ((1, 1), (1, 2), (2, 1), (1, 3), (2, 2), (3, 1))
-"""j and k of the sidebands at j·a ± k·b of a mesh that two shafts, of orders a and b, modulate: its own, or one of them
-and the next, whose load comes through the train."""
-
-
-def _without_combinations(
-    excess: LinesOverFloor, mesh: float, shafts: Sequence[float], images: Sequence[float]
-) -> LinesOverFloor:
+def _without_combinations(excess: LinesOverFloor, mesh: float, shafts: Sequence[float]) -> LinesOverFloor:
     """Return lines without the sidebands at j·a ± k·b of a mesh that two shafts, of orders a and b, modulate.
 
-    Teeth that differ modulate by all multiples of their shaft's order, and the other shaft each of those by its first
-    two, as an eccentric or oval gear does. So many products lie everywhere: beyond `COMBINATIONS` one is the shafts'
-    only where the sidebands stand that it is the product of, m_a A/2 and m_b A/2, and it is no stronger than the
-    weaker of them, m_a m_b A/4.
-
-    Parameters
-    ----------
-    excess : LinesOverFloor
-    mesh : float
-        Order of the carrier.
-    shafts, images : sequence of float
-        Orders of shafts, and of what modulates besides and has no line of its own.
+    They are its own, or one of them and the next, whose load comes through the train. Teeth that differ modulate by all
+    multiples of their shaft's order, and the other shaft each of those by its first two, as an eccentric or oval gear
+    does. Where a shaft's multiples lie so close that most lines would go, its further ones are left.
     """
-    for one, other in combinations((*shafts, *images), 2):
-        for j, k in COMBINATIONS:
-            for start in (j * one + k * other, j * one - k * other):
-                excess = excess.without_multiples(mesh, start=start).without_multiples(mesh, start=-start)
     spectrum = excess.spectrum
-    carriers = mesh * np.arange(1, int(spectrum.positions[-1] / mesh) + 1)[:, None]
-    closest, farthest = 4 * APART_LINES * spectrum.resolution, SPACINGS * LARGEST_SPACING
-
-    def amplitudes(places: FloatArray) -> FloatArray:
-        lines = np.clip(excess.line_numbers(places), 0, len(spectrum.values) - 1)
-        over_floor: FloatArray = excess.over_floor_db(lines.ravel()).reshape(lines.shape)
-        return np.where(over_floor >= CLEAR_DB, 10 ** (over_floor / 20) * excess.floor[lines], 0.0)
-
-    masked = excess.masked.copy()
-    for many, few in permutations((order for order in shafts if order >= closest), 2):
-        multiples = many * np.arange(1, int((farthest + 2 * few) / many) + 1)
-        of_many = np.maximum(amplitudes(carriers + multiples), amplitudes(carriers - multiples))
-        for second in (few, 2 * few):
-            of_few = np.maximum(amplitudes(carriers + second), amplitudes(carriers - second))
-            for offset in (multiples + second, multiples - second, second - multiples, -multiples - second):
-                places = carriers + offset
-                is_product = (of_many > 0) & (of_few > 0) & (amplitudes(places) <= np.minimum(of_many, of_few))
-                lines = excess.lines_at(places[is_product])
-                reach = np.arange(-round(APART_LINES), round(APART_LINES) + 1)
-                masked[np.clip(lines[:, None] + reach, 0, len(masked) - 1)] = True
-    return replace(excess, masked=masked)
+    reach, farthest = APART_LINES * spectrum.resolution, SPACINGS * LARGEST_SPACING
+    pairs: set[tuple[int, int]] = set()
+    slowest = min((order for order in shafts if order >= 4 * reach), default=farthest)
+    for j in range(1, int((farthest + max(shafts, default=0.0)) / slowest) + 1):
+        pairs |= {(1, j), (j, 1), (2, j), (j, 2)}
+    places = {
+        abs(j * one + side * k * other)
+        for one, other in combinations(shafts, 2)
+        for j, k in pairs
+        for side in (-1, 1)
+        if (j <= 3 or one >= 4 * reach) and (k <= 3 or other >= 4 * reach)
+    }
+    if not places:
+        return excess
+    beside = np.abs(spectrum.positions - mesh * np.rint(spectrum.positions / mesh))
+    known = np.array([-np.inf, *sorted(places), np.inf])
+    after = np.searchsorted(known, beside)
+    near = np.minimum(known[after] - beside, beside - known[after - 1]) <= reach
+    return replace(excess, masked=excess.masked | near)
 
 
 def _knots(signals: AnalysisSignals) -> tuple[float, ...]:
@@ -450,7 +427,7 @@ def _family(signals: AnalysisSignals, excess: LinesOverFloor, pair: GearPair, tr
         wide = foot if order >= 4 * foot else 0.0
         excess = excess.without_multiples(order, half_width=wide)
         excess = excess.without_multiples(order, start=mesh, half_width=wide)
-    excess = _without_combinations(excess, mesh, tuple(signals.known_shaft_orders.values()), _knots(signals))
+    excess = _without_combinations(excess, mesh, (*signals.known_shaft_orders.values(), *_knots(signals)))
     if hunting is not None:
         excess = excess.without_multiples(hunting)  # of both gears together, and the mesh is one of them
     for train in trains:  # with each shaft's sidebands
