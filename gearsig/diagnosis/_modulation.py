@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, permutations
 from math import log10
 
 import numpy as np
@@ -369,40 +369,57 @@ LARGEST_SPACING, SPACINGS = 1.9, 3
 """Widest spacing of sidebands that is looked for, and how many of them to either side of the mesh."""
 
 
-def _without_combinations(excess: LinesOverFloor, mesh: float, shafts: Sequence[float]) -> LinesOverFloor:
-    """Return lines without the sidebands at j·a ± k·b of a mesh that two shafts, of orders a and b, modulate.
+COMBINATIONS = ((1, 1), (1, 2), (2, 1), (1, 3), (2, 2), (3, 1))
+"""j and k of the sidebands at j·a ± k·b of a mesh that two shafts, of orders a and b, modulate: its own, or one of them
+and the next, whose load comes through the train."""
 
-    They are its own, or one of them and the next, whose load comes through the train. Teeth that differ modulate by all
-    multiples of their shaft's order, and the other shaft each of those by its first two, as an eccentric or oval gear
-    does. Where a shaft's multiples lie so close that most lines would go, its further ones are left.
+
+def _without_combinations(signals: AnalysisSignals, excess: LinesOverFloor, mesh: float) -> LinesOverFloor:
+    """Return lines without the sidebands of a mesh that two shafts make together.
+
+    Of products beyond `COMBINATIONS` those are left that are stronger than one of their factors' own sidebands: depths
+    are below 1, so that no product is.
     """
-    spectrum = excess.spectrum
-    reach, farthest = APART_LINES * spectrum.resolution, SPACINGS * LARGEST_SPACING
-    pairs: set[tuple[int, int]] = set()
-    slowest = min((order for order in shafts if order >= 4 * reach), default=farthest)
-    for j in range(1, int((farthest + max(shafts, default=0.0)) / slowest) + 1):
-        pairs |= {(1, j), (j, 1), (2, j), (j, 2)}
-    places = {
-        abs(j * one + side * k * other)
-        for one, other in combinations(shafts, 2)
-        for j, k in pairs
-        for side in (-1, 1)
-        if (j <= 3 or one >= 4 * reach) and (k <= 3 or other >= 4 * reach)
-    }
-    if not places:
-        return excess
-    beside = np.abs(spectrum.positions - mesh * np.rint(spectrum.positions / mesh))
-    known = np.array([-np.inf, *sorted(places), np.inf])
-    after = np.searchsorted(known, beside)
-    near = np.minimum(known[after] - beside, beside - known[after - 1]) <= reach
-    return replace(excess, masked=excess.masked | near)
+    for one, other in combinations(signals.known_shaft_orders.values(), 2):
+        for j, k in COMBINATIONS:
+            for start in (j * one + k * other, j * one - k * other):
+                excess = excess.without_multiples(mesh, start=start).without_multiples(mesh, start=-start)
+    spectrum, masked, near = excess.spectrum, excess.masked.copy(), APART_LINES * excess.spectrum.resolution
+    carriers = [h * mesh for h in range(1, N_CARRIERS + 1) if (h + 1) * mesh <= spectrum.positions[-1]]
+    heights: dict[float, float] = {}
+    for distance, factors in _products(signals, 4 * near):
+        for factor in (f for f in factors if f not in heights):
+            beside = (spectrum.largest_near(c + side * factor, near)[1] for c in carriers for side in (-1, 1))
+            heights[factor] = max(beside, default=0.0)
+        for place in (c + side * distance for c in carriers for side in (-1, 1)):
+            lines = slice(spectrum.index_of(place - near), spectrum.index_of(place + near) + 1)
+            if spectrum.values[lines].max() <= min(heights[factor] for factor in factors):
+                masked[lines] = True
+    return replace(excess, masked=masked)
+
+
+def _products(signals: AnalysisSignals, closest: float) -> Iterator[tuple[float, tuple[float, ...]]]:
+    """Yield how far from the mesh sidebands of two shafts together lie, and the distances of their factors.
+
+    Teeth that differ modulate by all multiples of their shaft's order, if these are not closer than `closest`, and the
+    other shaft each of those by its first two, as an eccentric or oval gear does. An angle that was found from the
+    vibration at some points a turn has images of what it follows.
+    """
+    shafts, farthest = tuple(signals.known_shaft_orders.values()), SPACINGS * LARGEST_SPACING
+    for one, other in permutations((order for order in shafts if order >= closest), 2):
+        for j in (1, 2):
+            for k in range(1, int((farthest + j * one) / other) + 1):
+                for distance in (abs(j * one - k * other), j * one + k * other):
+                    if distance <= farthest:
+                        yield distance, (j * one, k * other)
+    for points in _knots(signals):
+        for factor in (k * order for order in shafts for k in (1, 2)):
+            yield abs(points - factor), (factor,)
+            yield points + factor, (factor,)
 
 
 def _knots(signals: AnalysisSignals) -> tuple[float, ...]:
-    """Return how often a turn an angle that was found from the vibration is known; of others, nothing.
-
-    It follows what a shaft modulates the phase by, and interpolated between its points it has images of that.
-    """
+    """Return how often a turn an angle that was found from the vibration is known; of others, nothing."""
     angle = signals.angle
     if angle is None or angle.method != "tachless":
         return ()
@@ -427,7 +444,7 @@ def _family(signals: AnalysisSignals, excess: LinesOverFloor, pair: GearPair, tr
         wide = foot if order >= 4 * foot else 0.0
         excess = excess.without_multiples(order, half_width=wide)
         excess = excess.without_multiples(order, start=mesh, half_width=wide)
-    excess = _without_combinations(excess, mesh, (*signals.known_shaft_orders.values(), *_knots(signals)))
+    excess = _without_combinations(signals, excess, mesh)
     if hunting is not None:
         excess = excess.without_multiples(hunting)  # of both gears together, and the mesh is one of them
     for train in trains:  # with each shaft's sidebands

@@ -81,6 +81,8 @@ def test_products_of_known_orders_are_no_third_shafts_sidebands() -> None:
     angle = ShaftAngle("in", points, 22.0 * points, np.full(len(points), 22.0), "tachless")
     for product in (4 - 27 / 43, 115 / 88 - 27 / 43):
         recording = record(seconds=4.0)
+        for order in (-4.0, -27 / 43, 27 / 43, 4.0):  # no product is stronger than its factors
+            recording = with_tone(recording, 0.2, 22.0 * (27 + order))
         for order in (-product, product):
             for h in (1, 2, 3):
                 recording = with_tone(recording, 0.15, 22.0 * (27 * h + order))
