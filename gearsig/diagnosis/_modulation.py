@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, permutations
-from math import log10
+from math import gcd, log10
 
 import numpy as np
 
+from gearsig.diagnosis._bearing_families import expected_parts, slip_of
 from gearsig.diagnosis._lines import CLEAR_DB, mesh_is_confirmed, teeth_are_contradicted
 from gearsig.diagnosis._signals import AnalysisSignals, line_at
 from gearsig.diagnosis._types import WITH_ASSUMED_DATA, Finding, Kind, Strength, from_p_value, p_text
@@ -450,24 +451,45 @@ def _family(signals: AnalysisSignals, excess: LinesOverFloor, pair: GearPair, tr
     for train in trains:  # with each shaft's sidebands
         for start in (0.0, mesh, *(mesh + k * o for o in signals.known_shaft_orders.values() for k in (-2, -1, 1, 2))):
             excess = excess.without_multiples(train, start=start, skirt=TRAIN_SKIRT)
+    for _, part, order in expected_parts(signals):
+        # Rolling elements under the load are stiffer or softer by turns, and so shift the gears, in sound bearings too.
+        for passing in (order, 2 * order) if part == "BPFO" else ():
+            wide = passing * slip_of(signals)
+            excess = excess.without_multiples(mesh, start=passing, half_width=wide)
+            excess = excess.without_multiples(mesh, start=-passing, half_width=wide)
     centres = mesh * np.arange(1, N_CARRIERS + 1)
     centres = centres[centres + 2 < excess.spectrum.positions[-1]]
     if len(centres) == 0:
         return None
     lowest = max(0.05, CLOSEST_LINES * excess.spectrum.resolution, 3 * foot)
     offsets = np.array([k for k in range(-SPACINGS, SPACINGS + 1) if k])
-    return best_comb(excess, lowest, LARGEST_SPACING, offsets=offsets, centres=centres)
+    comb = best_comb(excess, lowest, LARGEST_SPACING, offsets=offsets, centres=centres)
+    step = 1 if comb is None else gcd(*(k for _, k in _numbers(comb, mesh)))
+    if comb is None or step <= 1 or (spacing := step * comb.fundamental) > LARGEST_SPACING:
+        return comb
+    # Every second or third multiple alone: the spacing is so much wider, and has been as likely to be found.
+    near = excess.spectrum.resolution / 2
+    wider = best_comb(excess, spacing - near, spacing + near, offsets=offsets, centres=centres)
+    return comb if wider is None else replace(wider, p_value=max(comb.p_value, wider.p_value))
+
+
+def _numbers(comb: Comb, mesh: float) -> list[tuple[int, int]]:
+    """Return of which harmonic of the mesh each line is a sideband, and how many spacings it lies beside that."""
+    harmonics = [max(1, round(position / mesh)) for position in comb.positions]
+    return [
+        (h, round((position - h * mesh) / comb.fundamental))
+        for h, position in zip(harmonics, comb.positions, strict=True)
+    ]
 
 
 def _is_family(comb: Comb, mesh: float) -> bool:
     """Whether three of the lines are there, two of them on both sides of one carrier, and one is clear by itself.
 
-    An amplitude that wanders at random puts the same noise about all harmonics of the mesh, on both sides: its lines
-    are as one line, and together no less likely than that.
+    A shaft shows by its first multiple before all others: second and third ones alone are products of other lines. An
+    amplitude that wanders at random puts the same noise about all harmonics of the mesh, on both sides: its lines are
+    as one line, and together no less likely than that.
     """
-    places = []
-    for position in comb.positions:
-        h = max(1, round(position / mesh))
-        places.append((h, round((position - h * mesh) / comb.fundamental)))
+    places = _numbers(comb, mesh)
     is_clear = max(comb.ratios_db, default=0.0) >= CLEAR_DB
-    return is_clear and len(places) >= 3 and any((h, -k) in places for h, k in places)
+    has_first = any(abs(k) == 1 for _, k in places)
+    return is_clear and has_first and len(places) >= 3 and any((h, -k) in places for h, k in places)

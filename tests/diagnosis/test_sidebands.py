@@ -17,7 +17,7 @@ from gearsig.diagnosis import Modulation as Found
 from gearsig.orders import order_spectrum
 from gearsig.prepared import LinesOverFloor, lines_over_noise_floor, neighbour_level, neighbour_levels
 from gearsig.recording import Channel, Recording
-from gearsig.rig import ConstantSpeed, GearPair, Rig, Shaft, TachometerChannel
+from gearsig.rig import Bearing, ConstantSpeed, GearPair, Rig, Shaft, TachometerChannel
 from sims.measure import ColouredNoise, Tachometer
 from tests.kinematic.model import (
     KinematicModel,
@@ -283,6 +283,22 @@ def test_a_family_of_an_unknown_shaft_stands_out_of_the_skirt() -> None:
 
     (finding,) = found(analyze(with_mesh(6.0, 27, modulation)), "sidebands-of-unknown-shaft")
     assert finding.where.order == pytest.approx(0.3, abs=0.002)
+
+
+def test_ball_passing_and_second_multiples_alone_are_no_unknown_shafts() -> None:
+    """Elements that pass under the load shift the gears of a sound machine, too."""
+
+    def modulated(order: float) -> Recording:
+        return with_mesh(6.0, 27, lambda t: 0.1 * np.cos(2 * pi * order * 22.0 * t))
+
+    once, twice = modulated(1.27), modulated(2.54)
+    (finding,) = found(analyze(once), "sidebands-of-unknown-shaft")
+    assert finding.where.order == pytest.approx(1.27, abs=0.002)
+    assert not found(analyze(twice), "sidebands-of-unknown-shaft")
+    assert once.rig is not None
+    slow = Bearing("slow", "in", bpfo_order=1.26, bpfi_order=1.74)
+    with_bearing = replace(once, rig=replace(once.rig, bearings=(slow,)))
+    assert not found(analyze(with_bearing), "sidebands-of-unknown-shaft")
 
 
 def test_sidebands_of_both_shafts_together_are_no_unknown_shafts() -> None:
