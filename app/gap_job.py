@@ -69,6 +69,7 @@ def run_gap(
         inputs.recordings,
         simulator,
         references=inputs.references,
+        run_up=inputs.run_up,
         learn=inputs.labelled,
         stage=asked.stage,
         cache=cache,

@@ -50,6 +50,15 @@ def gap(
         ),
     ] = None,
     reference_fs: ReferenceRateOption = None,
+    run_up: Annotated[
+        Path | None,
+        typer.Option(
+            "--run-up",
+            metavar="HEALTHY",
+            help="Run-up or run-down of the same rig when it was healthy, with a tachometer, beside --reference: it "
+            "measures the path to the sensors, by which faults of teeth are told apart.",
+        ),
+    ] = None,
     torque: Annotated[
         list[str] | None,
         typer.Option("--torque", metavar="N", help="Of the input shaft, e.g. 60Nm: one for all, or one for each."),
@@ -119,6 +128,7 @@ def gap(
         stage=stage,
         speed_rpm=speed_rpm,
         reference_rate_hz=reference_fs,
+        run_up=run_up,
     )
     check_folder(output)
     if cache is not None:

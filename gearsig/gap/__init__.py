@@ -76,6 +76,7 @@ from gearsig.gap._gearless import UnexpectedFinding, place_of_unexpected, unexpe
 from gearsig.gap._inputs import GapRequest, read_gap_inputs, read_labelled, twin_rig, with_stage
 from gearsig.gap._labelled import LabelledRecording, labelled_changes, labelled_support, with_labelled
 from gearsig.gap._next_recording import next_recordings, next_steps
+from gearsig.gap._path import MeasuredPath, measured_path
 from gearsig.gap._places import (
     ComparedPair,
     counted_against,
@@ -157,6 +158,7 @@ from gearsig.gap._report import (
     LabelledFacts,
     NextRecording,
     NextStep,
+    PathFacts,
     PlaceKind,
     Shrinkage,
     SpectrumCurves,
@@ -270,10 +272,12 @@ __all__ = [
     "LabelledRecording",
     "Learned",
     "LinearRule",
+    "MeasuredPath",
     "NextRecording",
     "NextStep",
     "ObservedChange",
     "OperatingCondition",
+    "PathFacts",
     "PlaceKind",
     "Population",
     "Recogniser",
@@ -354,6 +358,7 @@ __all__ = [
     "locate_tail",
     "mains_lines",
     "matching_reference",
+    "measured_path",
     "mirrored",
     "next_recordings",
     "next_steps",

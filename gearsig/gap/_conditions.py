@@ -18,6 +18,7 @@ from gearsig.gap._change import change_features, difference_features, lines_of_s
 from gearsig.gap._evidence import over_floors
 from gearsig.gap._features import STEPS_PER_TOOTH, Features, decibel, tooth_energy
 from gearsig.gap._floors import FLOOR_IN_DEVIATIONS, GapSize, StructuralFloor, gap_size, pooled_scatter
+from gearsig.gap._path import MeasuredPath, measured_path
 from gearsig.gap._population import load_learned
 from gearsig.gap._prediction import ObservedChange
 from gearsig.gap._recognition import Learned, Recogniser
@@ -31,7 +32,8 @@ from gearsig.gap._reduction import (
     shaft_words,
 )
 from gearsig.gap._report import ConditionFacts
-from gearsig.gap._simulator import Added, OperatingCondition, Twin
+from gearsig.gap._simulator import Added, OperatingCondition, Twin, as_tried
+from gearsig.gap._waveform import gain_scatter
 from gearsig.prepared import PreparedRecording
 from gearsig.recording import find_problems, metres_per_second_squared
 from gearsig.rig import GearPair, Rig
@@ -74,6 +76,8 @@ class Condition:
     reference : ReducedRecording or None
     learned : Learned
         By which distances are judged.
+    path : MeasuredPath or None
+        To the sensors, where a run-up of the healthy machine was recorded.
     """
 
     facts: ConditionFacts
@@ -81,6 +85,7 @@ class Condition:
     simulated: ReducedRecording
     reference: ReducedRecording | None
     learned: Learned = field(repr=False)
+    path: MeasuredPath | None = field(default=None, repr=False)
 
     @property
     def baseline(self) -> ReducedRecording:
@@ -126,6 +131,12 @@ class Condition:
     def trial_s(self) -> float:
         """Length of a simulation that tries an effect at this point."""
         return trial_length_s(self.now)
+
+    @property
+    def gain_scatter(self) -> float:
+        """α, by how much the twin's mesh harmonics miss the reference's, beside each other; see `_waveform`."""
+        unknown = gain_scatter(self.baseline, self.simulated)
+        return unknown if self.path is None else self.path.gain_scatter(unknown)
 
     @cached_property
     def over_floors(self) -> dict[str, float]:
@@ -538,6 +549,7 @@ def conditions_of(
     references: Sequence[PreparedRecording],
     twin: Twin,
     *,
+    run_up: PreparedRecording | None = None,
     tell: Stage = lambda _what, _done: None,
     learned: Learned | None = None,
     on_read: Callable[[ConditionFacts, ReducedRecording], object] = lambda _facts, _now: None,
@@ -549,6 +561,8 @@ def conditions_of(
     recordings, references : sequence of PreparedRecording
         Each carries its rig, and the name that it is called by.
     twin : Twin
+    run_up : PreparedRecording or None
+        Of the healthy machine, which measures the path to the sensors.
     tell : callable
         Is told what is being done, and which share of the whole is complete.
     learned : Learned or None
@@ -558,18 +572,26 @@ def conditions_of(
 
     Raises
     ------
+    InputError
+        If the speed of the run-up hardly varies.
     RefusalError
-        If in no recording, or in no reference, the speed can be known and there are enough revolutions.
+        If in no recording, or in no reference, the speed can be known and there are enough revolutions; or if the
+        run-up measures no path, see `measured_path`.
     """
     learned = load_learned() if learned is None else learned
     messages: list[str] = []
     healthy = readable(references, read_healthy, "reference", messages)
+    path = None
+    if run_up is not None:
+        tell(f"measuring the path by {run_up.recording.name}", 0.03)
+        path = measured_path(run_up, as_tried(twin), seed=SEED)
     done = iter(range(len(recordings)))
 
     def condition_of(recording: PreparedRecording) -> tuple[Condition, list[str]]:
         name = recording.recording.name
         tell(f"simulating the healthy machine at the point of {name}", 0.05 + 0.15 * next(done) / len(recordings))
-        return _condition(recording, healthy, twin, learned, on_read)
+        condition, notes = _condition(recording, healthy, twin, learned, on_read)
+        return replace(condition, path=path), notes
 
     conditions = readable(recordings, condition_of, "recording", messages)
     if not references:

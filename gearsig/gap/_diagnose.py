@@ -41,7 +41,7 @@ from gearsig.gap._report import (
     unbounded_fits,
     within_the_floor,
 )
-from gearsig.gap._simulator import Added, DriveSimulator, GapEffect, GapSimulator, Twin
+from gearsig.gap._simulator import Added, CanRunUp, DriveSimulator, GapEffect, GapSimulator, Twin, as_tried
 from gearsig.gap._tooth_error import ToothErrorEvidence, has_encoders, mean_log_likelihoods, tooth_error_evidence
 from gearsig.gap._trials import (
     PROCESSES,
@@ -53,7 +53,6 @@ from gearsig.gap._trials import (
     start_healthy_trial,
     steps_of,
 )
-from gearsig.gap._waveform import gain_scatter
 from gearsig.gap.start_stop._diagnose import diagnose_start_stop, drive_report, refuse_start_stop
 from gearsig.prepared import PreparedRecording
 from gearsig.processes import one_pool, start_early
@@ -105,6 +104,7 @@ def diagnose_gap(
     simulator: GapSimulator | DriveSimulator,
     *,
     references: Sequence[Recording] = (),
+    run_up: Recording | None = None,
     effects: Sequence[str] = (),
     learn: Sequence[LabelledRecording] = (),
     stage: str = "",
@@ -125,6 +125,10 @@ def diagnose_gap(
         Of running that goes on, or of starts and stops: what is compared is told in `gearsig.gap.start_stop`.
     references : sequence of Recording
         Of the same rig when it was healthy; each recording is compared with the one at its speed and torque.
+    run_up : Recording or None
+        A run-up or run-down of the same rig when it was healthy, with a tachometer or an encoder, through the speeds
+        of the recordings; beside a reference. It measures the path that the change by a tooth's fault takes to the
+        sensors, see `gearsig.gap._path`.
     effects : sequence of str
         Which effects may be named; empty: all that the simulator has, those of the user's own files included, see
         `sims.effects.add_effect`.
@@ -148,29 +152,33 @@ def diagnose_gap(
     Raises
     ------
     InputError
-        If a recording carries no rig or is given twice, or an effect does not exist.
+        If a recording carries no rig or is given twice, an effect does not exist, or the speed of the run-up hardly
+        varies.
     RefusalError
-        If the rig's data do not suffice, there is no speed, or too few revolutions.
+        If the rig's data do not suffice, there is no speed, or too few revolutions; or if nothing tells the angle along
+        the run-up.
     """
     tell = on_stage or (lambda _what, _done: None)
     known = _effects_of(simulator)
 
     # 1. What is given must fit together, and each recording count once.
-    _check(recordings, references, effects, known)
+    run_ups = [] if run_up is None else [run_up]
+    _check(recordings, references, run_ups, effects, known)
     recordings, references = _named_apart(recordings), _named_apart(references)
-    _check_distinct([*recordings, *references, *(item.recording for item in learn)])
-    rig = _check_rigs([*recordings, *references, *(item.recording for item in learn)])
+    every = [*recordings, *references, *run_ups, *(item.recording for item in learn)]
+    _check_distinct(every)
+    rig = _check_rigs(every)
     allowed = {name: effect for name, effect in known.items() if not effects or name in effects}
 
     # 2. Machines that start and stop are compared by their motion, those without gears by their bearings alone.
     if isinstance(simulator, DriveSimulator):
-        _refuse_labelled(learn, "a machine that starts and stops")
+        _refuse_further(learn, run_up, "a machine that starts and stops")
         return drive_report(diagnose_start_stop(recordings, references, simulator, allowed, tell))
     refuse_start_stop(recordings, simulator.name)
-    rig, recordings, references, learn = _on_stage(rig, recordings, references, learn, stage)
+    rig, recordings, references, run_ups, learn = _on_stage(rig, recordings, references, run_ups, learn, stage)
     prepared, healthy = [PreparedRecording(r) for r in recordings], [PreparedRecording(r) for r in references]
     if is_gearless(rig):
-        _refuse_labelled(learn, "a rig without gears")
+        _refuse_further(learn, run_up, "a rig without gears")
         return diagnose_gearless(prepared, healthy, allowed, tell)
 
     # 3. Each recording is reduced to features, beside the healthy twin at its point and the reference.
@@ -183,6 +191,7 @@ def diagnose_gap(
         prepared,
         healthy,
         twin,
+        run_up=PreparedRecording(run_ups[0]) if run_ups else None,
         tell=tell,
         learned=learned,
         on_read=lambda facts, now: start_healthy_trial(twin, facts, now),
@@ -266,6 +275,7 @@ def diagnose_gap(
         notes=(
             *uncalibrated,
             *(() if labels is None else (labels.text,)),
+            *(() if clearest.path is None else (clearest.path.facts.text,)),
             *left_out,
             *assumed,
             *messages,
@@ -289,21 +299,31 @@ def diagnose_gap(
             has_reference=all(condition.reference is not None for condition in conditions),
             has_encoders=has_encoders(recording.recording),
             is_labelled=labels is not None,
+            has_run_up=clearest.path is not None or not isinstance(as_tried(twin), CanRunUp),
         ),
+        path=None if clearest.path is None else clearest.path.facts,
     )
 
 
 def _check(
     recordings: Sequence[Recording],
     references: Sequence[Recording],
+    run_ups: Sequence[Recording],
     effects: Sequence[str],
     known: Mapping[str, GapEffect],
 ) -> None:
-    for label, items in (("recordings", recordings), ("references", references)):
+    for label, items in (("recordings", recordings), ("references", references), ("run_up", run_ups)):
         for place, recording in enumerate(listed(items, label, object)):
             check_recording(recording, f"{label}[{place}]")
     if not recordings:
         raise InputError("no recording is given", remedy="give one, or better several operating conditions of one rig")
+    if run_ups and not references:
+        raise InputError(
+            "a run-up is given, and no healthy reference",
+            where="run_up",
+            remedy="give a healthy recording at the recordings' speed as well: the run-up tells which path that takes "
+            "to the sensors which has changed since",
+        )
     strange = [name for name in listed(effects, "effects", str) if name not in known]
     if strange:
         raise InputError(
@@ -358,12 +378,13 @@ def _on_stage(
     rig: Rig,
     recordings: Sequence[Recording],
     references: Sequence[Recording],
+    run_ups: Sequence[Recording],
     learn: Sequence[LabelledRecording],
     stage: str,
-) -> tuple[Rig, Sequence[Recording], Sequence[Recording], Sequence[LabelledRecording]]:
+) -> tuple[Rig, Sequence[Recording], Sequence[Recording], Sequence[Recording], Sequence[LabelledRecording]]:
     """Return everything with the pair that is asked for as the rig's first."""
     if not stage and len(rig.pairs) < 2:
-        return rig, recordings, references, learn
+        return rig, recordings, references, run_ups, learn
 
     def chosen(recording: Recording) -> Recording:
         return replace(recording, rig=None if recording.rig is None else with_stage(recording.rig, stage))
@@ -374,7 +395,8 @@ def _on_stage(
         )
         for item in learn
     ]
-    return with_stage(rig, stage), [*map(chosen, recordings)], [*map(chosen, references)], labelled
+    staged = ([*map(chosen, some)] for some in (recordings, references, run_ups))
+    return with_stage(rig, stage), *staged, labelled
 
 
 def _labelled_facts(
@@ -386,7 +408,9 @@ def _labelled_facts(
     return LabelledFacts(attribution.labelled.counts, without, attribution.calibration.outcome(without, known))
 
 
-def _refuse_labelled(learn: Sequence[LabelledRecording], machines: str) -> None:
+def _refuse_further(learn: Sequence[LabelledRecording], run_up: Recording | None, machines: str) -> None:
+    if run_up is not None:
+        raise InputError(f"a run-up of {machines} tells nothing", where="run_up", remedy="leave it out")
     if learn:
         raise InputError(
             f"labelled recordings of {machines} tell nothing yet",
@@ -424,7 +448,7 @@ def _waveform_messages(
     matches = {known[name].title: trial.match.correlation for name, trial in tried.items() if trial.match is not None}
     if not matches or condition.reference is None:
         return []
-    missed_db = 20.0 / np.log(10.0) * gain_scatter(condition.reference, condition.simulated)
+    missed_db = 20.0 / np.log(10.0) * condition.gain_scatter
     values = ", ".join(f"{title} {correlation:.2f}" for title, correlation in likeliest_first(matches).items())
     is_decided = any(trial.match is not None and trial.match.is_good for trial in tried.values())
     meant = "the highest is likeliest" if is_decided else "too little to part them: the twin is not like this machine"

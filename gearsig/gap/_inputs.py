@@ -42,6 +42,8 @@ class GapRequest:
         Constant speed of the reference shaft in all recordings and references, where nothing measures it.
     reference_rate_hz : float or None
         Sampling rate of the references, where it differs.
+    run_up : Path or None
+        Run-up of the same machine when it was healthy, see `diagnose_gap`.
     """
 
     recordings: tuple[Path, ...]
@@ -55,15 +57,22 @@ class GapRequest:
     stage: str = ""
     speed_rpm: float | None = None
     reference_rate_hz: float | None = None
+    run_up: Path | None = None
+
+    @property
+    def healthy(self) -> tuple[Path, ...]:
+        """References, and the run-up where there is one."""
+        return (*self.references, *(() if self.run_up is None else (self.run_up,)))
 
 
 @dataclass(frozen=True)
 class GapInputs:
-    """Recordings and references, each with its rig and its name for people, and what is labelled."""
+    """Recordings, references and run-up, each with its rig and its name for people, and what is labelled."""
 
     recordings: tuple[Recording, ...]
     references: tuple[Recording, ...] = ()
     labelled: tuple[LabelledRecording, ...] = ()
+    run_up: Recording | None = None
 
 
 def read_gap_inputs(request: GapRequest, on_file: Callable[[str], object] = lambda _: None) -> GapInputs:
@@ -82,8 +91,9 @@ def read_gap_inputs(request: GapRequest, on_file: Callable[[str], object] = lamb
         the number of torques fits none.
     """
     _check_files(request)
-    files = (*request.recordings, *request.references)
+    files = (*request.recordings, *request.healthy)
     names = (*(request.names or _names(request.recordings)), *(request.reference_names or _names(request.references)))
+    names = (*names, *(path.name for path in request.healthy[len(request.references) :]))
     recordings: list[Recording] = []
     n, labelled = len(request.recordings), tuple[LabelledRecording, ...]()
     speed = None if request.speed_rpm is None else ConstantSpeed(request.speed_rpm)
@@ -94,25 +104,27 @@ def read_gap_inputs(request: GapRequest, on_file: Callable[[str], object] = lamb
         if is_reference:
             _, rate_hz = rig_and_rate_of_reference(path, None, rate_hz, request.reference_rate_hz)
         with options_named(REFERENCE_OPTIONS if is_reference else {}):
-            recording = read_whole(path, rig, sampling_rate_hz=rate_hz, speed=speed)
+            stated = None if path == request.run_up else speed  # constant, as that of a run-up is not
+            recording = read_whole(path, rig, sampling_rate_hz=rate_hz, speed=stated)
         recordings.append(recording.with_name(name))
     if request.learn is not None:
         on_file(request.learn.name)
         labelled = read_labelled(
             request.learn, rig=recordings[0].rig, sampling_rate_hz=request.sampling_rate_hz, on_file=on_file
         )
-    return GapInputs(tuple(recordings[:n]), tuple(recordings[n:]), labelled)
+    run_up = None if request.run_up is None else recordings.pop()
+    return GapInputs(tuple(recordings[:n]), tuple(recordings[n:]), labelled, run_up)
 
 
 def _check_files(request: GapRequest) -> None:
     if not request.recordings:
         raise InputError("no recording is given", remedy="give one, or better several operating conditions of one rig")
     paths: set[Path] = set()
-    for path in (*request.recordings, *request.references):
+    for path in (*request.recordings, *request.healthy):
         if not path.exists():
             raise InputError("there is no such file", where=str(path), remedy="check its name and folder")
         if path.resolve() in paths:
-            healthy = path in request.references and path in request.recordings
+            healthy = path in request.healthy and path in request.recordings
             problem = "is given as a recording and as its own healthy reference" if healthy else "is given twice"
             raise InputError(problem, where=str(path), remedy="give each file once")
         paths.add(path.resolve())

@@ -10,7 +10,7 @@ from gearsig.checks import FloatArray
 from gearsig.gap._conditions import Condition
 from gearsig.gap._evidence import TOOTH_FAULTS
 from gearsig.gap._floors import family_members
-from gearsig.gap._report import NEXT_STEPS, SLOW_RPM, GapCause, GapOutcome, NextRecording, NextStep
+from gearsig.gap._report import NEXT_STEPS, SLOW_RPM, WIDE, GapCause, GapOutcome, NextRecording, NextStep
 from gearsig.gap._simulator import HasFurtherPlaces, OperatingCondition, Twin, point_text, same_condition
 from gearsig.gap._trials import PROCESSES, Reduced, Task, TriedEffect, TwinRun, finished_runs, n_compared
 
@@ -150,9 +150,6 @@ def _family_distance(conditions: Sequence[Condition], difference: FloatArray) ->
 LIKELY = 0.1
 """Probability from which an effect is one of those to be told apart."""
 
-WIDE = 2.0
-"""Ratio of speeds from which a resonance is told from an order."""
-
 PASSED_ON = ("transfer_path", "tooth_wear", "surface_roughness", "sliding_friction", "bearing_clearance")
 AROUND_A_SHAFT = ("unbalance", "eccentricity", "misalignment")
 """Effects that are taken for each other."""
@@ -166,6 +163,7 @@ def next_steps(
     has_reference: bool,
     has_encoders: bool,
     is_labelled: bool,
+    has_run_up: bool = False,
 ) -> tuple[NextStep, ...]:
     """Return what would tell the likely causes apart, best first; nothing where there is no gap.
 
@@ -175,8 +173,9 @@ def next_steps(
     causes : sequence of GapCause
     points : sequence of OperatingCondition
         Of the recordings.
-    has_reference, has_encoders, is_labelled : bool
-        Whether every recording has a healthy reference; both shafts an encoder; recordings of the rig are labelled.
+    has_reference, has_encoders, is_labelled, has_run_up : bool
+        Whether every recording has a healthy reference; both shafts an encoder; recordings of the rig are labelled; a
+        run-up of the healthy machine was given, or the simulator cannot run up beside it.
     """
     if outcome is GapOutcome.NO_GAP:
         return ()
@@ -189,7 +188,8 @@ def next_steps(
         "healthy": not has_reference,
         "encoders": is_which_tooth_fault and not has_encoders,
         "slow_loads": is_which_tooth_fault and len(slow) < 2,
-        "run_up": passed_on and max(speeds) < WIDE * min(speeds),
+        "run_up": is_which_tooth_fault and has_reference and not has_run_up,
+        "other_speed": passed_on and max(speeds) < WIDE * min(speeds),
         "label": not is_labelled and outcome is not GapOutcome.EFFECT,
     }
     return tuple(NextStep(code, NEXT_STEPS[code]) for code, worth in is_worth.items() if worth)

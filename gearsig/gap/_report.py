@@ -509,7 +509,7 @@ class NextStep:
     Parameters
     ----------
     code : str
-        "healthy", "encoders", "slow_loads", "run_up" or "label".
+        "healthy", "encoders", "slow_loads", "run_up", "other_speed" or "label".
     text : str
     """
 
@@ -568,6 +568,37 @@ class LabelledFacts:
             f"Labelled recordings of this rig that joined what is known of other machines: {n} ({kinds}). "
             f"Without {'them' if n > 1 else 'it'} the likeliest would be {first.replace('_', ' ')}, "
             f"{odds_text(self.without.get(first, 0.0))} (outcome: {self.outcome_without.value})."
+        )
+
+
+@dataclass(frozen=True)
+class PathFacts:
+    """The path from the mesh to the sensors, as a run-up of the healthy machine measured it.
+
+    Parameters
+    ----------
+    run_up : str
+        Name of the recording.
+    low_hz, high_hz : float
+        Between which mesh harmonics went.
+    credibility : mapping
+        Channel → share of what was measured that harmonics of other numbers repeat at the same frequencies, 0 to 1.
+    """
+
+    run_up: str
+    low_hz: float
+    high_hz: float
+    credibility: Mapping[str, float]
+
+    @property
+    def text(self) -> str:
+        """What was measured, and how far it is believed, in a sentence or two."""
+        believed = ", ".join(f"{channel} {value:.2f}" for channel, value in self.credibility.items())
+        return (
+            f"The path from the mesh to the sensors was measured by {self.run_up} from {self.low_hz:.0f} to "
+            f"{self.high_hz:.0f} Hz; the waveforms of simulated tooth faults pass it before they are compared. So much "
+            f"of it is repeated by mesh harmonics of other numbers at the same frequencies, and counts: {believed} "
+            "(1: all)."
         )
 
 
@@ -639,6 +670,8 @@ class GapReport(Result, rows="causes"):
         What labelled recordings of the rig changed; None: none were given.
     next_steps : tuple of NextStep
         What would help most besides, best first.
+    path : PathFacts or None
+        What a healthy run-up told of the path to the sensors; None: none was given.
     """
 
     rig: str
@@ -662,6 +695,7 @@ class GapReport(Result, rows="causes"):
     warnings: tuple[str, ...] = ()
     labelled: LabelledFacts | None = None
     next_steps: tuple[NextStep, ...] = ()
+    path: PathFacts | None = None
 
     def __post_init__(self) -> None:
         if not self.groups:
@@ -887,13 +921,19 @@ SLOW_RPM = 300.0
 """Up to which crack, chip and spall begin to part: of 121 at 120 to 240 rpm 62 in 100 were told rightly, of 227 at 600
 to 3000 rpm 55."""
 
+WIDE = 2.0
+"""Ratio of speeds from which a resonance is told from an order."""
+
 HEALTHY_MACHINE = "the same machine when it was healthy"
 NEXT_STEPS = {
     "healthy": f"{HEALTHY_MACHINE}, at the same speed and load; then only what has changed since counts",
     "encoders": "encoders on both shafts: no path distorts their transmission error, whose profile over one engagement "
     "tells a damaged tooth from a displaced one",
     "slow_loads": f"two loads below {SLOW_RPM:.0f} rpm, at which the gears ring less over one engagement",
-    "run_up": "a run-up of the healthy machine, which shows what the path to the sensors and what the gears make of it",
+    "run_up": "a run-up of the healthy machine (--run-up), which measures the path that a tooth's fault takes to the "
+    "sensors",
+    "other_speed": "the same machine at twice or half the speed: a resonance stays at its frequency, what belongs to a "
+    "shaft at its order",
     "label": "two labelled recordings of each likely cause on this rig (--learn): nothing else tells so much",
 }
 

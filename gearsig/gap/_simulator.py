@@ -151,6 +151,34 @@ class CanBeQuiet(Protocol):
         ...
 
 
+def as_tried(twin: Twin) -> Twin:
+    """Return the twin that effects are tried on: without noise, if it can be."""
+    return twin.quiet() if isinstance(twin, CanBeQuiet) else twin
+
+
+@runtime_checkable
+class CanRunUp(Protocol):
+    """A twin whose speed can also rise, for the path to be measured."""
+
+    @property
+    def point(self) -> OperatingCondition:
+        """The rig's nominal operating point."""
+        ...
+
+    def run_up(
+        self,
+        from_rpm: float,
+        to_rpm: float,
+        torque_nm: float,
+        *,
+        seed: int,
+        duration_s: float,
+        sampling_rate_hz: float,
+    ) -> Recording:
+        """Return a recording of the healthy machine whose speed rises, by equal factors in equal times."""
+        ...
+
+
 @runtime_checkable
 class HasFurtherSettings(Protocol):
     """A twin that knows further settings of a tooth's fault, which take another profile over the engagement."""

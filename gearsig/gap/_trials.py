@@ -38,7 +38,7 @@ from gearsig.gap._prediction import (
 )
 from gearsig.gap._reduction import ComplexArray, GearFrame, ReducedRecording, reduce_recording, shaft_words
 from gearsig.gap._report import ConditionFacts, GapCause, GapPlace, GapStep, Interval, PlaceKind, Shrinkage
-from gearsig.gap._simulator import Added, CanBeQuiet, GapEffect, HasFurtherSettings, OperatingCondition, Twin
+from gearsig.gap._simulator import Added, GapEffect, HasFurtherSettings, OperatingCondition, Twin, as_tried
 from gearsig.gap._waveform import (
     BETWEEN,
     N_HARMONICS,
@@ -46,7 +46,6 @@ from gearsig.gap._waveform import (
     PROFILE_SCATTER,
     WaveformMatch,
     compare_waveform,
-    gain_scatter,
     joined_waveforms,
     mesh_sidebands,
     sideband_noise,
@@ -530,11 +529,14 @@ def _match(banks: Sequence[Bank], conditions: Sequence[Condition], effect: GapEf
         channels = [simulated.index(name) for name in names]
         observed = mesh_sidebands(condition.now, condition.reference, is_turned=True)
         noise = sideband_noise(condition.now, condition.reference)
-        scatter = gain_scatter(condition.reference, condition.simulated)
+        scatter = condition.gain_scatter
+        passed: ComplexArray = np.ones((len(names), len(SIDES), 1, 1), dtype=np.complex128)
+        if condition.path is not None:
+            passed = condition.path.of_sidebands(names, condition.now.frame, condition.now.speed_hz)
         compared = [
             compare_waveform(
                 setting,
-                sidebands[channels],
+                sidebands[channels] * passed[:, side],
                 observed[:, side],
                 noise[:, side],
                 moves_pitches=effect.moves_pitches / (BETWEEN + 1 if effect.profile_varies_with else 1),
@@ -602,8 +604,7 @@ def trial_run(twin: Twin, facts: ConditionFacts, now: ReducedRecording) -> TwinR
     It starts as the healthy run does, so that all that differs is the effect. The machine's own baseline is put under
     it, see `_distances`.
     """
-    still = twin.quiet() if isinstance(twin, CanBeQuiet) else twin
-    return TwinRun(still, facts.point, float(f"{trial_length_s(now):.3g}"), facts.sampling_rate_hz)
+    return TwinRun(as_tried(twin), facts.point, float(f"{trial_length_s(now):.3g}"), facts.sampling_rate_hz)
 
 
 def start_healthy_trial(twin: Twin, facts: ConditionFacts, now: ReducedRecording) -> None:

@@ -35,6 +35,7 @@ from sims.machine import (
     Machine,
     Nominal,
     Operation,
+    Profile,
     log_uniform,
     nominal_of,
     pitch_tolerance_um,
@@ -318,6 +319,8 @@ _UNEVEN = (
     *(f"{what}_{gear}_{unit}" for what, unit in (("runout", "um"), ("unbalance", "g_mm")) for gear in GEARS),
 )
 _NOISES = ("noise_mps2", "sensor_noise_mps2_per_sqrt_hz")
+RUN_UP_POINTS = 32
+"""Between which the set speed of a run-up is straight."""
 VIBRATION_S = 0.5
 """Length of the run that tells how strongly the healthy machine vibrates."""
 
@@ -398,6 +401,23 @@ class PairTwin:
         ready = self._prepared(self.preset(point, added, seed=seed), rng, sampling_rate_hz)
         step_s = self._step_s(point, seed)
         return ready, MeasuredRun(rng, sampling_rate_hz, 1.0 / sampling_rate_hz, self._rig_at(point), step_s=step_s)
+
+    def run_up(
+        self,
+        from_rpm: float,
+        to_rpm: float,
+        torque_nm: float,
+        *,
+        seed: int,
+        duration_s: float,
+        sampling_rate_hz: float,
+    ) -> Recording:
+        """Return a recording of the healthy machine whose speed rises, by equal factors in equal times."""
+        ready, run = self._planned(OperatingCondition(to_rpm, torque_nm), (), seed, sampling_rate_hz)
+        part = np.linspace(0.0, 1.0, RUN_UP_POINTS)
+        speed_rpm = Profile.of(duration_s * part, from_rpm * (to_rpm / from_rpm) ** part)
+        operation = Operation(speed_rpm, Profile.constant(torque_nm))
+        return self.pair_model.record(replace(ready, operation=operation), replace(run, duration_s=duration_s))
 
     def quiet(self) -> Self:
         """Return the machine on soft mounts where nothing else vibrates and its own gears hardly do.

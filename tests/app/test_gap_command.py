@@ -173,7 +173,8 @@ def test_a_rig_file_beside_a_recording_overrides_speed_and_torque(tmp_path) -> N
 
 
 def test_without_a_rig_those_beside_are_taken(tmp_path) -> None:
-    inputs = read_gap_inputs(GapRequest((CRACKED,), (HEALTHY,)))
+    inputs = read_gap_inputs(GapRequest((CRACKED,), (HEALTHY,), run_up=HEALTHY.with_name("root_crack_2mm.h5")))
+    assert inputs.run_up.name == "root_crack_2mm.h5"
     assert inputs.recordings[0].rig.name == read_rig(RIG).name
     assert [reference.rig.name for reference in inputs.references] == [read_rig(HEALTHY.with_suffix(".toml")).name]
     with pytest.raises(InputError, match="--rig"):
@@ -230,6 +231,8 @@ def test_files_given_twice_are_refused() -> None:
         read_gap_inputs(GapRequest((CRACKED, CRACKED)))
     with pytest.raises(InputError, match="its own healthy reference"):
         read_gap_inputs(GapRequest((CRACKED,), (CRACKED,)))
+    with pytest.raises(InputError, match="twice"):
+        read_gap_inputs(GapRequest((CRACKED,), (HEALTHY,), run_up=HEALTHY))
 
 
 def test_names_of_equal_files_in_different_folders_stay_apart(tmp_path) -> None:

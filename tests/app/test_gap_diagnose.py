@@ -60,12 +60,20 @@ class Eccentric(Added):
         return hash((self.name, self.severity))
 
 
+@cache
+def run_up() -> Recording:
+    twin = gap_simulator("cracked").twin_of(rig())
+    rising = twin.run_up(900.0, 1600.0, POINT.torque_nm, seed=5, duration_s=4.0, sampling_rate_hz=20480.0)
+    return rising.with_name("run-up")
+
+
 @pytest.fixture(scope="module")
 def report(tmp_path_factory: pytest.TempPathFactory) -> GapReport:
     return diagnose_gap(
         [run(Eccentric("eccentricity", SEVERITY_UM, {"gear": "driven"}), noise=2).with_name("now")],
         gap_simulator("cracked"),
         references=[run(noise=1)],
+        run_up=run_up(),
         effects=["eccentricity"],
         cache=tmp_path_factory.mktemp("cache"),
     )
@@ -95,6 +103,15 @@ def test_it_says_whether_it_is_calibrated_and_keeps_the_twin(report: GapReport, 
     file = tmp_path / "twin.toml"
     file.write_text(report.twin_toml, encoding="utf-8")
     assert [s.name for s in preset("cracked", str(file)).effects] == ["eccentricity"]
+
+
+def test_a_healthy_run_up_measures_the_path_and_that_is_said(report: GapReport) -> None:
+    assert report.path is not None
+    assert min(report.path.credibility.values()) > 0.5
+    assert report.path.low_hz < 900.0 / 60.0 * 29.0 * 1.1 < 1600.0 / 60.0 * 29.0 < report.path.high_hz
+    assert report.path.text in report.notes
+    with pytest.raises(InputError, match="a run-up is given, and no healthy reference"):
+        diagnose_gap([run(noise=1)], gap_simulator("cracked"), run_up=run_up())
 
 
 def test_lists_that_do_not_fit_are_errors() -> None:

@@ -4,7 +4,7 @@
 records a specimen of each healthy and with every fault of a tooth, and asks the diagnosis with the 16-degree-of-freedom
 pair as twin: that is another specimen with another housing, flanks and tolerances. `--source blind`
 and `--source reduced-fe` record the independent rig and the pair of finite-element gears instead: poor twins, whose
-trials must do no harm.
+trials must do no harm. With `--run-up` a run-up of each healthy specimen measures the path.
 """
 
 from __future__ import annotations
@@ -45,6 +45,8 @@ BLIND_LEVELS = (0.5, 0.9)
 MIN_LOAD_N_PER_MM = 30.0
 """With less, flanks part and no fault of a tooth is what one sees."""
 LONGEST_S = 4.0
+RUN_UP_S, RUN_UP = 20.0, (0.3, 1.1)
+"""Length of the healthy run-up, and its speeds over those of the recordings."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,7 @@ class RecordedFault:
     severity: float
     now: Recording
     reference: Recording
+    run_up: Recording | None = None
 
 
 @dataclass(frozen=True)
@@ -98,7 +101,7 @@ def drawn_cases(plan: Plan, n_rigs: int) -> Iterator[tuple[int, BlindCase]]:
             yield number, case
 
 
-def simulated(case: BlindCase, source: str, seed: int) -> Iterator[RecordedFault]:
+def simulated(case: BlindCase, source: str, seed: int, *, with_run_up: bool = False) -> Iterator[RecordedFault]:
     """Yield a specimen of a simulator with each fault."""
     rng = np.random.default_rng(seed)
     first, healthy = case.conditions[0], case.references[0]
@@ -118,6 +121,16 @@ def simulated(case: BlindCase, source: str, seed: int) -> Iterator[RecordedFault
         return made.with_rig(case.rig.description(first.stated_rpm, first.stated_nm))
 
     reference = run(healthy.true_rpm, healthy.true_nm, (), 1)
+    run_up = None
+    if with_run_up:
+        run_up = twin.run_up(
+            RUN_UP[0] * healthy.true_rpm,
+            RUN_UP[1] * healthy.true_rpm,
+            healthy.true_nm,
+            seed=specimen,
+            duration_s=RUN_UP_S,
+            sampling_rate_hz=case.rig.sampling_rate_hz,
+        ).with_name("run-up")
     for name in TOOTH_FAULTS:
         for k, level in enumerate(LEVELS, 2):
             added = twin.draw(name, rng, above=level)
@@ -126,7 +139,8 @@ def simulated(case: BlindCase, source: str, seed: int) -> Iterator[RecordedFault
             except GearsigError as error:
                 typer.echo(f"left out: {name} {added.severity:.3g}: {error}")
                 continue
-            yield RecordedFault(name, added.severity, now.with_name(f"{name} {k}"), reference.with_name("healthy"))
+            now = now.with_name(f"{name} {k}")
+            yield RecordedFault(name, added.severity, now, reference.with_name("healthy"), run_up)
 
 
 def independent(plan: Plan, number: int) -> Iterator[RecordedFault]:
@@ -145,7 +159,8 @@ def answered(recorded: RecordedFault, rig: Rig, cache: Path) -> Answered:
     simulator = CrackedPair()
     known, twin = simulator.gap_effects(), simulator.twin_of(rig)
     now, reference = PreparedRecording(recorded.now.with_rig(rig)), PreparedRecording(recorded.reference.with_rig(rig))
-    conditions, _ = conditions_of([now], [reference], twin)
+    run_up = None if recorded.run_up is None else PreparedRecording(recorded.run_up.with_rig(rig))
+    conditions, _ = conditions_of([now], [reference], twin, run_up=run_up)
     attribution = attribute(conditions, known, TOOTH_FAULTS, twin, cache, lambda _what, _done: None)
     before, after = (a.probabilities() for a in (replace(attribution, tried={}), attribution))
     trial = attribution.tried.get(recorded.name)
@@ -202,13 +217,17 @@ def main() -> None:
     parser.add_argument("--rigs", type=int, default=6)
     parser.add_argument("--seed", type=int, default=8101)
     parser.add_argument("--role", default="development")
+    parser.add_argument("--run-up", action="store_true", help="of simulators; the independent rig has none")
     arguments = parser.parse_args()
     plan, rows = Plan(1000, arguments.seed, arguments.role, reference="with", longest_s=LONGEST_S), []
     for number, case in drawn_cases(plan, arguments.rigs):
         first = case.conditions[0]
         rig = case.rig.description(first.stated_rpm, first.stated_nm)
-        is_blind = arguments.source == "blind"
-        recorded = independent(plan, number) if is_blind else simulated(case, arguments.source, arguments.seed + number)
+        if arguments.source == "blind":
+            recorded = independent(plan, number)
+        else:
+            seed = arguments.seed + number
+            recorded = simulated(case, arguments.source, seed, with_run_up=arguments.run_up)
         with tempfile.TemporaryDirectory() as cache:
             for recorded_fault in recorded:
                 try:
