@@ -584,7 +584,7 @@ def conditions_of(
     path = None
     if run_up is not None:
         tell(f"measuring the path by {run_up.recording.name}", 0.03)
-        path = measured_path(run_up, as_tried(twin), seed=SEED)
+        path = _path_of(run_up, healthy, twin, messages)
     done = iter(range(len(recordings)))
 
     def condition_of(recording: PreparedRecording) -> tuple[Condition, list[str]]:
@@ -599,6 +599,26 @@ def conditions_of(
             "No healthy reference: a recording of the same rig when it was healthy would make it much surer."
         )
     return conditions, messages
+
+
+MAX_MISSED_DB = 2.0
+"""Of mesh harmonics beside each other, between two healthy runs of a machine at one speed and load: another day's are
+within a decibel or so, another machine's some decibels apart."""
+
+
+def _path_of(
+    run_up: PreparedRecording, healthy: Sequence[HealthyReference], twin: Twin, messages: list[str]
+) -> MeasuredPath | None:
+    """Return the path that a run-up measures; None, and say so, where it is not of the references' machine."""
+    path = measured_path(run_up, as_tried(twin), seed=SEED)
+    missed_db = [db for reference in healthy if np.isfinite(db := path.missed_db(reference.reduced))]
+    if min(missed_db, default=0.0) <= MAX_MISSED_DB:
+        return path
+    messages.append(
+        f"{path.name} is not used: beside each other, its mesh harmonics miss those of the healthy reference at the "
+        f"same speed by {min(missed_db):.1f} dB. Is it of the same machine, sensors and load?"
+    )
+    return None
 
 
 ReadT = TypeVar("ReadT")

@@ -24,7 +24,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError, RefusalError
-from gearsig.gap._reduction import DRIVER, ComplexArray, GearFrame, gear_frame, smooth_power
+from gearsig.gap._reduction import DRIVER, ComplexArray, GearFrame, ReducedRecording, gear_frame, smooth_power
 from gearsig.gap._report import PathFacts
 from gearsig.gap._simulator import CanRunUp, Twin
 from gearsig.gap._waveform import MIN_GAIN_SCATTER, N_HARMONICS, OFFSETS
@@ -93,6 +93,10 @@ class MeasuredPath:
         Channel → λ, 0 to 1.
     excitation : mapping
         Channel → a_k, (n_harmonics,), complex.
+    speed_hz : array, (n_blocks,)
+        Of the driver along the run-up.
+    levels : mapping
+        Channel → ln |Y_k|, (n_harmonics, n_blocks); nan where noise hides it.
     """
 
     name: str
@@ -100,6 +104,8 @@ class MeasuredPath:
     responses: Mapping[str, ComplexArray]
     credibility: Mapping[str, float]
     excitation: Mapping[str, ComplexArray]
+    speed_hz: FloatArray
+    levels: Mapping[str, FloatArray]
 
     def of_sidebands(self, channels: Sequence[str], frame: GearFrame, speed_hz: float) -> ComplexArray:
         """Return exp λ(h(f) − h(f_k)) of the orders beside each mesh harmonic; 1 where nothing was measured.
@@ -143,6 +149,28 @@ class MeasuredPath:
             for name, value in self.credibility.items()
         ]
         return max(min(float(np.sqrt(np.mean(variances))), unknown), MIN_GAIN_SCATTER)
+
+    def missed_db(self, reference: ReducedRecording) -> float:
+        """Return by how much mesh harmonics, beside each other, miss those of a healthy recording at its speed.
+
+        Root of the mean square over harmonics and channels, each channel's mean taken out; nan where fewer than two
+        harmonics of a channel can be compared, as the run-up does not come through that speed.
+        """
+        variances = []
+        for name in set(self.levels) & set(reference.channels):
+            average = reference.average(name, DRIVER)
+            n = min(len(self.levels[name]), average.highest // average.teeth)
+            mesh = average.teeth * np.arange(1, n + 1)
+            heard = np.abs(average.lines[mesh]) ** 2
+            along = np.argsort(self.speed_hz)
+            levels = [
+                np.interp(reference.speed_hz, self.speed_hz[along], row[along], np.nan, np.nan)
+                for row in self.levels[name][:n]
+            ]
+            difference = np.where(MAX_NOISE * heard > average.noise[mesh], levels - 0.5 * np.log(heard), np.nan)
+            if np.count_nonzero(np.isfinite(difference)) > 1:
+                variances.append(float(np.nanvar(difference)))
+        return float(20.0 / np.log(10.0) * np.sqrt(np.mean(variances))) if variances else float("nan")
 
     @property
     def facts(self) -> PathFacts:
@@ -192,17 +220,18 @@ def measured_path(run_up: PreparedRecording, twin: Twin, *, seed: int) -> Measur
     is_sampled = mesh_hz <= USED_BAND * recording.sampling_rate_hz
     log_hz = np.log(mesh_hz)
     knots = np.arange(log_hz[is_sampled].min(), log_hz[is_sampled].max() + KNOT, KNOT)
-    responses, credibility, excitation = {}, {}, {}
+    responses, credibility, excitation, levels = {}, {}, {}, {}
     for i, (name, lines) in enumerate(recorded.lines.items()):
         of_twin = simulated.lines.get(name, list(simulated.lines.values())[i % len(simulated.lines)])
         log_ratio = _logarithm(lines[:n]) - _at_speeds(of_twin[:n], simulated.speed_hz, recorded.speed_hz)
         noise = recorded.noise[name][:n] / np.maximum(np.abs(lines[:n]) ** 2, 1e-300)
         is_clear = is_sampled & (noise <= MAX_NOISE)
         weights = is_clear / (OWN_SCATTER**2 + noise)
+        levels[name] = np.where(noise <= MAX_NOISE, _logarithm(lines[:n]).real, np.nan)
         excitation[name], responses[name] = _fitted(log_ratio, log_hz, weights, knots)
         heard = np.count_nonzero(is_clear) / np.count_nonzero(is_sampled)
         credibility[name] = heard * _credibility(log_ratio, log_hz, weights, knots)
-    return MeasuredPath(recording.name, np.exp(knots), responses, credibility, excitation)
+    return MeasuredPath(recording.name, np.exp(knots), responses, credibility, excitation, recorded.speed_hz, levels)
 
 
 # --------------------

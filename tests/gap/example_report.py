@@ -20,6 +20,7 @@ from gearsig.gap import (
     Interval,
     NextRecording,
     OperatingCondition,
+    PathFacts,
     PlaceKind,
     Shrinkage,
     SpectrumCurves,
@@ -64,6 +65,7 @@ def effect_report(rig: str = RIG, simulator: str = "cracked") -> GapReport:
         averages=(average("input", 55, tooth=21), average("output", 75)),
         notes=("The mean torque is the rig file's; it was not measured.",),
         twin_toml=TWIN,
+        path=PathFacts("run_up.h5", 229.0, 7334.0, {"a1": 0.86, "a2": 0.0}),
     )
 
 
@@ -80,6 +82,7 @@ def cannot_separate_report() -> GapReport:
         causes=(shaken, rival, replace(third, probability=0.06), GapCause("unknown", "", "unknown", "", 0.05)),
         inseparable=("root_crack", "tooth_spall"),
         twin_toml="",
+        path=None,
         spectra=(spectrum("residual of a1"), spectrum("residual of a2", seed=1)),
         averages=(),
         angles=(replace(angles("input", 55, tooth=21), has_mark=False),),

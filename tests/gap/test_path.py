@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError, RefusalError
 from gearsig.gap import SIDEBAND_OFFSETS as OFFSETS
-from gearsig.gap import MeasuredPath, OperatingCondition, gear_frame, measured_path
+from gearsig.gap import MeasuredPath, OperatingCondition, gear_frame, measured_path, reduce_recording
 from gearsig.prepared import PreparedRecording
 from gearsig.recording import Channel, Recording
 from gearsig.rig import ConstantSpeed, PulseTimes, SpeedSource
@@ -32,9 +34,9 @@ def run_up(
     time = np.arange(round(RATE_HZ * duration_s)) / RATE_HZ
     turned = from_hz * time + 0.5 * (to_hz - from_hz) / duration_s * time**2
     speed = from_hz + (to_hz - from_hz) / duration_s * time
+    excitation = rng.uniform(0.5, 2.0, N_HARMONICS) * np.exp(2j * np.pi * rng.uniform(size=N_HARMONICS))
     samples = 0.02 * rng.standard_normal(len(time))
-    for k in range(1, N_HARMONICS + 1):
-        excited = rng.uniform(0.5, 2.0) * np.exp(2j * np.pi * rng.uniform())
+    for k, excited in enumerate(excitation, 1):
         response = housing(k * TEETH[0] * speed) if is_passed else 1.0
         samples += hears * np.real(excited * response * np.exp(2j * np.pi * k * TEETH[0] * turned))
     pulses = np.interp(np.arange(np.floor(turned[-1]) + 1), turned, time)
@@ -56,8 +58,13 @@ def measured(recording: Recording) -> MeasuredPath:
     return measured_path(PreparedRecording(recording), Rigid(), seed=0)  # type: ignore[arg-type]  # all that it asks of a twin
 
 
+@cache
+def rising() -> MeasuredPath:
+    return measured(run_up(8.0, 26.0))
+
+
 def test_a_resonance_that_the_twin_lacks_is_found_and_bends_what_passes_it() -> None:
-    path, frame, speed_hz = measured(run_up(8.0, 26.0)), gear_frame(RIG), 16.0
+    path, frame, speed_hz = rising(), gear_frame(RIG), 16.0
     assert path.facts.credibility["a1"] > 0.9
     assert path.facts.low_hz < 8.0 * 23 * 1.2 < 0.8 * 0.4 * RATE_HZ < path.facts.high_hz
     factors = path.of_sidebands(["a1", "not there"], frame, speed_hz)
@@ -66,6 +73,14 @@ def test_a_resonance_that_the_twin_lacks_is_found_and_bends_what_passes_it() -> 
     assert np.abs(np.log(expected)).max() > 1.2  # about the third harmonic, at 1104 Hz
     np.testing.assert_allclose(factors[0], expected, rtol=0.2)
     np.testing.assert_array_equal(factors[1], 1.0)
+
+
+def test_a_run_up_of_another_machine_is_noticed_by_the_reference() -> None:
+    path = rising()
+    own, other = (reduce_recording(run_up(16.0, 16.0, duration_s=1.5, seed=seed)) for seed in (0, 3))
+    assert path.missed_db(own) < 0.5
+    assert path.missed_db(other) > 3.0
+    assert np.isnan(path.missed_db(reduce_recording(run_up(30.0, 30.0, duration_s=1.5))))  # through no such speed
 
 
 def test_what_does_not_repeat_over_harmonics_is_no_path_and_does_no_harm() -> None:
