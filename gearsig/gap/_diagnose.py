@@ -162,7 +162,7 @@ def diagnose_gap(
     known = _effects_of(simulator)
 
     # 1. What is given must fit together, and each recording count once.
-    run_ups = [] if run_up is None else [run_up]
+    run_ups: Sequence[Recording] = () if run_up is None else (run_up,)
     _check(recordings, references, run_ups, effects, known)
     recordings, references = _named_apart(recordings), _named_apart(references)
     every = [*recordings, *references, *run_ups, *(item.recording for item in learn)]
@@ -395,8 +395,8 @@ def _on_stage(
         )
         for item in learn
     ]
-    staged = ([*map(chosen, some)] for some in (recordings, references, run_ups))
-    return with_stage(rig, stage), *staged, labelled
+    recordings, references, run_ups = ([*map(chosen, some)] for some in (recordings, references, run_ups))
+    return with_stage(rig, stage), recordings, references, run_ups, labelled
 
 
 def _labelled_facts(

@@ -300,7 +300,7 @@ def _run_up_of(twin: CanRunUp, run_up: PreparedRecording, low_hz: float, high_hz
     return twin.run_up(
         60.0 * low_hz / TWIN_MARGIN,
         60.0 * high_hz * TWIN_MARGIN,
-        twin.point.torque_nm if torque_nm is None else torque_nm,
+        torque_nm or twin.point.torque_nm,
         seed=seed,
         duration_s=min(slowest_block_s * np.log(high_hz / low_hz * TWIN_MARGIN**2) / TWIN_CHANGE, LONGEST_S),
         sampling_rate_hz=recording.sampling_rate_hz,
@@ -348,12 +348,13 @@ def _fitted(
     step = np.diff(np.eye(len(knots)), axis=0)
     held[n_harmonics:, n_harmonics:] = STIFFNESS * step.T @ step + MEAN_STIFFNESS * np.eye(len(knots))
     held[:n_harmonics, :n_harmonics] = 1e-9 * np.eye(n_harmonics)  # of harmonics that are left out
-    observed, robust = log_ratio.ravel(), np.ones(log_ratio.size)
+    observed: ComplexArray = log_ratio.ravel()
+    robust: FloatArray = np.ones(log_ratio.size)
     for _ in range(N_PASSES):
         weighted = columns * (weights.ravel() * robust)[:, None]
-        unknowns: ComplexArray = np.linalg.solve(weighted.T @ columns + held, weighted.T @ observed)
+        unknowns = np.asarray(np.linalg.solve(weighted.T @ columns + held, weighted.T @ observed), dtype=np.complex128)
         residual = _within_half_a_turn(observed - columns @ unknowns)
-        observed = columns @ unknowns + residual
+        observed = np.asarray(columns @ unknowns + residual, dtype=np.complex128)
         robust = 1.0 / (1.0 + np.abs(residual) ** 2 * weights.ravel() / DEGREES)
     return unknowns[:n_harmonics], unknowns[n_harmonics:]
 
