@@ -369,11 +369,10 @@ def _reasons_to_leave_open(
         races = ", ".join(dict.fromkeys(part_text(c.name, c.bearing.name) for c in doubtful if c.bearing))
         chance = f"the chance of so many is {p_text(doubtful[0].p_value)}"
         yield f"lines stand at the order of the {races}, and {chance}", longer
-    for channel, race, comb in races_in_vibration(signals):
-        why = (
-            f"{len(comb.positions)} multiples of the order of the {race} stand in {channel} itself, and in no envelope"
-        )
-        yield why, "A higher sampling rate, or a sensor nearer to the bearing: shocks show in an envelope then."
+    for channel, race, comb in races_in_vibration(signals, envelopes):
+        seen = f"{len(comb.positions)} multiples of the order of the {race} stand in {channel} itself"
+        why = f"{seen}, whose first ones a shaft's hide from the envelopes"
+        yield why, "A recording at another load: slip parts a bearing from the shaft."
     for (k, shaft), on_shaft in parts_on_shaft(signals, envelopes).items():
         races = f"the order of the {' or '.join(on_shaft)} within its slip"
         why = f"impacts come {k} times a turn of {named('shaft', shaft)}, which is {races}"

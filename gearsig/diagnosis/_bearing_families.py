@@ -474,33 +474,35 @@ def doubtful_races(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> l
 
 
 IN_VIBRATION, SEEN_IN_VIBRATION, WITHOUT_GAPS = 24, 6, 0.75
-"""Multiples of a race's order that are looked for in the vibration itself, how many of them must be seen, as a smooth
-tone of elements that differ has two or three, and which part of those from the first to the last that are seen: impacts
-leave no gaps, whereas strong lines of gears, together no chance either, lie here and there."""
+"""Multiples of a race's order that are looked for in the vibration itself, how many of them must be seen, and which
+part of those from the first to the last that are seen: impacts leave no gaps, whereas strong lines of gears, together
+no chance either, lie here and there."""
 
 
-def races_in_vibration(signals: AnalysisSignals) -> list[tuple[str, str, Comb]]:
-    """Return channel, race and lines of trains of impacts that stand in the order spectra themselves, surest first.
+def races_in_vibration(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> list[tuple[str, str, Comb]]:
+    """Return channel, race and lines of trains that stand in the order spectra where no envelope can show them.
 
-    Envelopes are searched for the first six lines of a family. Those may run into multiples of a slow shaft, and a
-    resonance that rings from one impact to the next, or a sampling rate below all others, leaves an envelope little.
-    The further lines of the same train are apart from the shaft's then, and among those of the gears no chance.
+    Envelopes are searched for the first six lines of a family. A slip may take those to multiples of a slow shaft, of
+    which only the further lines of the train part. Where an envelope could show it and does not, lines are smooth tones
+    of elements that pass the load, which sound bearings have too, up to high multiples.
     """
     races = [(part_text(name, b.name), order) for b, name, order in expected_parts(signals) if name in RACES]
     multiples, slip = np.arange(1, IN_VIBRATION + 1), slip_of(signals)
+    allowed = signals.settings.false_alarm_probability / max(len(races) * len(signals.order_excess), 1)
     found = []
     for channel, lines in signals.order_excess.items():
         free = without_shafts(signals, lines)
         for race, order in races:
             comb = best_comb(free, order * (1 - slip), order * (1 + slip), offsets=multiples)
-            if comb is None or len(comb.positions) < SEEN_IN_VIBRATION:
+            if comb is None or comb.p_value > allowed or len(comb.positions) < SEEN_IN_VIBRATION:
                 continue
             first, last = (round(position / comb.fundamental) for position in (comb.positions[0], comb.positions[-1]))
             between = free.free_lines_at(comb.fundamental * np.arange(first, last + 1))
-            if len(comb.positions) >= WITHOUT_GAPS * len(between):
+            first_six = comb.fundamental * np.arange(1, N_MULTIPLES + 1)
+            is_hidden = all(len(e.excess.free_lines_at(first_six)) < MINIMUM_LINES for e in envelopes)
+            if is_hidden and len(comb.positions) >= WITHOUT_GAPS * len(between):
                 found.append((channel, race, comb))
-    allowed = signals.settings.false_alarm_probability / max(len(races) * len(signals.order_excess), 1)
-    return sorted((one for one in found if one[2].p_value <= allowed), key=lambda one: one[2].p_value)
+    return sorted(found, key=lambda one: one[2].p_value)
 
 
 def _chance_among_others(

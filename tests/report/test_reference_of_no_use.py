@@ -1,20 +1,22 @@
 """Why a reference that was given could not be used is said wherever an analysis is read."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
 from gearsig.diagnosis import Analysis, analyze
 from gearsig.report import analysis_text, analysis_to_json, page_html
-from tests.diagnosis.machines import record
+from tests.diagnosis.machines import RIG, record
 
-REASON = "The depth of a root crack cannot be told: the rig file does not give module_mm"
+REASON = "The depth of a root crack cannot be told: the rig file does not give torque_nm"
+SIZED = replace(RIG, pairs=tuple(replace(pair, module_mm=2.0, face_width_mm=20.0) for pair in RIG.pairs))
 
 
 @pytest.fixture(scope="module")
 def analysis() -> Analysis:
-    """Analyse a healthy gearbox, of whose gears too little is known, against a reference."""
-    return analyze(record(), reference=record(seed=1))
+    """Analyse a healthy gearbox, of whose torque nothing is known, against a reference."""
+    return analyze(record(rig=SIZED), reference=record(rig=SIZED, seed=1))
 
 
 def test_terminal_page_and_json_say_why(analysis: Analysis) -> None:
@@ -24,7 +26,7 @@ def test_terminal_page_and_json_say_why(analysis: Analysis) -> None:
     assert REASON in page_html(analysis).partition("<h2>")[0]
     told = json.loads(analysis_to_json(analysis))
     assert REASON in told["verdict"]
-    assert told["crack"]["reason"].startswith("the rig file does not give module_mm")
+    assert told["crack"]["reason"].startswith("the rig file does not give torque_nm")
 
 
 def test_nobody_asks_for_the_reference_that_was_given(analysis: Analysis) -> None:
