@@ -370,8 +370,8 @@ def _reasons_to_leave_open(
         chance = f"the chance of so many is {p_text(doubtful[0].p_value)}"
         yield f"lines stand at the order of the {races}, and {chance}", longer
     for channel, race, comb in races_in_vibration(signals, envelopes):
-        seen = f"{len(comb.positions)} multiples of the order of the {race} stand in {channel} itself"
-        why = f"{seen}, whose first ones a shaft's hide from the envelopes"
+        lines = f"{len(comb.positions)} multiples of the order of the {race} stand in {channel} itself"
+        why = f"{lines}, whose first ones a shaft's hide from the envelopes"
         yield why, "A recording at another load: slip parts a bearing from the shaft."
     for (k, shaft), on_shaft in parts_on_shaft(signals, envelopes).items():
         races = f"the order of the {' or '.join(on_shaft)} within its slip"
