@@ -75,16 +75,18 @@ def test_uploads_become_files_with_their_own_rigs(tmp_path) -> None:
         (upload("gearbox.toml", text=RIG), upload("b.toml", text=own)),
         torque_nm=None,
         reference_rate_hz=51200.0,
+        run_up=upload("rising.h5", HEALTHY.with_name("root_crack_2mm.h5").read_bytes()),
     )
     asked = files_of(choice, tmp_path)
-    assert all(tmp_path in path.parents for path in (*asked.recordings, *asked.references))
+    assert all(tmp_path in path.parents for path in (*asked.recordings, *asked.references, asked.run_up))
     assert asked.names == ("../a run.h5", "b.h5")
     inputs = read_gap_inputs(asked)
-    torques = [r.rig.operating_point.torque_nm for r in (*inputs.recordings, *inputs.references)]
-    assert torques == [110.0, 55.0, 55.0]
+    torques = [r.rig.operating_point.torque_nm for r in (*inputs.recordings, *inputs.references, inputs.run_up)]
+    assert torques == [110.0, 55.0, 55.0, 110.0]
     assert asked.reference_rate_hz == 51200.0
     assert "--reference-fs 51200" in choice.command
     assert "--rig gearbox.toml" in choice.command
+    assert "--run-up rising.h5" in choice.command
     assert "'../a run.h5'" in choice.command
 
 
@@ -126,8 +128,9 @@ def test_another_choice_has_another_key() -> None:
         Choice((sample(HEALTHY),)),
         Choice((sample(CRACKED),), (sample(HEALTHY),), torque_nm=3.0),
         Choice((sample(CRACKED),), (sample(HEALTHY),), (upload("r.toml", text=RIG),)),
+        Choice((sample(CRACKED),), (sample(HEALTHY),), run_up=upload("rising.h5")),
     )
-    assert len({one.key, *(other.key for other in others)}) == 5
+    assert len({one.key, *(other.key for other in others)}) == 6
     assert one.key == Choice((sample(CRACKED),), (sample(HEALTHY),)).key
 
 

@@ -222,7 +222,7 @@ def _place_of(choice: Choice) -> Path:
 
     Whoever asks has the files themselves: their hashes are in the name.
     """
-    rigs = [file.rig_text for file in (*choice.recordings, *choice.references)]
+    rigs = [file.rig_text for file in choice.recorded]
     code = f"{gearsig.__version__} {_code()} {sources_digest()}"
     asked = sha256(f"{code} {choice.key} {rigs!r}".encode()).hexdigest()
     return cache_folder("gap-results") / f"{asked}.zip"

@@ -14,6 +14,7 @@ from app.dashboard.cached import read_rig_text, safe_file_name
 from app.dashboard.state import ChosenFile
 from app.dashboard.widgets.chooser import (
     SIMULATED,
+    choose_file,
     choose_files,
     choose_reference_rate,
     sample_file,
@@ -38,6 +39,8 @@ class Choice:
         What the files do not state.
     reference_rate_hz : float or None
         Sampling rate of the references, where it is another one.
+    run_up : ChosenFile or None
+        Of the healthy machine; beside a reference.
     """
 
     recordings: tuple[ChosenFile, ...]
@@ -47,13 +50,23 @@ class Choice:
     torque_nm: float | None = None
     sampling_rate_hz: float | None = None
     reference_rate_hz: float | None = None
+    run_up: ChosenFile | None = None
+
+    @property
+    def _run_ups(self) -> tuple[ChosenFile, ...]:
+        return () if self.run_up is None else (self.run_up,)
 
     @property
     def key(self) -> str:
         """Equal for choices with equal answers."""
-        groups = self.recordings, self.references, self.rigs
+        groups = self.recordings, self.references, self.rigs, self._run_ups
         files = [[(file.name, file.sha256) for file in group] for group in groups]
         return repr((files, self.model, self.torque_nm, self.sampling_rate_hz, self.reference_rate_hz))
+
+    @property
+    def recorded(self) -> tuple[ChosenFile, ...]:
+        """Everything that was recorded, in the order of the diagnosis."""
+        return (*self.recordings, *self.references, *self._run_ups)
 
     @property
     def command(self) -> str:
@@ -62,6 +75,7 @@ class Choice:
         common = common_rig(self)
         words += ["--rig", common.name] if common is not None else []
         words += [word for file in self.references for word in ("--reference", file.name)]
+        words += [word for file in self._run_ups for word in ("--run-up", file.name)]
         words += ["--torque", f"{self.torque_nm:.15g}Nm"] if self.torque_nm is not None else []
         rates = {"--fs": self.sampling_rate_hz, "--reference-fs": self.reference_rate_hz}
         words += [word for name, hz in rates.items() if hz is not None for word in (name, f"{hz:.15g}")]
@@ -78,7 +92,7 @@ def common_rig(choice: Choice) -> ChosenFile | None:
     """
     if len(choice.rigs) == 1:  # all recordings are of one rig, whatever its file is called
         return choice.rigs[0]
-    named = [own_rig(file, choice.rigs) for file in (*choice.recordings, *choice.references)]
+    named = [own_rig(file, choice.rigs) for file in choice.recorded]
     common = [rig for rig in choice.rigs if rig not in named]
     if len(common) > 1:
         raise InputError(
@@ -142,18 +156,18 @@ def files_of(choice: Choice, folder: Path) -> GapRequest:
     if common is not None:
         rig = folder / "rig.toml"
         rig.write_text(common.rig_text, encoding="utf-8")
-    numbered = enumerate((*choice.recordings, *choice.references), 1)
-    paths = [_written(file, folder / str(i), choice.rigs) for i, file in numbered]
-    n = len(choice.recordings)
+    paths = [_written(file, folder / str(i), choice.rigs) for i, file in enumerate(choice.recorded, 1)]
+    n, n_compared = len(choice.recordings), len(choice.recordings) + len(choice.references)
     return GapRequest(
         tuple(paths[:n]),
-        tuple(paths[n:]),
+        tuple(paths[n:n_compared]),
         rig,
         () if choice.torque_nm is None else (choice.torque_nm,),
         choice.sampling_rate_hz,
         tuple(file.name for file in choice.recordings),
         tuple(file.name for file in choice.references),
         reference_rate_hz=choice.reference_rate_hz,
+        run_up=paths[-1] if choice.run_up is not None else None,
     )
 
 
@@ -196,6 +210,7 @@ def choose() -> Choice:
     with st.sidebar:
         origin = address.ask_one(st.radio, "Recordings", (SAMPLES, FILES), name="of", horizontal=True)
         recordings, references, rigs = _choose_samples() if origin == SAMPLES else _choose_files()
+        run_up = _choose_run_up() if references and origin == FILES else None
         names = tuple(gap_simulators())
         model = address.ask_one(st.selectbox, "Simulator", names, name="simulator", format_func=simulator_title)
         with st.expander("Not in the files?", icon=":material/tune:"):
@@ -205,7 +220,7 @@ def choose() -> Choice:
             rate = address.ask_number(st, "Sampling rate (Hz)", 0.0, name="rate", **looks)
             of_files = bool(references) and origin == FILES
             reference_rate = choose_reference_rate(of_several=True) if of_files else None
-    return Choice(recordings, references, rigs, model, torque or None, rate or None, reference_rate)
+    return Choice(recordings, references, rigs, model, torque or None, rate or None, reference_rate, run_up)
 
 
 def _choose_samples() -> ChosenFiles:
@@ -244,3 +259,11 @@ def _choose_files() -> ChosenFiles:
     rigs = choose_files("Rig file (TOML)", "gap rigs", about=about, of_rigs=True, name="rigs")
     about = "The same rig when it was healthy. The answer becomes much surer."
     return recordings, choose_files("Healthy references", "gap references", about=about, name="references"), rigs
+
+
+def _choose_run_up() -> ChosenFile | None:
+    about = (
+        "The same rig run up or down when it was healthy, with a tachometer: it measures the path to the sensors, by "
+        "which faults of teeth are told apart."
+    )
+    return choose_file("Healthy run-up", "gap run-up", about=about, name="run-up")
