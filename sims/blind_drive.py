@@ -532,11 +532,6 @@ def march(r, y, errors_1, errors_2, n_samples, interval, longest_step):
 
 
 # --------------------
-# One blind case: a machine by its drawing, something wrong or nothing, recordings now and when it was healthy.
-# --------------------
-
-
-# --------------------
 # From a drive's motion to a recording: encoders that round, noise, sensors that are not there.
 # --------------------
 
@@ -659,6 +654,11 @@ def _slips(machine: BlindDrive, motion: FloatArray, rng: np.random.Generator) ->
         way = slip * rng.uniform(0.3, 1.7) / n["rb2"]
         angle -= way * np.clip((time - start - 0.1) / (0.5 * n["on"]), 0.0, 1.0)
     return angle
+
+
+# --------------------
+# One blind case: a machine by its drawing, something wrong or nothing, recordings now and when it was healthy.
+# --------------------
 
 
 KINDS = ("none", "single", "unknown")

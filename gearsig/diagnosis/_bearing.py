@@ -308,8 +308,9 @@ def _modulation_text(candidate: Candidate) -> str:
 def _none_shows(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope], families: Families) -> list[Finding]:
     """State that nothing shows as far as it would have shown, and which parts could not have shown."""
     where = Where(channels=tuple(dict.fromkeys(e.channel for e in envelopes)))
-    for why, surer in _reasons_to_leave_open(signals, envelopes, families):
-        return [_undecided(why, surer, where)]
+    reason = next(_reasons_to_leave_open(signals, envelopes, families), None)
+    if reason is not None:
+        return [_undecided(*reason, where)]
     # For each part of each bearing, the depth of modulation from which it would have shown.
     expected = expected_parts(signals)
     probability = signals.settings.false_alarm_probability / max(1, len(expected) * len(envelopes))

@@ -685,9 +685,9 @@ def _of_shaft(
 def _told_apart(weights: Mapping[str, float], *, are_told: bool) -> list[list[str]]:
     """Return the causes, likeliest first; unbalance and a bent shaft in one where nothing tells them apart."""
     causes = sorted(weights, key=lambda cause: -weights[cause])
-    of_one_turn = [cause for cause in causes if cause in ("unbalance", "bent-shaft")]
     if are_told:
         return [[cause] for cause in causes]
+    of_one_turn = [cause for cause in causes if cause in ("unbalance", "bent-shaft")]
     groups = [of_one_turn, *([cause] for cause in causes if cause not in of_one_turn)]
     return sorted(groups, key=lambda group: -sum(weights[cause] for cause in group))
 

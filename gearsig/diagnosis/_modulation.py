@@ -375,6 +375,14 @@ COMBINATIONS = ((1, 1), (1, 2), (2, 1), (1, 3), (2, 2), (3, 1))
 and the next, whose load comes through the train."""
 
 
+def _without_sidebands(
+    excess: LinesOverFloor, mesh: float, distance: float, *, half_width: float = 0.0
+) -> LinesOverFloor:
+    """Return lines without those so far from any harmonic of a mesh, on either side."""
+    above = excess.without_multiples(mesh, start=distance, half_width=half_width)
+    return above.without_multiples(mesh, start=-distance, half_width=half_width)
+
+
 def _without_combinations(signals: AnalysisSignals, excess: LinesOverFloor, mesh: float) -> LinesOverFloor:
     """Return lines without the sidebands of a mesh that two shafts make together.
 
@@ -383,8 +391,8 @@ def _without_combinations(signals: AnalysisSignals, excess: LinesOverFloor, mesh
     """
     for one, other in combinations(signals.known_shaft_orders.values(), 2):
         for j, k in COMBINATIONS:
-            for start in (j * one + k * other, j * one - k * other):
-                excess = excess.without_multiples(mesh, start=start).without_multiples(mesh, start=-start)
+            for distance in (j * one + k * other, j * one - k * other):
+                excess = _without_sidebands(excess, mesh, distance)
     spectrum, masked, near = excess.spectrum, excess.masked.copy(), APART_LINES * excess.spectrum.resolution
     carriers = [h * mesh for h in range(1, N_CARRIERS + 1) if (h + 1) * mesh <= spectrum.positions[-1]]
     heights: dict[float, float] = {}
@@ -454,9 +462,7 @@ def _family(signals: AnalysisSignals, excess: LinesOverFloor, pair: GearPair, tr
     for _, part, order in expected_parts(signals):
         # Rolling elements under the load are stiffer or softer by turns, and so shift the gears, in sound bearings too.
         for passing in (order, 2 * order) if part == "BPFO" else ():
-            wide = passing * slip_of(signals)
-            excess = excess.without_multiples(mesh, start=passing, half_width=wide)
-            excess = excess.without_multiples(mesh, start=-passing, half_width=wide)
+            excess = _without_sidebands(excess, mesh, passing, half_width=passing * slip_of(signals))
     centres = mesh * np.arange(1, N_CARRIERS + 1)
     centres = centres[centres + 2 < excess.spectrum.positions[-1]]
     if len(centres) == 0:

@@ -25,7 +25,7 @@ from gearsig.diagnosis._types import (
 )
 from gearsig.formatting import enumerated, percent, unit_text
 from gearsig.orders import whole_revolutions
-from gearsig.prepared import has_mark, sliding_mean, strongest_window
+from gearsig.prepared import chance_of_any, has_mark, sliding_mean, strongest_window
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ def _p_among_teeth(ratio: float, n_teeth: float) -> float:
 
     median = 0.4549364  # of the chi-square distribution with one degree of freedom
     single = float(erfc(np.sqrt(ratio * median / 2)))
-    return float(-np.expm1(n_teeth * np.log1p(-min(single, 1 - 1e-12))))
+    return chance_of_any(single, n_teeth)
 
 
 def _p_among_these(energies: FloatArray, start: int, width: int) -> float:
@@ -180,7 +180,7 @@ def _p_among_these(energies: FloatArray, start: int, width: int) -> float:
         return 1.0
     distance = (teeth[0] - others.mean()) / (scatter * np.sqrt(1 + 1 / len(others)))
     single = float(student.sf(distance, len(others) - 1))
-    return float(-np.expm1(n_teeth * np.log1p(-min(single, 1 - 1e-12))))
+    return chance_of_any(single, n_teeth)
 
 
 def _onset(x: FloatArray, start: int, width: int) -> float:

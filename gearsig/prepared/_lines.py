@@ -261,7 +261,7 @@ def best_comb(
     best = _sharpest(excess, origins, factors, candidates)
     score = float(totals[best])
     single = tail_probability(excess, n_terms, score)
-    p_value = float(-np.expm1(independent_trials(n_candidates) * np.log1p(-min(single, 1 - 1e-12))))
+    p_value = chance_of_any(single, independent_trials(n_candidates))
     return _described(excess, origins, factors, candidates[best], score, p_value)
 
 
@@ -290,6 +290,14 @@ def comb_at(excess: LinesOverFloor, fundamental: float, multiples: NDArray[np.in
 def independent_trials(n_candidates: int) -> int:
     """Return how many of the fundamentals tried are independent: three fall on one line of the highest multiple."""
     return max(1, n_candidates // 3)
+
+
+def chance_of_any(p_value: float, n_trials: float) -> float:
+    """Return the chance that any of n independent trials gives so small a p-value: 1 − (1 − p)ⁿ.
+
+    Z. Šidák, "Rectangular confidence regions for the means of multivariate normal distributions", 1967.
+    """
+    return float(-np.expm1(n_trials * np.log1p(-min(p_value, 1 - 1e-12))))
 
 
 def score_needed(excess: LinesOverFloor, n_terms: int, low: float, high: float, probability: float) -> float:
