@@ -36,5 +36,6 @@ def parabola_vertex(before: Any, middle: Any, after: Any) -> tuple[Any, Any]:
     """
     bend = before - 2 * middle + after
     bent = np.where(bend < 0, bend, -1.0)
-    offset = np.where(bend < 0, np.clip(0.5 * (before - after) / bent, -0.5, 0.5), 0.0)
+    # Not np.clip, which Numba has for arrays alone: kernels take this function for single lines.
+    offset = np.where(bend < 0, np.minimum(np.maximum(0.5 * (before - after) / bent, -0.5), 0.5), 0.0)
     return offset, middle - 0.25 * (before - after) * offset

@@ -113,6 +113,16 @@ class LinesOverFloor:
         return scores
 
     @cached_property
+    def heights(self) -> FloatArray:
+        """ln(A/A₀) of each line by itself, not cut at any limit, with the masked lines at 0."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            heights = np.log(self.spectrum.values / self.floor)
+        heights = np.nan_to_num(heights, copy=False, nan=0.0, posinf=40.0, neginf=0.0)
+        heights[self.masked] = 0.0
+        heights.flags.writeable = False
+        return heights
+
+    @cached_property
     def _densities(self) -> list[FloatArray]:
         """Distributions of sums of 1, 2, … draws: searches over many ranges ask for the same ones."""
         n_cells = int(np.ceil(LOG_RATIO_LIMIT / _STEP)) + 1
@@ -369,15 +379,10 @@ def _comb_totals(scores, candidates, origins, factors, first, resolution, inside
 
 def _sharpest(excess: LinesOverFloor, origins: FloatArray, factors: NDArray[np.int_], candidates: FloatArray) -> int:
     """Return the candidate whose harmonics meet the peaks best."""
-    spectrum = excess.spectrum
-    heights = np.zeros(len(candidates))
+    last, sums = len(excess.log_ratio) - 1, np.zeros(len(candidates))
     for origin, factor in zip(origins, factors, strict=True):
-        index = np.clip(excess.line_numbers(origin + factor * candidates), 0, len(spectrum.values) - 1)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            height = np.log(spectrum.values[index] / excess.floor[index])
-        height = np.nan_to_num(height, nan=0.0, posinf=40.0, neginf=0.0)
-        heights += np.where(excess.masked[index], 0.0, height)
-    return int(np.argmax(heights))
+        sums += excess.heights[np.clip(excess.line_numbers(origin + factor * candidates), 0, last)]
+    return int(np.argmax(sums))
 
 
 def tail_probability(excess: LinesOverFloor, n_terms: int, score: float) -> float:
@@ -405,67 +410,86 @@ def _described(
     p_value: float,
 ) -> Comb:
     """Fit the fundamental to the peaks, and gather the family's lines."""
-    fitted = float(fundamental)
-    for _ in range(N_FITS):
-        lines = _lines_near(excess, origins, multiples, fitted)
-        # Least squares of position - origin = multiple · fundamental, clearer lines counting more.
-        weights = sum(line.weight * line.multiple**2 for line in lines)
-        if not weights:
-            break
-        fitted = sum(line.weight * line.multiple * line.distance for line in lines) / weights
-    strongest = max(lines, key=lambda line: line.ratio_db, default=None)
+    spectrum = excess.spectrum
+    peaks, positions, ratios_db = np.empty(len(multiples), np.int64), np.empty(len(multiples)), np.empty(len(multiples))
+    fitted, n = _fit_to_peaks(
+        spectrum.values,
+        spectrum.positions,
+        spectrum.resolution,
+        excess.floor,
+        excess.masked,
+        np.asarray(origins, dtype=np.float64),
+        np.asarray(multiples, dtype=np.int64),
+        float(fundamental),
+        peaks,
+        positions,
+        ratios_db,
+    )
+    strongest = peaks[int(np.argmax(ratios_db[:n]))] if n else None
     return Comb(
         fitted,
         score,
         p_value,
-        tuple(line.position for line in lines),
-        tuple(line.ratio_db for line in lines),
-        strongest.amplitude if strongest else 0.0,
-        strongest.floor if strongest else 0.0,
+        tuple(positions[:n].tolist()),
+        tuple(ratios_db[:n].tolist()),
+        0.0 if strongest is None else float(spectrum.values[strongest]),
+        0.0 if strongest is None else float(excess.floor[strongest]),
     )
 
 
-@dataclass(frozen=True)
-class _Line:
-    position: float
-    distance: float
-    multiple: int
-    amplitude: float
-    floor: float
-    ratio_db: float
-
-    @property
-    def weight(self) -> float:
-        """Power over the floor, which the variance of a line's position falls with; cut at 30 dB."""
-        return float(10 ** (min(self.ratio_db, 30.0) / 10))
+_vertex = njit(cache=True, nogil=True)(parabola_vertex)
 
 
-def _lines_near(
-    excess: LinesOverFloor, origins: FloatArray, multiples: NDArray[np.int_], fundamental: float
-) -> list[_Line]:
-    """Return the family's lines that stand clearly above the floor; two lines off is still the same peak."""
-    spectrum = excess.spectrum
-    lines = []
-    for origin, multiple in zip(origins, multiples, strict=True):
-        place = float(origin + multiple * fundamental)
-        if not 0 < place <= spectrum.positions[-1]:
-            continue
-        position, amplitude = spectrum.largest_near(place, 2 * spectrum.resolution)
-        i = spectrum.index_of(position)
-        floor = float(excess.floor[i])
-        ratio = over_floor_db(amplitude, floor)
-        if ratio >= CLEAR_LINE_DB and not excess.masked[i]:
-            position = peak_position(spectrum, i)
-            lines.append(_Line(position, position - float(origin), int(multiple), amplitude, floor, ratio))
-    return lines
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _fit_to_peaks(values, at, resolution, floor, masked, origins, multiples, fundamental, peaks, positions, ratios_db):  # type: ignore[no-untyped-def]
+    """Return the fitted fundamental, and how many lines of its family stand clearly above the floor; write these.
+
+    Least squares of position - origin = multiple · fundamental; the clearer a line, the less its position varies, by
+    its power over the floor, which is cut at 30 dB.
+    """
+    last = len(values) - 1
+    for _ in range(N_FITS):
+        n, weights, products = 0, 0.0, 0.0
+        for k in range(len(multiples)):
+            place = origins[k] + multiples[k] * fundamental
+            if not 0.0 < place <= at[last]:
+                continue
+            # Two lines off is still the same peak.
+            nearest = int(np.rint((place - at[0]) / resolution))
+            low, high = max(nearest - 2, 0), min(nearest + 2, last)
+            i = low + int(np.argmax(values[low : high + 1]))
+            ratio_db = 20.0 * np.log10(max(values[i], 1e-300) / max(floor[i], 1e-300))
+            if ratio_db < CLEAR_LINE_DB or masked[i]:
+                continue
+            peaks[n], positions[n], ratios_db[n] = i, _peak_position(values, at, resolution, i), ratio_db
+            clearness = 10.0 ** (min(ratio_db, 30.0) / 10.0)
+            weights += clearness * multiples[k] ** 2
+            products += clearness * multiples[k] * (positions[n] - origins[k])
+            n += 1
+        if weights == 0.0:
+            break
+        fundamental = products / weights
+    return fundamental, n
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _peak_position(values, at, resolution, i):  # type: ignore[no-untyped-def]
+    if not 0 < i < len(values) - 1:
+        return at[i]
+    before, middle, after = np.log(np.maximum(values[i - 1 : i + 2], 1e-300))
+    return at[i] + _vertex(before, middle, after)[0] * resolution
 
 
 def peak_position(spectrum: Spectrum, i: int) -> float:
-    """Return the vertex of the parabola through the logarithms of a line and its neighbours."""
-    if not 0 < i < len(spectrum.values) - 1:
-        return float(spectrum.positions[i])
-    offset, _ = parabola_vertex(*np.log(np.maximum(spectrum.values[i - 1 : i + 2], 1e-300)))
-    return float(spectrum.positions[i] + offset * spectrum.resolution)
+    """Return the vertex of the parabola through the logarithms of a line and its neighbours.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+    i : int
+        Number of the line. The first and the last have one neighbour only, and stay where they are.
+    """
+    return float(_peak_position(spectrum.values, spectrum.positions, spectrum.resolution, i))
 
 
 # --------------------

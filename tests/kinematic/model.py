@@ -328,13 +328,14 @@ def between_teeth(values: FloatArray | Sequence[float], shaft_rev: FloatArray) -
     """
     v = np.asarray(values, dtype=np.float64)
     z = len(v)
-    coefficients = np.fft.rfft(v) / z
-    total = np.full(np.shape(shaft_rev), coefficients[0].real)
-    for m in range(1, len(coefficients)):
-        # An even tooth number has one term at half the tooth number, which counts once.
-        weight = 1.0 if 2 * m == z else 2.0
-        phase = 2 * np.pi * m * (shaft_rev - 0.5 / z)
-        total += weight * (coefficients[m].real * np.cos(phase) - coefficients[m].imag * np.sin(phase))
+    coefficients = 2.0 * np.fft.rfft(v) / z
+    # The mean, and with an even tooth number the term at half of it, count once.
+    coefficients[0] /= 2.0
+    if z % 2 == 0:
+        coefficients[-1] /= 2.0
+    # Horner's scheme in exp(2πjθ): two transcendental functions a sample instead of two for each term.
+    turn = np.exp(2j * np.pi * (shaft_rev - 0.5 / z))
+    total: FloatArray = np.polynomial.polynomial.polyval(turn, coefficients).real
     return total
 
 
