@@ -4,7 +4,7 @@ import ast
 import subprocess
 import sys
 from collections import Counter, defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 
@@ -47,11 +47,19 @@ def name_of(path: Path) -> str:
     return path.relative_to(ROOT).as_posix()
 
 
+def statements(tree: ast.AST) -> Iterator[ast.AST]:
+    """Yield all statements below a node, without looking into expressions, in which a tenth of the time goes."""
+    for field in ("body", "orelse", "finalbody", "handlers", "cases"):
+        for node in getattr(tree, field, ()):
+            yield node
+            yield from statements(node)
+
+
 def imports_of(text: str, name: str) -> set[str]:
     """Return all modules that a file of that name imports, also inside functions, and the names it takes from them."""
     folders = name.split("/")[:-1]
     found = set()
-    for node in ast.walk(ast.parse(text)):
+    for node in statements(ast.parse(text)):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):

@@ -532,58 +532,70 @@ def best_path(
     """
     q = nodes_apart(scores.shape[1])
     n_slopes = min(max(1, int(np.ceil(steepest * q))), scores.shape[0] - 1)
-    table = np.ascontiguousarray(scores, dtype=np.float32)
-    path: FloatArray = _search(table, hidden, n_slopes, np.float32(stiffness), np.float32(credit), q).astype(np.float64)
+    is_hidden = hidden != NOT_HIDDEN
+    lost = np.where(is_hidden | (scores >= _NOTHING), 0.0, stiffness * _ASTRAY / q)
+    # A column's cells lie side by side, as the search goes along them.
+    seen, astray = (np.ascontiguousarray(a.T, dtype=np.float32) for a in (np.where(is_hidden, 0.0, scores), lost))
+    covering = np.ascontiguousarray(hidden.T)
+    lines = _search(seen, astray, covering, n_slopes, np.float32(stiffness), np.float32(credit), q)
+    path: FloatArray = lines.astype(np.float64)
     return path
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _search(scores, hidden, S, stiffness, credit, q):  # type: ignore[no-untyped-def]
-    """Viterbi recursion over states (line, slope index s + S)."""
-    n_lines, n_columns = scores.shape
+def _search(seen, astray, covering, S, stiffness, credit, q):  # type: ignore[no-untyped-def]
+    """Viterbi recursion over states (slope index s + S, line); inner loops go along lines, several at a time."""
+    n_columns, n_lines = seen.shape
     n_nodes = (n_columns + q - 1) // q
     n_s = 2 * S + 1
-    best = np.zeros((n_lines, n_s), dtype=np.float32)
-    came = np.zeros((n_nodes, n_lines, n_s), dtype=np.int16)
-    moved = np.empty((n_lines, n_s), dtype=np.float32)
+    best = np.zeros((n_s, n_lines), dtype=np.float32)
+    came = np.zeros((n_nodes, n_s, n_lines), dtype=np.int16)
+    moved = np.empty((n_s, n_lines), dtype=np.float32)
+    is_covered = np.zeros(n_columns, dtype=np.bool_)
+    for column in range(n_columns):
+        is_covered[column] = np.any(covering[column] != NOT_HIDDEN)
     for node in range(n_nodes):
         moved[:] = -1e30
-        for k in range(n_lines):
-            for i in range(n_s):
-                to = k + i - S
-                if to < 0 or to >= n_lines:
-                    continue
-                total = best[k, i]
-                for c in range(min(q, n_columns - node * q)):
-                    line, column = _at(k, i - S, c, q), node * q + c
-                    if hidden[line, column] == NOT_HIDDEN:
-                        total += scores[line, column]
-                        if scores[line, column] < _NOTHING:
-                            total -= stiffness * _ASTRAY * abs(i - S) / q
-                    elif abs(i - S - hidden[line, column]) >= _MIN_ANGLE:
-                        total += credit
-                moved[to, i] = total
-        for k in range(n_lines):
-            for i in range(n_s):
-                top, source = np.float32(-1e30), i
-                for j in range(max(0, i - _MAX_BEND), min(n_s, i + _MAX_BEND + 1)):
-                    bend = max(abs(i - j) - 1, 0)
-                    value = moved[k, j] - stiffness * bend * bend
-                    if value > top:
-                        top, source = value, j
-                best[k, i] = top
-                came[node, k, i] = source
+        for i in range(n_s):
+            s = i - S
+            first, last = max(0, -s), min(n_lines, n_lines - s)  # lines from which a piece ends within the table
+            total = moved[i, first + s : last + s]
+            total[:] = best[i, first:last]
+            for c in range(min(q, n_columns - node * q)):
+                column, rise = node * q + c, _at(0, s, c, q)
+                scores, lost = seen[column, first + rise : last + rise], astray[column, first + rise : last + rise]
+                dear = np.float32(abs(s))
+                for k in range(last - first):
+                    total[k] += scores[k] - dear * lost[k]
+                if is_covered[column]:
+                    for k in range(last - first):
+                        by = covering[column, first + rise + k]
+                        if by != NOT_HIDDEN and abs(s - by) >= _MIN_ANGLE:
+                            total[k] += credit
+        for i in range(n_s):
+            top, source = best[i], came[node, i]
+            top[:] = np.float32(-1e30)
+            source[:] = i
+            for j in range(max(0, i - _MAX_BEND), min(n_s, i + _MAX_BEND + 1)):
+                bend = max(abs(i - j) - 1, 0)
+                price, values = np.float32(stiffness * bend * bend), moved[j]
+                for k in range(n_lines):
+                    value = values[k] - price
+                    is_better = value > top[k]
+                    top[k] = value if is_better else top[k]
+                    source[k] = j if is_better else source[k]
     return _read_back(best, came, n_columns, S, q)
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _read_back(best, came, n_columns, S, q):  # type: ignore[no-untyped-def]
     """Follow the best final state back to the first column."""
-    flat = np.argmax(best)
-    k, i = flat // best.shape[1], flat % best.shape[1]
+    # Of states that are as good the lowest line, and of its slopes the steepest down.
+    flat = np.argmax(best.T.copy())
+    k, i = flat // best.shape[0], flat % best.shape[0]
     path = np.empty(n_columns, dtype=np.int64)
     for node in range(came.shape[0] - 1, -1, -1):
-        i = came[node, k, i]
+        i = came[node, i, k]
         k -= i - S
         for c in range(min(q, n_columns - node * q)):
             path[node * q + c] = _at(k, i - S, c, q)
