@@ -6,6 +6,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Sequence
+from functools import cache
 
 import typer
 
@@ -70,7 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line; an error of the user's input is one line on standard error and exit code 2."""
     _end_on_sigterm()
     try:
-        sys.exit(app(args=list(arguments) if arguments is not None else None, standalone_mode=False))
+        sys.exit(_parser()(args=list(arguments) if arguments is not None else None, standalone_mode=False))
     except USAGE_ERROR as error:  # a wrong option or argument: left alone, Typer draws a frame of several lines
         typer.echo(_usage_text(error), err=True, nl=bool(_usage_text(error)))
         sys.exit(EXIT_INPUT_ERROR)
@@ -83,6 +84,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except BrokenPipeError:  # the reader of our output has gone, e.g. `| head`
         sys.stderr.close()
         sys.exit(0)
+
+
+@cache
+def _parser() -> Callable[..., object]:
+    """Read all commands' options from their signatures, which takes a tenth of a second, once."""
+    return typer.main.get_command(app)
 
 
 def _end_on_sigterm() -> None:

@@ -376,6 +376,8 @@ def mean_log_distance(points, firsts, seconds, block, across, sums, counts):  # 
     x(i + k + 1) - x(i + k - 1) is taken off.
     """
     d = points.shape[1]
+    # One logarithm for the product of many squares, as long as that is a normal number.
+    products = np.ones(sums.shape)
     for r in range(firsts.shape[0]):
         i, j, b = firsts[r], seconds[r], block[r]
         for k in range(sums.shape[1]):
@@ -390,8 +392,13 @@ def mean_log_distance(points, firsts, seconds, block, across, sums, counts):  # 
             if speed > 0.0:
                 square -= along * along / speed
             if square > 0.0:
-                sums[b, k] += 0.5 * np.log(square)
+                product = products[b, k] * square
+                if not 1e-280 < product < 1e280:
+                    sums[b, k] += 0.5 * (np.log(products[b, k]) + np.log(square))
+                    product = 1.0
+                products[b, k] = product
                 counts[b, k] += 1
+    sums += 0.5 * np.log(products)
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
