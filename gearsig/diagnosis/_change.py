@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import hypot, inf, sqrt
 
 import numpy as np
@@ -80,6 +81,11 @@ class _Quantity:
     now: _Levels
     then: _Levels
 
+    @property
+    def mean_power(self) -> float:
+        """Of the record where it is larger."""
+        return max(float(self.now.power.mean()), float(self.then.power.mean()))
+
 
 def level_changes(
     signals: AnalysisSignals,
@@ -149,7 +155,7 @@ def family_change(
     except RefusalError:
         return None
     best = max(pairs, key=lambda pair: _in_common(pair[0].band_hz, band))
-    now, then = (_family(envelope, order, SAME_FAMILY, block_rev) for envelope in best)
+    now, then = (None if d is None else _family(d, order, SAME_FAMILY) for d in (_depths(e, block_rev) for e in best))
     if now is None or then is None:
         return None
     quantity = _Quantity(finding.code, "bearing", finding.where, 0.0, "", now, then)
@@ -241,6 +247,12 @@ class _Segments:
         found = order_map(signal, channel, revolutions_per_block=block_rev, overlap=0.0, scaling="power")
         return cls(found.values, found.resolution)
 
+    @cached_property
+    def mean(self) -> FloatArray:
+        """Over the segments, (n_lines,)."""
+        mean: FloatArray = self.power.mean(axis=0)
+        return mean
+
     @property
     def highest_order(self) -> float:
         """Of the lines."""
@@ -258,8 +270,7 @@ class _Segments:
         """Return the largest line at an order, within `slip` (relative) or a line to either side."""
         reach = max(1, round(slip * order / self.resolution))
         low, high = max(round(order / self.resolution) - reach, 1), round(order / self.resolution) + reach + 1
-        mean = self.power.mean(axis=0)
-        top = low + int(np.argmax(mean[low:high]))
+        mean, top = self.mean, low + int(np.argmax(self.mean[low:high]))
         floor = np.quantile(mean[max(low - 32, 1) : high + 32], NOISE_QUANTILE)
         is_peak = mean[top] >= mean[max(top - 2, 1) : top + 3].max()  # and no foot of a line beyond
         largest = self.power[:, low:high].max(axis=1)
@@ -346,38 +357,48 @@ def _bearing_parts(
 ) -> Iterator[_Quantity]:
     """Yield each known part's family of lines in the band of each channel's envelopes where either record has most."""
     bands = {(e.channel, e.band_hz): e for e in reference_envelopes}
-    pairs = [(e, bands[e.channel, e.band_hz]) for e in envelopes if (e.channel, e.band_hz) in bands]
-    shafts = tuple(signals.known_shaft_orders.values())
-    for bearing, name, order in expected_parts(signals):
-        for channel in dict.fromkeys(e.channel for e, _ in pairs):
-            place = signals.where(order, channel, shaft=bearing.shaft, bearing=bearing.name)
-            found = []
-            for envelope, other in pairs:
-                levels = [_family(e, order, slip_of(signals), block_rev, shafts) for e in (envelope, other)]
-                if envelope.channel == channel and levels[0] is not None and levels[1] is not None:
-                    where = replace(place, band_hz=envelope.band_hz)
-                    found.append(_Quantity(part_text(name, bearing.name), "bearing", where, 0.0, "", *levels))  # type: ignore[arg-type]
-            if found:
-                yield max(found, key=lambda q: max(float(q.now.power.mean()), float(q.then.power.mean())))
+    shafts, slip, parts = tuple(signals.known_shaft_orders.values()), slip_of(signals), expected_parts(signals)
+    loudest: dict[tuple[int, str], _Quantity] = {}
+    for envelope in envelopes:
+        other = bands.get((envelope.channel, envelope.band_hz))
+        both = [_depths(e, block_rev, shafts) for e in (envelope, other) if e is not None]
+        if len(both) < 2 or None in both:
+            continue
+        for number, (bearing, name, order) in enumerate(parts):
+            now, then = (_family(depths, order, slip) for depths in both if depths is not None)
+            if now is None or then is None:
+                continue
+            place = signals.where(order, envelope.channel, shaft=bearing.shaft, bearing=bearing.name)
+            where = replace(place, band_hz=envelope.band_hz)
+            quantity = _Quantity(part_text(name, bearing.name), "bearing", where, 0.0, "", now, then)
+            key = number, envelope.channel
+            loudest[key] = max(loudest.get(key, quantity), quantity, key=lambda q: q.mean_power)
+    channels = list(dict.fromkeys(e.channel for e in envelopes))
+    yield from (loudest[key] for key in sorted(loudest, key=lambda key: (key[0], channels.index(key[1]))))
 
 
-def _family(
-    envelope: BandEnvelope, order: float, slip: float, block_rev: int, shafts: Sequence[float] = ()
-) -> _Levels | None:
-    """Return the sum of the first three multiples of an order in the envelope, as depths of modulation.
+def _depths(envelope: BandEnvelope, block_rev: int, shafts: Sequence[float] = ()) -> _Segments | None:
+    """Return an envelope's segments over its mean, as depths of modulation, without multiples of the shafts.
 
-    It stands out where each does, beside multiples of the shafts, and the depth is one that a damage has: a louder
-    carrier changes none of it.
+    A louder carrier changes none of it. None where the speed is not known, or nothing was recorded.
     """
     if envelope.over_angle is None or envelope.mean <= 0:
         return None
     segments = _Segments.of(envelope.over_angle, envelope.channel, block_rev).without_multiples(shafts)
-    lines = [segments.line(k * order, slip) for k in (1, 2, 3) if k * order * (1 + slip) <= segments.highest_order]
+    return replace(segments, power=segments.power / envelope.mean**2)
+
+
+def _family(depths: _Segments, order: float, slip: float) -> _Levels | None:
+    """Return the sum of the first three multiples of an order.
+
+    It stands out where each does, and the depth is one that a damage has.
+    """
+    lines = [depths.line(k * order, slip) for k in (1, 2, 3) if k * order * (1 + slip) <= depths.highest_order]
     if not lines or not all(line.power.any() for line in lines):
         return None
-    depth = max(float(np.sqrt(2 * line.power.mean())) for line in lines) / envelope.mean
+    depth = max(float(np.sqrt(2 * line.power.mean())) for line in lines)
     stands_out = len(lines) > 1 and all(line.stands_out for line in lines) and depth >= CLEAR_MODULATION
-    return _Levels(_sum(lines).power / envelope.mean**2, stands_out)
+    return replace(_sum(lines), stands_out=stands_out)
 
 
 # --------------------
