@@ -35,7 +35,7 @@ READING = 0.03
 
 
 def run_gap(
-    asked: GapRequest,
+    request: GapRequest,
     model: str,
     *,
     cache: Path | None,
@@ -46,7 +46,7 @@ def run_gap(
 
     Parameters
     ----------
-    asked : GapRequest
+    request : GapRequest
     model : str
         Name of the simulator.
     cache : Path or None
@@ -64,14 +64,14 @@ def run_gap(
     from sims.registry import gap_simulator
 
     simulator = gap_simulator(model)
-    inputs = read_gap_inputs(asked, lambda name: on_stage(f"reading {name}", 0.0))
+    inputs = read_gap_inputs(request, lambda name: on_stage(f"reading {name}", 0.0))
     return diagnose_gap(
         inputs.recordings,
         simulator,
         references=inputs.references,
         run_up=inputs.run_up,
         learn=inputs.labelled,
-        stage=asked.stage,
+        stage=request.stage,
         cache=cache,
         fresh=fresh,
         on_stage=lambda stage, done: on_stage(stage, READING + (1 - READING) * done),
@@ -176,9 +176,9 @@ class Job:
         See `run_gap` and the page's command.
     """
 
-    def __init__(self, folder: Path, asked: GapRequest, model: str, *, cache: Path | None, command: str = "") -> None:
+    def __init__(self, folder: Path, request: GapRequest, model: str, *, cache: Path | None, command: str = "") -> None:
         self.folder, self.was_stopped = folder, False
-        write_text(folder / REQUEST, json.dumps(plain(_JobRequest(asked, model, cache, command))))
+        write_text(folder / REQUEST, json.dumps(plain(_JobRequest(request, model, cache, command))))
         log = (folder / LOG).open("w", encoding="utf-8")
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-m", "app.gap_job", str(folder)],  # -P: a user's own app.py there is not ours

@@ -193,5 +193,5 @@ def papers(
     for figure in publication.figures:
         typer.echo(f"{figure.answers}: {figure.title}")
         for claim in figure.claims:
-            typer.echo(f"  {claim.verdict:<15} {claim.statement}: {claim.found}")
+            typer.echo(f"  {claim.verdict:<15} {claim.statement}: {claim.number}")
     typer.echo(f"{publication.summary} Open {output / 'index.html'} in a browser.")

@@ -37,7 +37,7 @@ class Claim:
     ----------
     statement : str
         With its number.
-    found : str
+    number : str
         The model's number.
     verdict : str
     because : str
@@ -45,7 +45,7 @@ class Claim:
     """
 
     statement: str
-    found: str
+    number: str
     verdict: Verdict
     because: str = ""
 
@@ -58,11 +58,11 @@ class Claim:
         return f"{text}{joint}{self.because}" if self.because and self.verdict != "agrees" else text
 
 
-def judged(statement: str, found: str, *, agrees: bool, partly: bool = False, because: str = "") -> Claim:
+def judged(statement: str, number: str, *, agrees: bool, partly: bool = False, because: str = "") -> Claim:
     """Return a claim with the verdict that two comparisons of numbers give."""
     return Claim(
         statement,
-        with_minus(found),
+        with_minus(number),
         "agrees" if agrees else "agrees in part" if partly else "does not",
         with_minus(because),
     )
@@ -161,7 +161,7 @@ def write_paper(publication: Paper, folder: Path, *, command: str = "") -> tuple
         Section(
             f"{item.answers}: {item.title}",
             header=header,
-            rows=tuple((claim.statement, claim.found, claim.judgement) for claim in item.claims),
+            rows=tuple((claim.statement, claim.number, claim.judgement) for claim in item.claims),
             pictures=(embed(item.figure, "", f"{item.title}, as the model gives it"),),
             is_prose=True,
         )

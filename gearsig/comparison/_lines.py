@@ -148,8 +148,10 @@ def _is_certain(x: ComplexArray, y: ComplexArray, best: float, shifts: list[floa
     """
     if max(_angle_distance_rev(best, shift) for shift in shifts) >= 0.5 / n_teeth:
         return False
-    telling = np.arange(x.shape[1]) % n_teeth != 0
-    alike = shift_scores(_cross_spectrum(np.where(telling, x, 0.0), np.where(telling, y, 0.0)), np.array([best]))[0]
+    is_beside_mesh = np.arange(x.shape[1]) % n_teeth != 0
+    alike = shift_scores(
+        _cross_spectrum(np.where(is_beside_mesh, x, 0.0), np.where(is_beside_mesh, y, 0.0)), np.array([best])
+    )[0]
     return bool(alike > 0.5)  # patterns of different gears reach 0.3 to 0.4 at the best of all teeth
 
 

@@ -102,8 +102,8 @@ def fleet_changes(fleet: Fleet, since: datetime | None = None) -> FleetChanges:
                 raised.append(change)
             elif event.cleared_added is not None and event.cleared_added > moment:
                 cleared.append(change)
-    standing = series["level"] > 0
-    shifted = series[~standing & (series["changed_added"] > moment)]
+    alarmed = series["level"] > 0
+    shifted = series[~alarmed & (series["changed_added"] > moment)]
     return FleetChanges(since, n_new, n_failed, failures, _sorted(raised), _sorted(cleared), diagnoses, shifted, status)
 
 

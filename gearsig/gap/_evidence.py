@@ -50,7 +50,7 @@ def evidence_of(fit: Fit, observed: Sequence[ObservedChange], frame: GearFrame) 
         for rows in family_members(fit.path.names).values()
         for i in rows[np.argsort(-sizes[rows], kind="stable")][:MAX_OF_A_FAMILY]
     ]
-    telling = sorted((i for i in best if clear[i]), key=lambda i: -sizes[i])
+    largest = sorted((i for i in best if clear[i]), key=lambda i: -sizes[i])
     return tuple(
         evidence_of_feature(
             feature_words(fit.path.names[i], frame),
@@ -58,7 +58,7 @@ def evidence_of(fit: Fit, observed: Sequence[ObservedChange], frame: GearFrame) 
             float(clearest.distances[i]),
             float(clearest.floors[i]),
         )
-        for i in telling[:MAX_SHOWN]
+        for i in largest[:MAX_SHOWN]
     )
 
 

@@ -313,10 +313,10 @@ def _logarithm(lines: ComplexArray) -> ComplexArray:
     return log
 
 
-def _at_speeds(lines: ComplexArray, speed_hz: FloatArray, wanted_hz: FloatArray) -> ComplexArray:
+def _at_speeds(lines: ComplexArray, speed_hz: FloatArray, at_hz: FloatArray) -> ComplexArray:
     """Return ln of the amplitudes of a run-up at other speeds, straight over ln of the speed."""
-    log, at, wanted = _logarithm(lines), np.log(speed_hz), np.log(wanted_hz)
-    return np.array([_interpolated(wanted, at, row) for row in log])
+    log_amplitudes, log_speed = _logarithm(lines), np.log(speed_hz)
+    return np.array([_interpolated(np.log(at_hz), log_speed, row) for row in log_amplitudes])
 
 
 # --------------------
@@ -384,8 +384,8 @@ def _credibility(log_ratio: ComplexArray, log_hz: FloatArray, weights: FloatArra
         for values, at, weight in zip(log_ratio[is_asked], log_hz[is_asked], weights[is_asked], strict=True):
             used = (weight > 0.0) & (np.interp(at, knots, is_known) == 1.0)
             if np.count_nonzero(used) >= MIN_POINTS:
-                said = _interpolated(at[used], knots, response)
-                left += _bent(values[used] - said, at[used], weight[used])
+                predicted = _interpolated(at[used], knots, response)
+                left += _bent(values[used] - predicted, at[used], weight[used])
                 whole += _bent(values[used], at[used], weight[used])
     return float(np.clip(1.0 - left / whole, 0.0, 1.0)) if whole > 0.0 else 0.0
 

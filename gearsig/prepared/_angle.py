@@ -170,9 +170,9 @@ def _from_shaft_harmonics(recording: Recording, stated: ShaftAngle) -> ShaftAngl
     for mains_hz in mains:
         lines = lines.without_multiples(mains_hz, skirt=MAINS_TOLERANCE)
         comb = best_comb(lines, low, high, harmonics)
-    telling = None if comb is None else _distinguishing_harmonic(channels, comb.fundamental, hertz)
-    if comb is not None and telling is not None:
-        nearer, harmonics = abs(comb.fundamental - hertz) / 2, harmonics[:telling]
+    n_harmonics = None if comb is None else _distinguishing_harmonic(channels, comb.fundamental, hertz)
+    if comb is not None and n_harmonics is not None:
+        nearer, harmonics = abs(comb.fundamental - hertz) / 2, harmonics[:n_harmonics]
         comb = best_comb(lines, hertz - nearer, hertz + nearer, harmonics)
     if comb is None or comb.p_value > 1e-3:
         return _from_first_harmonic(channels, stated)

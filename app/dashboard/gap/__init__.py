@@ -172,8 +172,8 @@ def _start(choice: Choice) -> None:
     forget()
     folder = private_folder()
     try:
-        asked = files_of(choice, folder)
-        job = Job(folder, asked, choice.model, cache=cache_folder("gap"), command=choice.command)
+        request = files_of(choice, folder)
+        job = Job(folder, request, choice.model, cache=cache_folder("gap"), command=choice.command)
     except BaseException as error:
         shutil.rmtree(folder, ignore_errors=True)
         if not isinstance(error, GearsigError):
@@ -224,8 +224,8 @@ def _place_of(choice: Choice) -> Path:
     """
     rigs = [file.rig_text for file in choice.recorded]
     code = f"{gearsig.__version__} {_code()} {sources_digest()}"
-    asked = sha256(f"{code} {choice.key} {rigs!r}".encode()).hexdigest()
-    return cache_folder("gap-results") / f"{asked}.zip"
+    name = sha256(f"{code} {choice.key} {rigs!r}".encode()).hexdigest()
+    return cache_folder("gap-results") / f"{name}.zip"
 
 
 @cache

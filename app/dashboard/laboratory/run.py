@@ -103,16 +103,16 @@ def run_setup(setup: Setup) -> LaboratoryRun:
 
     operation, rng = Operation.steady(setup.speed_rpm, setup.torque_nm), np.random.default_rng(setup.seed)
     rate_hz, duration_s = setup.sampling_rate_hz, setup.duration_s
-    asked = SimulationSetup(setup.preset, dict(setup.parameters), setup.effects, operation)
+    simulated_setup = SimulationSetup(setup.preset, dict(setup.parameters), setup.effects, operation)
     rig_name = f"simulated: {setup.preset}"
     if setup.model == MODEL:
-        ready = CrackedPair().prepare(asked, rng, sampling_rate_hz=rate_hz)
+        ready = CrackedPair().prepare(simulated_setup, rng, sampling_rate_hz=rate_hz)
         rig = build_rig(ready.machine, operation, name=rig_name)
         recording, response = simulate_with_motion(
             ready.machine, operation, MeasuredRun(rng, rate_hz, duration_s, rig, ready.truth(), also=MOTION)
         )
         return LaboratoryRun(setup, ready.machine, recording, _shown_part(response, duration_s))
-    flexible = ReducedPair().prepare(asked, rng, sampling_rate_hz=rate_hz)
+    flexible = ReducedPair().prepare(simulated_setup, rng, sampling_rate_hz=rate_hz)
     pair, machine = flexible.pair, flexible.pair.machine
     rig = build_rig(machine, operation, name=rig_name)
     recording, bent = simulate_pair(

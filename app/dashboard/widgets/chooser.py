@@ -155,10 +155,10 @@ def choose_with_rig(label: str, key: str, *, about: str = KINDS) -> tuple[Chosen
 
 def _open_named(key: str, name: str) -> None:
     """Open the files that the page's address names, where this session holds none or Back asks for them."""
-    asked = address.all_asked(name)
+    tokens = address.all_asked(name)
     if not address.follows(key) and state.kept_files(key):
         return
-    named = {token: file for token in asked if (file := kept_file(token)) is not None}
+    named = {token: file for token in tokens if (file := kept_file(token)) is not None}
     if named:
         for token, file in named.items():
             state.token_of(key, file.sha256, token)

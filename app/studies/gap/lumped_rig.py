@@ -271,9 +271,9 @@ def march(  # type: ignore[no-untyped-def]  # noqa: PLR0915  one step after the 
         kx, ky, k_roll = bodies.mount_n_per_m
         cx, cy, c_roll = bodies.mount_damping
         yielding = ky * (1.0 - drive.loose) if q[9] > -drive.lifted_m else ky
-        standing = ky * drive.lifted_m - yielding * (q[9] + drive.lifted_m)
+        support_force = ky * drive.lifted_m - yielding * (q[9] + drive.lifted_m)
         a[8] = (pressed_x - kx * q[8] - cx * v[8] + on_housing[0, i]) / bodies.housing_mass
-        a[9] = (pressed_y + standing - cy * v[9] + on_housing[1, i]) / bodies.housing_mass
+        a[9] = (pressed_y + support_force - cy * v[9] + on_housing[1, i]) / bodies.housing_mass
         a[10] = (moment - k_roll * q[10] - c_roll * v[10]) / bodies.housing_inertia
         for d in range(11):
             v[d] += step * a[d]
