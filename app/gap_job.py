@@ -25,8 +25,8 @@ from time import monotonic
 
 from gearsig.cache import write_text
 from gearsig.errors import GearsigError, InputError, RefusalError
-from gearsig.gap import GapReport, GapRequest, read_gap_inputs
-from gearsig.processes import stop
+from gearsig.gap import PROCESSES, GapReport, GapRequest, read_gap_inputs
+from gearsig.processes import one_pool, stop
 from gearsig.report import check_writable, from_plain, plain, read_gap_json, write_gap_json, write_gap_page
 
 Stage = Callable[[str, float], None]
@@ -300,8 +300,9 @@ def main(folder: Path) -> int:
         _JobRequest, json.loads((folder / REQUEST).read_text(encoding="utf-8")), where=REQUEST
     )
     try:
-        report = run_gap(request.asked, request.model, cache=request.cache, on_stage=_Progress(folder / PROGRESS))
-        write_results(report, folder / RESULTS, command=request.command)
+        with one_pool(PROCESSES):
+            report = run_gap(request.asked, request.model, cache=request.cache, on_stage=_Progress(folder / PROGRESS))
+            write_results(report, folder / RESULTS, command=request.command)
     except GearsigError as error:
         write_text(folder / ERROR, error_to_json(error))
         return EXIT_REFUSED

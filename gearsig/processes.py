@@ -65,8 +65,11 @@ def one_pool(n_processes: int) -> Iterator[None]:
     """Let all jobs of a block that ask for so many local processes run in the same ones, also as a decorator.
 
     The processes start with the first job, and stay what they are while the block lasts; where one is killed, the jobs
-    that follow get fresh ones.
+    that follow get fresh ones. Within such a block another one changes nothing.
     """
+    if any(pool._max_workers == n_processes for pool in _KEPT.get([])):  # type: ignore[attr-defined]  # nothing public tells it
+        yield
+        return
     with process_pool(n_processes) as pool:
         before = _KEPT.set([pool])
         try:
@@ -81,6 +84,26 @@ def start_early(function: Callable[..., object], *arguments: object) -> None:
         for pool in _KEPT.get([]):
             for _ in range(pool._max_workers):  # type: ignore[attr-defined]  # nothing public tells it
                 pool.submit(function, *arguments)
+
+
+def begin(function: Callable[..., Result], *arguments: object) -> Callable[[], Result]:
+    """Begin a call in a process of `one_pool`; return what waits for its result.
+
+    Outside such a block, and where the process is killed, that makes the call itself.
+    """
+    future: Future[Result] | None = None
+    if active_cluster() is None and can_be_sent((function, arguments)):
+        for pool in _KEPT.get([]):
+            with suppress(BrokenProcessPool):
+                future = pool.submit(function, *arguments)
+
+    def result() -> Result:
+        try:
+            return function(*arguments) if future is None else future.result()
+        except BrokenProcessPool:
+            return function(*arguments)
+
+    return result
 
 
 @contextmanager

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from gearsig.processes import call_apart, can_be_sent, one_pool, process_pool, run_jobs
+from gearsig.processes import begin, call_apart, can_be_sent, one_pool, process_pool, run_jobs
 
 SCRIPT = """
 from gearsig.processes import can_be_sent, process_pool
@@ -113,8 +113,11 @@ def test_jobs_of_a_block_share_processes_and_one_that_is_killed_is_replaced() ->
         jobs = run_jobs(os.readlink, ["/proc/self"] * 3, n_workers=2, if_killed=str)
         return {number for _, number in jobs}
 
+    assert begin(os.getpid)() == os.getpid()  # there is no pool: here, when its result is wanted
     with one_pool(2):
         first = numbers()
-        assert len(first | numbers()) <= 2
+        with one_pool(2):
+            assert len(first | numbers()) <= 2
+        assert str(begin(os.getpid)()) in first
         assert [*run_jobs(os._exit, [1], n_workers=2, if_killed=lambda _job: None)] == [(0, None)]
         assert not first & numbers()

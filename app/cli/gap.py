@@ -115,7 +115,8 @@ def gap(
     if output is None:
         raise InputError("no folder for the results is given", remedy="give -o DIR")
     from app.gap_job import check_folder, write_results
-    from gearsig.gap import GapRequest
+    from gearsig.gap import PROCESSES, GapRequest
+    from gearsig.processes import one_pool
     from gearsig.report import check_writable
 
     request = GapRequest(
@@ -135,10 +136,11 @@ def gap(
         check_writable(cache, "--cache")
     if fresh and model == "reduced-fe":
         clear_other_versions(model)
-    with open_cluster(cluster) as workers:
-        report = _diagnosed(request, model, cache, fresh=fresh)
-        ran = workers.text() if workers else ""
-    written = write_results(report, output, command=typed_command())
+    with one_pool(PROCESSES):  # which draw the page as well
+        with open_cluster(cluster) as workers:
+            report = _diagnosed(request, model, cache, fresh=fresh)
+            ran = workers.text() if workers else ""
+        written = write_results(report, output, command=typed_command())
     _print_summary(report, written)
     if ran:
         typer.echo(f"It ran {ran}.")

@@ -194,6 +194,7 @@ from gearsig.gap._tooth_error import (
     tooth_error_evidence,
 )
 from gearsig.gap._trials import (
+    PROCESSES,
     Bank,
     Reduced,
     Task,
@@ -228,6 +229,7 @@ __all__ = [
     "LIGHT_LOAD_N_PER_MM",
     "NAMING",
     "NONE",
+    "PROCESSES",
     "SIDEBAND_OFFSETS",
     "SIDES",
     "SIGNS",

@@ -384,6 +384,8 @@ def _plain(added: Added) -> list[Any]:
 
 
 PROCESSES = 2
+"""In which one diagnosis is made."""
+
 HELD_OUT = "other revolutions of the same recordings"
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, fields, is_dataclass, replace
 from datetime import datetime
 from math import isfinite
 from pathlib import Path
@@ -37,6 +37,7 @@ from gearsig.gap import (
     severity_unit,
     stance_words,
 )
+from gearsig.processes import begin
 from gearsig.report._files import render
 from gearsig.report._sections import Rows, made_rows
 
@@ -390,11 +391,10 @@ class GapGallery:
 
 
 def gap_galleries(report: GapReport) -> dict[str, GapGallery]:
-    """Return the pictures of a page by question."""
-    drawn = [
-        (figure, plot.embed(figure.figure, figure.look, figure.shows, vector=figure.vector))
-        for figure in gap_figures(report)
-    ]
+    """Return the pictures of a page by question; half of them are drawn by a process of `one_pool`, if there is one."""
+    first_half = begin(_embedded, report, _against_reference)
+    later = [pair for draw in (_spectra, *_FEW_LINES) for pair in _embedded(report, draw)]
+    drawn = [*first_half(), *later]
     return {
         question: GapGallery(
             tuple(p for figure, p in drawn if figure.question == question and not figure.is_small and not figure.of),
@@ -403,6 +403,16 @@ def gap_galleries(report: GapReport) -> dict[str, GapGallery]:
         )
         for question in QUESTIONS
     }
+
+
+def _embedded(
+    report: GapReport, draw: Callable[[GapReport], Iterator[GapFigure]]
+) -> list[tuple[GapFigure, plot.Picture]]:
+    """Return some figures as pictures; the figures themselves, which cannot be sent, are dropped."""
+    return [
+        (replace(figure, figure=None), plot.embed(figure.figure, figure.look, figure.shows, vector=figure.vector))
+        for figure in draw(report)
+    ]
 
 
 def gap_figures(report: GapReport, *, curves: bool = True) -> Iterator[GapFigure]:
@@ -419,9 +429,8 @@ def gap_figures(report: GapReport, *, curves: bool = True) -> Iterator[GapFigure
     if curves:
         yield from _against_reference(report)
         yield from _spectra(report)
-    yield from _teeth(report)
-    yield from _evidence(report)
-    yield from _waterfall(report)
+    for draw in _FEW_LINES:
+        yield from draw(report)
 
 
 def _against_reference(report: GapReport) -> Iterator[GapFigure]:
@@ -565,6 +574,10 @@ def _waterfall(report: GapReport) -> Iterator[GapFigure]:
             vector=True,
             data=plot.gap_waterfall_panel(report.steps, held_out=held_out),
         )
+
+
+_FEW_LINES = (_teeth, _evidence, _waterfall)
+"""What draws rings and bars, in the order of the page."""
 
 
 def is_finite(value: Any) -> bool:
