@@ -133,9 +133,9 @@ def _phase_plane(
         numbers=numbers,
         notes=(
             (
-                f"From {portrait.start_s:.3g} to {portrait.end_s:.3g} s of the part, {low:.4g} to {high:.4g} Hz: near "
-                "its ends an integral rests on what is not known. Motion that repeats with the lock falls onto one "
-                "point; scatter is noise, modulation, or motion that does not repeat."
+                f"Shown are {portrait.start_s:.3g} to {portrait.end_s:.3g} s of the part, {low:.4g} to {high:.4g} Hz; "
+                "its ends are left out, as integration is uncertain there. Motion that repeats with every cycle falls "
+                "onto one point; scatter is noise, modulation, or motion that does not repeat."
             ),
         ),
         warnings=_speed_messages(prepared) if section is not None else (),
