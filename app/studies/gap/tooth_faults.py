@@ -76,7 +76,7 @@ class Answered:
     size : float
         Of the gap, in structural floors.
     stated : Interval or None
-        The severity that is stated of the true fault.
+        The severity that is stated of the true fault; None where the twin does not show it.
     """
 
     name: str
@@ -164,7 +164,7 @@ def answered(recorded: RecordedFault, rig: Rig, cache: Path) -> Answered:
     attribution = attribute(conditions, known, TOOTH_FAULTS, twin, cache, lambda _what, _done: None)
     before, after = (a.probabilities() for a in (replace(attribution, tried={}), attribution))
     trial = attribution.tried.get(recorded.name)
-    severity = None if trial is None else trial.severity
+    severity = trial.severity if trial is not None and trial.explains else None
     if recorded.name == "root_crack" and isinstance(depth := _crack(now, reference), CrackEstimate):
         severity = Interval(depth.depth_mm, *depth.interval_mm)
     match = None if trial is None else trial.match
