@@ -79,12 +79,14 @@ from gearsig.gap._next_recording import next_recordings, next_steps
 from gearsig.gap._path import MeasuredPath, measured_path
 from gearsig.gap._places import (
     ComparedPair,
+    compared_pair,
     counted_against,
     gap_places,
     locate_all_round,
     locate_mesh,
     locate_tail,
     ranked_places,
+    without_silent_races,
 )
 from gearsig.gap._population import (
     BY_HAND,
@@ -202,6 +204,7 @@ from gearsig.gap._trials import (
     TwinRun,
     at_its_tooth,
     banks_of,
+    cause_place,
     place_of,
     refuse_where_none_ran,
     rounded,
@@ -311,11 +314,13 @@ __all__ = [
     "banks_of",
     "beyond_the_mesh",
     "burst_features",
+    "cause_place",
     "change_features",
     "change_once",
     "check_steady",
     "closed_shares",
     "compare_waveform",
+    "compared_pair",
     "conditions_of",
     "contrast_rows",
     "counted_against",
@@ -417,6 +422,7 @@ __all__ = [
     "within_reach",
     "within_the_floor",
     "without_machines_of",
+    "without_silent_races",
     "write_learned",
     "wrong_teeth",
 ]

@@ -21,7 +21,14 @@ from gearsig.gap._gearless import diagnose_gearless, place_of_unexpected, unexpe
 from gearsig.gap._inputs import is_gearless, twin_rig, with_stage
 from gearsig.gap._labelled import LabelledRecording, labelled_changes
 from gearsig.gap._next_recording import next_recordings, next_steps
-from gearsig.gap._places import counted_against, gap_places, ranked_places
+from gearsig.gap._places import (
+    ComparedPair,
+    compared_pair,
+    counted_against,
+    gap_places,
+    ranked_places,
+    without_silent_races,
+)
 from gearsig.gap._population import load_learned
 from gearsig.gap._reduction import ReducedRecording
 from gearsig.gap._report import (
@@ -217,13 +224,15 @@ def diagnose_gap(
             tooth_error_log_likelihoods=mean_log_likelihoods(tooth_errors),
         )
     tried, gap = attribution.tried, _places(clearest)
-    probabilities = _posterior(attribution, clearest, known, gap)
+    probabilities = _posterior(attribution, conditions, clearest, known, gap)
 
     # 5. What stands out of the clearest recording by itself, whatever the features say.
     tell("placing it", 0.82)
     unexpected, unexpected_messages, faults = unexpected_job.result()
     outcome, unseen = with_unexpected(attribution.calibration.outcome(probabilities, known), unexpected)
-    labels = _labelled_facts(attribution, _posterior(replace(attribution, labelled=None), clearest, known, gap), known)
+    labels = _labelled_facts(
+        attribution, _posterior(replace(attribution, labelled=None), conditions, clearest, known, gap), known
+    )
     warnings = (*unseen, *(text for condition in conditions for text in warnings_of(condition)), *faults)
 
     # 6. Where, and of each cause where it sits, how severe it is and what speaks for it.
@@ -498,11 +507,26 @@ def _fit_messages(named: GapCause | None, tried: Mapping[str, TriedEffect]) -> l
 
 
 def _posterior(
-    attribution: Attribution[TriedEffect], clearest: Condition, known: Mapping[str, GapEffect], gap: Sequence[GapPlace]
+    attribution: Attribution[TriedEffect],
+    conditions: Sequence[Condition],
+    clearest: Condition,
+    known: Mapping[str, GapEffect],
+    gap: Sequence[GapPlace],
 ) -> dict[str, float]:
-    """Return cause → probability, with what the whole gap and its places say."""
+    """Return cause → probability, with what the whole gap, its places and the races' own lines say."""
     posterior = within_the_floor(attribution.probabilities(), clearest.size.structural)
+    posterior = without_silent_races(posterior, [*map(_comparison, conditions)])
     return counted_against(posterior, known, gap, clearest.now.frame)
+
+
+def _comparison(condition: Condition) -> ComparedPair:
+    return compared_pair(
+        condition.now,
+        condition.baseline,
+        condition.floor,
+        condition.change,
+        is_reference=condition.reference is not None,
+    )
 
 
 def _places(condition: Condition) -> tuple[GapPlace, ...]:

@@ -134,6 +134,53 @@ def counted_against(
     return likeliest_first(lowered)
 
 
+RACES = {"bearing_outer_race": "outer", "bearing_inner_race": "inner"}
+"""Effect → the family of lines that it makes."""
+
+MISSED_RACE = 0.2
+"""Probability that a damaged race shows, and has no lines of its own: as `MISSED_FAULT`, of bearings alone."""
+
+
+def without_silent_races(probabilities: Mapping[str, float], comparisons: Sequence[ComparedPair]) -> dict[str, float]:
+    """Return the probabilities with those of races lowered whose lines rose in none of the recordings.
+
+    Balls that roll over a spall make lines at the race's own order. A tooth that strikes once a turn makes lines at all
+    multiples of its shaft, in the same bands, and some of them lie within a race's slip: the features of all bearings
+    rise with them. What has no lines of its own is multiplied by `MISSED_RACE`; then all are scaled to 1.
+
+    Parameters
+    ----------
+    probabilities : mapping
+        Cause → probability.
+    comparisons : sequence of ComparedPair
+        One per recording, of one rig.
+    """
+    silent = set(RACES).intersection(*(_silent_races(comparison) for comparison in comparisons))
+    weighted = {name: p * (MISSED_RACE if name in silent else 1.0) for name, p in probabilities.items()}
+    total = sum(weighted.values())
+    return likeliest_first({name: p / total for name, p in weighted.items()})
+
+
+def _silent_races(comparison: ComparedPair) -> set[str]:
+    """Return the effects whose race has no lines that rose, and more than the shafts' own in the envelope did.
+
+    Of a race that the rig file does not describe nothing is known.
+    """
+    envelope, residual = _envelope_levels(comparison), _residual_levels(comparison)
+    of_shafts = max(family.rise_db for family in _shafts(comparison, envelope))
+    floors = ((envelope, max(MIN_OF_A_FAMILY_DB, of_shafts)), (residual, MIN_OF_A_FAMILY_DB))
+    rises = [(_widened(levels.now) - levels.baseline, levels, floor) for levels, floor in floors]
+    silent = set()
+    for effect, kind in RACES.items():
+        attribute, factor = BEARING_FAMILIES[kind]
+        orders = [getattr(bearing, attribute) * factor for bearing in comparison.now.frame.bearings]
+        known = [order for order in orders if np.isfinite(order)]
+        heard = any(_family_rise(rise, o, levels)[0] >= floor for o in known for rise, levels, floor in rises)
+        if known and not heard:
+            silent.add(effect)
+    return silent
+
+
 def _is_an_order(place: GapPlace, frame: GearFrame) -> bool:
     """Whether a place is one of lines: a shaft's, those of the residual, or an envelope's at no shaft's order."""
     if place.kind is PlaceKind.ENVELOPE and place.orders:
@@ -179,6 +226,22 @@ class ComparedPair:
     def strongest(self, *beginnings: str) -> str:
         """Return the feature with the largest change over the floors among those whose names begin so."""
         return max((name for name in self.size if name.startswith(beginnings)), key=lambda name: abs(self.size[name]))
+
+
+def compared_pair(
+    now: ReducedRecording,
+    baseline: ReducedRecording,
+    structural: StructuralFloor,
+    change: Features,
+    *,
+    is_reference: bool,
+) -> ComparedPair:
+    """Return a recording beside what it is compared with; parameters as of `gap_places`."""
+    distances, *floors = against_floors(change, structural, is_reference=is_reference)
+    # Healthy machines' differences hold their scatter already; a shorter record's may be larger.
+    ratios = distances / np.maximum(*floors)
+    change_db, size = (dict(zip(change.names, values.tolist(), strict=True)) for values in (distances, ratios))
+    return ComparedPair(now, baseline, is_reference, change_db, size)
 
 
 def by_decibels(change_db: float) -> str:
@@ -249,10 +312,7 @@ class _StrongestRise:
 def locate_envelope(comparison: ComparedPair) -> GapPlace:
     """Return whose order modulates what no shaft repeats."""
     now, names = comparison.now, tuple(comparison.now.channels)
-    ratios = [
-        np.concatenate([envelope_ratios(g, g.channels[name]) for name in names]) for g in (now, comparison.baseline)
-    ]
-    levels = _levels(comparison, ratios, now.cycle_step, comparison.baseline.cycle_step)
+    levels = _envelope_levels(comparison)
     levels, sign = _with_rising_change(levels, comparison.size[comparison.strongest("envelope.")])
     family = _family_or_line(_best_race(comparison, levels), _strongest(comparison, levels, fundamental=True))
     family = max(family, *_shafts(comparison, levels), key=lambda candidate: candidate.rise_db)
@@ -301,6 +361,12 @@ def _line(comparison: ComparedPair, line: _StrongestRise, sign: float) -> GapPla
     change = sign * line.rise_db
     title = f"line {line.words} ({hertz(line.orders[0] * comparison.now.speed_hz)}), {by_decibels(change)}"
     return GapPlace(PlaceKind.LINE, title, change, orders=line.orders, channel=list(comparison.now.channels)[line.row])
+
+
+def _envelope_levels(comparison: ComparedPair) -> LineLevels:
+    now, before = comparison.now, comparison.baseline
+    ratios = [np.concatenate([envelope_ratios(g, g.channels[name]) for name in now.channels]) for g in (now, before)]
+    return _levels(comparison, ratios, now.cycle_step, before.cycle_step)
 
 
 def _residual_levels(comparison: ComparedPair) -> LineLevels:
@@ -844,10 +910,8 @@ def gap_places(
         If the reference was taken at another speed.
     """
     distances, *floors = against_floors(change, structural, is_reference=is_reference)
-    # Healthy machines' differences hold their scatter already; a shorter record's may be larger.
-    ratios = distances / np.maximum(*floors)
-    change_db, size = (dict(zip(change.names, values.tolist(), strict=True)) for values in (distances, ratios))
-    comparison = ComparedPair(now, baseline, is_reference, change_db, size)
+    comparison = compared_pair(now, baseline, structural, change, is_reference=is_reference)
+    ratios = np.array([*comparison.size.values()])
     members = {family: _located_rows(change.names, rows) for family, rows in family_members(change.names).items()}
     energies = {family: max(family_size(ratios[rows]) ** 2 - 1.0, 0.0) for family, rows in members.items()}
     min_energy = MIN_SHARE * sum(energies.values())

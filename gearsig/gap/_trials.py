@@ -803,7 +803,8 @@ def cause_place(
     """Return where a cause sits, in words; empty where it has no place or nothing is known of it.
 
     Which shaft, the recordings tell by themselves. Where they do not, a fit tells that is clearly better on one of them
-    than on the other; else that is what it says.
+    than on the other; then, of a single tooth, that on one shaft alone a tooth stands out: in the other's average its
+    bursts are smeared. Else that is what it says.
     """
     frame = conditions[0].now.frame
     changes = [condition.over_floors for condition in conditions]
@@ -815,6 +816,10 @@ def cause_place(
         return place_of(Added(name, 0.0, {**options, **a_tooth}) if tried is None else tried.added, frame, places)
     if tried is not None and _is_clear(tried, conditions):
         return place_of(tried.fit.added, frame, places)
+    bursting = {place.shaft for place in places if place.kind is PlaceKind.TOOTH and place.angle_deg is not None}
+    if name in SINGLE_TOOTH_FAULTS and len(bursting) == 1:
+        gear = SIDES[frame.shafts.index(bursting.pop())]
+        return place_of(Added(name, 0.0, {"gear": gear, "tooth": 1.0}), frame, places)
     either = " or ".join(shaft_words(frame, side) for side in range(len(SIDES)))
     return f"{either} (which cannot be told)"
 

@@ -18,11 +18,13 @@ from gearsig.gap import (
     StructuralFloor,
     beyond_the_mesh,
     change_features,
+    compared_pair,
     difference_features,
     gap_places,
     locate_all_round,
     locate_mesh,
     reduce_recording,
+    without_silent_races,
 )
 from tests.gap.synthetic import RIG, SPEED_HZ, TEETH, record, ringing
 
@@ -54,6 +56,20 @@ def places_of(added: Added | None = None, *, is_reference: bool = True, **settin
 
 def tone(order: float, amplitude: float) -> Added:
     return lambda _, r: amplitude * np.cos(2 * np.pi * order * r + 0.3)
+
+
+def test_only_a_race_with_lines_of_its_own_is_not_counted_against() -> None:
+    """A tooth strikes once a turn, a ball at the race's order: both make the envelope's features of bearings rise."""
+
+    def compared(order: float, level: float) -> ComparedPair:
+        now = reduce_recording(record(lambda _, r: level * ringing(order * r), seed=1), RIG)
+        change = change_features(now, healthy())
+        return compared_pair(now, healthy(), floor(True), change, is_reference=True)
+
+    rolling, striking = compared(OUTER, 2.0), compared(1.0, 4.0)
+    found = {"bearing_outer_race": 0.5, "root_crack": 0.3, "none": 0.2}
+    assert without_silent_races(found, [rolling]) == without_silent_races(found, [striking, rolling]) == found
+    assert without_silent_races(found, [striking])["bearing_outer_race"] == pytest.approx(0.1 / 0.6)
 
 
 @pytest.mark.slow
