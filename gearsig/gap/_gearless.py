@@ -153,10 +153,13 @@ def _with_bearings(recording: PreparedRecording) -> Analysis:
     return analysis
 
 
-def examined(analysis: Analysis, references: Sequence[Analysis]) -> ExaminedRecording:
-    """Return what stands out of a recording, beyond the reference at its speed where there is one."""
+def examined(analysis: Analysis, references: Sequence[Analysis], *, damaged_too: bool = False) -> ExaminedRecording:
+    """Return what stands out of a recording, beyond the reference at its speed where there is one.
+
+    A reference that shows a fault by itself is none, unless `damaged_too`.
+    """
     name = analysis.recording.name
-    reference, messages = _reference(analysis, references)
+    reference, messages = _reference(analysis, references, damaged_too=damaged_too)
     unexpected = []
     for finding in analysis.findings:
         if finding.code not in (*RACE_EFFECTS, *IMPACTS, LINE):
@@ -210,7 +213,9 @@ def _rise_db(finding: Finding, earlier: Earlier) -> float | None:
     return None if differ else earlier.change_db
 
 
-def _reference(analysis: Analysis, references: Sequence[Analysis]) -> tuple[Analysis | None, list[str]]:
+def _reference(
+    analysis: Analysis, references: Sequence[Analysis], *, damaged_too: bool
+) -> tuple[Analysis | None, list[str]]:
     """Return the healthy reference at the recording's speed, and what it cannot be asked; or none and why."""
     if not references:
         return None, []
@@ -223,7 +228,7 @@ def _reference(analysis: Analysis, references: Sequence[Analysis]) -> tuple[Anal
         why = f"no reference is within {percent(LARGEST_SPEED_DIFFERENCE)} of its speed"
     elif len(missing) == len(channels):
         why = f"the reference has no channel {', '.join(missing)}"
-    elif nearest.outcome is Outcome.FAULT:
+    elif nearest.outcome is Outcome.FAULT and not damaged_too:
         why = f"the reference at its speed is not healthy ({nearest.findings[0].title.rstrip('.')})"
     if why:
         return None, [f"{name} is not compared with a reference: {why}."]
@@ -373,7 +378,8 @@ def place_of_unexpected(part: UnexpectedFinding, rig: Rig, *, name: str = "") ->
         The recording's where there are several.
     """
     where = part.finding.where
-    order, frequency = where.order or NAN, where.frequency_hz or NAN
+    order = where.order or NAN
+    frequency = "" if where.frequency_hz is None else f", {hertz(where.frequency_hz)}"  # none where the speed varies
     over = f"{part.over_floor_db:.0f} dB over their floor" + (
         f" in {band_words(where.band_hz)}" if where.band_hz else ""
     )
@@ -382,7 +388,7 @@ def place_of_unexpected(part: UnexpectedFinding, rig: Rig, *, name: str = "") ->
     driver = rig.ratio(rig.pairs[0].driver) if rig.pairs else 1.0
     return GapPlace(
         PlaceKind.LINE if part.finding.code == LINE else PlaceKind.ENVELOPE,
-        f"{_part_text(part, rig)} (order {order:.4g}, {hertz(frequency)}), {over}{since}{in_recording}",
+        f"{_part_text(part, rig)} (order {order:.4g}{frequency}), {over}{since}{in_recording}",
         part.over_floor_db if part.rise_db is None else part.rise_db,
         shaft=where.shaft,
         orders=(order / (driver or 1.0),),
@@ -615,9 +621,10 @@ def unexpected_findings(
                 (abs(reference.shaft_angle.mean_speed_rpm - now.shaft_angle.mean_speed_rpm), len(speeds), reference)
             )
     nearest = min(speeds)[2] if speeds else references[0] if len(references) == 1 else None
-    healthy = [] if nearest is None else [analyze(named_alike(recording.recording, nearest))]
-    healthy = [analysis for analysis in healthy if isinstance(analysis.shaft_angle, ShaftAngle)]
-    now_examined = examined(now, healthy)
+    alike = [] if nearest is None else [named_alike(recording.recording, nearest)]
+    healthy = [analysis for analysis in map(analyze, alike) if isinstance(analysis.shaft_angle, ShaftAngle)]
+    alone = examined(now, healthy, damaged_too=True)  # what both have is no gap; that it is there, a warning says
+    now_examined = _beyond_reference(recording, alone, alike)
     warnings = _fault_of_reference(healthy[0], now, name) if healthy else []
     weak = [part for part in now_examined.unexpected if part.finding.code == LINE or part.finding.kind is Kind.NOTICE]
     strong = [part for part in now_examined.unexpected if part not in weak]
@@ -626,6 +633,7 @@ def unexpected_findings(
         for part in weak
         if not (part.finding.code == LINE and any(_is_harmonic(part, family) for family in strong))
     ]
+    messages += now_examined.notes[len(alone.notes) :]
     return strong, messages, warnings
 
 
@@ -664,10 +672,12 @@ def _fault_of_reference(reference: Analysis, now: Analysis, name: str) -> list[s
     """Say so where the reference shows a fault by itself; most of all where the recording shows none."""
     if reference.outcome is not Outcome.FAULT:
         return []
-    fault = reference.findings[0].title.rstrip(".")
-    perhaps = "" if now.outcome is Outcome.FAULT else " and the recording shows no fault: they may have been exchanged"
+    fault = reference.findings[0]
+    is_shown = now.outcome is Outcome.FAULT or in_reference(fault, now) is not None
+    perhaps = "" if is_shown else " and the recording shows no fault: they may have been exchanged"
+    title = fault.title.rstrip(".")
     message = (
-        f"The reference of {name} does not look healthy ({fault}){perhaps}. What is named may be what the "
+        f"The reference of {name} does not look healthy ({title}){perhaps}. What is named may be what the "
         "reference has and the recording has not."
     )
     return [message]

@@ -10,7 +10,17 @@ from gearsig.checks import FloatArray
 from gearsig.gap._conditions import Condition
 from gearsig.gap._evidence import TOOTH_FAULTS
 from gearsig.gap._floors import family_members
-from gearsig.gap._report import NEXT_STEPS, SLOW_RPM, WIDE, GapCause, GapOutcome, NextRecording, NextStep
+from gearsig.gap._report import (
+    NEXT_STEPS,
+    NONE,
+    SLOW_RPM,
+    UNKNOWN,
+    WIDE,
+    GapCause,
+    GapOutcome,
+    NextRecording,
+    NextStep,
+)
 from gearsig.gap._simulator import HasFurtherPlaces, OperatingCondition, Twin, point_text, same_condition
 from gearsig.gap._trials import PROCESSES, Reduced, Task, TriedEffect, TwinRun, finished_runs, n_compared
 
@@ -190,6 +200,6 @@ def next_steps(
         "slow_loads": is_which_tooth_fault and len(slow) < 2,
         "run_up": is_which_tooth_fault and has_reference and not has_run_up,
         "other_speed": passed_on and max(speeds) < WIDE * min(speeds),
-        "label": not is_labelled and outcome is not GapOutcome.EFFECT,
+        "label": not is_labelled and outcome is not GapOutcome.EFFECT and not {NONE, UNKNOWN}.issuperset(likely),
     }
     return tuple(NextStep(code, NEXT_STEPS[code]) for code, worth in is_worth.items() if worth)

@@ -43,6 +43,19 @@ def test_impacts_at_a_strange_order_are_named_and_a_reference_that_has_them_sile
     assert not again
 
 
+@pytest.mark.slow
+def test_a_race_that_strikes_in_the_reference_as_well_is_no_gap_but_a_doubt() -> None:
+    outer = RIG.bearings[0].orders()["BPFO"]
+
+    def rolling_over(_time: FloatArray, revolutions: FloatArray) -> FloatArray:
+        return np.asarray(3.0 * ringing(revolutions * outer))
+
+    standing, _, (doubt,) = seen(record(rolling_over), RIG, record(rolling_over, seed=1))
+    assert not standing
+    assert "does not look healthy" in doubt
+    assert "exchanged" not in doubt
+
+
 def test_healthy_gears_have_nothing_strange() -> None:
     assert seen(record()) == ([], [], [])
 
@@ -66,6 +79,8 @@ def test_orders_of_a_place_are_the_drivers_whatever_shaft_the_speed_is_of() -> N
     standing, *_ = seen(record(knocking), turned)
     assert standing[0].finding.where.order == pytest.approx(STRANGE * 37 / 23, rel=1e-3)
     assert place_of_unexpected(standing[0], turned).orders[0] == pytest.approx(STRANGE, rel=1e-3)
+    hunting = replace(standing[0].finding, where=replace(standing[0].finding.where, frequency_hz=None))
+    assert "(order 8.282), " in place_of_unexpected(replace(standing[0], finding=hunting), turned).title
 
 
 def standing(code: str) -> UnexpectedFinding:

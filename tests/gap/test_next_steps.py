@@ -56,3 +56,4 @@ def test_paths_and_shafts_ask_for_another_speed_where_the_speed_was_not_varied(b
 def test_labels_are_asked_for_where_it_is_not_settled() -> None:
     assert codes("root_crack", labelled=False) == ["label"]
     assert codes("root_crack", labelled=False, outcome=GapOutcome.EFFECT) == []
+    assert codes("unknown", labelled=False, outcome=GapOutcome.UNKNOWN) == []  # there is no likely cause to label
