@@ -803,23 +803,24 @@ def cause_place(
     """Return where a cause sits, in words; empty where it has no place or nothing is known of it.
 
     Which shaft, the recordings tell by themselves. Where they do not, a fit tells that is clearly better on one of them
-    than on the other; then, of a single tooth, that on one shaft alone a tooth stands out: in the other's average its
-    bursts are smeared. Else that is what it says.
+    than on the other; then, of a tooth's fault, that on one shaft alone a tooth stands out: in the other's average its
+    bursts are smeared. Else that is what it says. Pitch errors are of one tooth where one stands out, else of all.
     """
     frame = conditions[0].now.frame
     changes = [condition.over_floors for condition in conditions]
     options: dict[str, float | str] = {**determined_options(name, changes, frame.teeth)}
     if tried is not None and tried.match is not None and tried.is_shown:
         options["gear"] = tried.match.added.options["gear"]
+    bursts = [place for place in places if place.kind is PlaceKind.TOOTH and place.angle_deg is not None]
+    gears = {SIDES[frame.shafts.index(place.shaft)] for place in bursts}
     if options or name not in SIGNS:
-        a_tooth = {"tooth": 1.0} if name in SINGLE_TOOTH_FAULTS else {}
+        is_of_one = name in SINGLE_TOOTH_FAULTS or (name in TOOTH_FAULTS and options["gear"] in gears)
+        a_tooth = {"tooth": 1.0} if is_of_one else {}
         return place_of(Added(name, 0.0, {**options, **a_tooth}) if tried is None else tried.added, frame, places)
     if tried is not None and _is_clear(tried, conditions):
         return place_of(tried.fit.added, frame, places)
-    bursting = {place.shaft for place in places if place.kind is PlaceKind.TOOTH and place.angle_deg is not None}
-    if name in SINGLE_TOOTH_FAULTS and len(bursting) == 1:
-        gear = SIDES[frame.shafts.index(bursting.pop())]
-        return place_of(Added(name, 0.0, {"gear": gear, "tooth": 1.0}), frame, places)
+    if name in TOOTH_FAULTS and len(gears) == 1:
+        return place_of(Added(name, 0.0, {"gear": gears.pop(), "tooth": 1.0}), frame, places)
     either = " or ".join(shaft_words(frame, side) for side in range(len(SIDES)))
     return f"{either} (which cannot be told)"
 

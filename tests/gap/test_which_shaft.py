@@ -76,12 +76,15 @@ def test_signs_on_both_shafts_cannot_be_told_but_for_an_order_that_one_shaft_can
     assert determined_options("misalignment", [on_both("misalignment")], (69, 23)) == {"shaft": "driver"}
 
 
-def test_a_tooth_that_stands_out_on_one_shaft_alone_puts_a_damaged_tooth_there() -> None:
+def test_a_tooth_that_stands_out_on_one_shaft_alone_puts_a_tooths_fault_there() -> None:
     condition = SimpleNamespace(now=SimpleNamespace(frame=gear_frame(PAIR)), over_floors={})
     bursts = [GapPlace(PlaceKind.TOOTH, "", 9.0, shaft=name, angle_deg=50.0, tooth=4) for name in ("output", "input")]
     all_round = replace(bursts[1], angle_deg=None)
     assert cause_place("tooth_spall", None, [condition], bursts[:1]) == "tooth 4 of the gear on the output shaft"
     assert cause_place("tooth_spall", None, [condition], [all_round, bursts[0]]).endswith("on the output shaft")
+    told = SimpleNamespace(now=condition.now, over_floors=risen("pitch_error", "driven", 2.0))
+    assert cause_place("pitch_error", None, [told], bursts) == "tooth 4 of the gear on the output shaft"
+    assert cause_place("pitch_error", None, [told], bursts[1:]) == "the gear on the output shaft"
     for name, places in (("tooth_spall", bursts), ("eccentricity", bursts[:1]), ("tooth_spall", [all_round])):
         assert cause_place(name, None, [condition], places).endswith("(which cannot be told)")
 
