@@ -745,8 +745,7 @@ NO_SIMULATION = (
 
 def _where(report: GapReport) -> str:
     if report.outcome in (GapOutcome.NO_GAP, GapOutcome.UNDECIDED) and (report.size.value <= 1.0 or not report.places):
-        apart = f"; by itself stands out: {report.places[0].title}" if _stands_out(report) else ""
-        return f"Where: nowhere beyond the floor; the gap is {report.size.value:.2g} structural floors{apart}."
+        return f"Where: nowhere beyond the floor; the gap is {report.size.value:.2g} structural floors."
     if not report.places:
         return f"Where: spread over all orders and bands, {report.size.value:.2g} structural floors."
     first, *further_places = report.places
@@ -754,11 +753,6 @@ def _where(report: GapReport) -> str:
     if not isfinite(first.structural) and further_places and isfinite(further_places[0].share):
         second_place = f"; beside it, {_with_size(further_places[0])}"
     return f"Where: {_with_size(first)}{second_place}."
-
-
-def _stands_out(report: GapReport) -> bool:
-    """Whether the first place was found without any simulation, and is none of the gap's."""
-    return bool(report.places) and not isfinite(report.places[0].structural)
 
 
 def _with_size(place: GapPlace) -> str:
@@ -889,13 +883,9 @@ def _which_undecided(report: GapReport) -> str:
     """Name the likeliest two, and the group that is likelier than not."""
     named = {NONE: "no gap", UNKNOWN: "a gap of unknown cause"}
     most_probable = sorted(report.causes, key=lambda cause: -cause.probability)[:2]
-    first = most_probable[0]
-    if first.name == NONE and first.probability >= LIKELIER_THAN_NOT:
-        return (
-            f"Which: undecided; by the features that are compared no gap {odds_text(first.probability)}, but lines of "
-            "a bearing's race stand out by themselves."
-        )
     parts = [f"{named.get(cause.name, cause.title)} {odds_text(cause.probability)}" for cause in most_probable]
+    if report.places and most_probable[0].name == NONE and most_probable[0].probability >= LIKELIER_THAN_NOT:  # a race
+        return f"Which: undecided; {parts[0]} by the features compared, but there are {report.places[0].title}."
     kind = kind_of(report.causes, report.groups)
     if kind is not None:
         parts.append(f"effects of the group “{kind.group}” together {odds_text(kind.probability)}")
