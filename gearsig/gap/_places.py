@@ -353,8 +353,10 @@ def line_within(comparison: ComparedPair, band_hz: tuple[float, float], change_d
     order = float(orders[peak])
     levels = _residual_levels(comparison)
     rise = float((levels.now - levels.baseline)[row, min(peak, len(levels.taken) - 1)])
-    words = _order_words(comparison, order)
-    return _line(comparison, _StrongestRise(words, rise, (order,), row), 1.0)
+    place = _line(comparison, _StrongestRise(_order_words(comparison, order), rise, (order,), row), 1.0)
+    # What no average of the gears holds of the mesh, as it swells and fades, is theirs all the same.
+    is_of_the_mesh = _mesh_harmonic(comparison, order) is not None
+    return replace(place, kind=PlaceKind.BAND, band_hz=band_hz) if is_of_the_mesh else place
 
 
 def _line(comparison: ComparedPair, line: _StrongestRise, sign: float) -> GapPlace:
@@ -480,12 +482,17 @@ def _strongest(comparison: ComparedPair, levels: LineLevels, *, fundamental: boo
     return _StrongestRise(_order_words(comparison, order), change, (order,), row)
 
 
+def _mesh_harmonic(comparison: ComparedPair, order: float) -> int | None:
+    """Return the number of the mesh harmonic that lies at an order."""
+    mesh = comparison.now.frame.teeth[DRIVER]
+    k = max(round(order / mesh), 1)
+    return k if abs(order - k * mesh) <= 1.5 * comparison.now.order_step else None
+
+
 def _order_words(comparison: ComparedPair, order: float) -> str:
     """Return whose order it is by itself, without a family of multiples."""
     frame, step = comparison.now.frame, 1.5 * comparison.now.order_step
-    mesh = frame.teeth[DRIVER]
-    if abs(order - max(round(order / mesh), 1) * mesh) <= step:
-        k = max(round(order / mesh), 1)
+    if (k := _mesh_harmonic(comparison, order)) is not None:
         return f"at order {order:.4g}, {'that' if k == 1 else f'{k} times that'} of the mesh"
     for side, turns in enumerate(frame.shaft_orders):
         if abs(order - max(round(order / turns), 1) * turns) <= min(step, 0.1 * turns):

@@ -72,6 +72,13 @@ def test_only_a_race_with_lines_of_its_own_is_not_counted_against() -> None:
     assert without_silent_races(found, [striking])["bearing_outer_race"] == pytest.approx(0.1 / 0.6)
 
 
+def test_a_mesh_that_swells_and_fades_is_no_line_that_belongs_to_no_shaft() -> None:
+    places = places_of(lambda t, r: np.cos(2 * np.pi * t) * tone(2 * TEETH[0], 0.4)(t, r))
+    (left_over,) = [place for place in places if "that of the mesh" in place.title]
+    assert left_over.kind is PlaceKind.BAND
+    assert PlaceKind.LINE not in [place.kind for place in places]
+
+
 @pytest.mark.slow
 def test_another_record_of_the_same_machine_differs_nowhere() -> None:
     assert places_of() == ()
