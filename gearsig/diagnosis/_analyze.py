@@ -19,6 +19,7 @@ from gearsig.diagnosis._modulation import detect_sidebands
 from gearsig.diagnosis._overall import detect_vibration_zone
 from gearsig.diagnosis._reference import beside_reference, reference_not_healthy, reference_unfit
 from gearsig.diagnosis._resonance import detect_resonances, order_levels
+from gearsig.diagnosis._rotor import HALF_ORDERS, OIL_WHIRL, detect_between_orders
 from gearsig.diagnosis._sampling_rate import detect_sampling_rate
 from gearsig.diagnosis._signals import (
     AnalysisSignals,
@@ -190,7 +191,7 @@ def _examined(
         findings, compared = _against(findings, signals, envelopes, reference_analysis, then, healthy)
     # Doubts come last, when all that they could lower is there; the crack's depth takes no channel that they spoil.
     findings, unfit = lowered(findings, names), dead | spoiled(findings, names)
-    crack: Answer | None = withheld_crack(findings, asked=healthy is not None)
+    crack: Answer | None = withheld_crack(findings, asked=healthy is not None and bool(known.pairs))
     if not unfit.issuperset(names):
         crack = crack_depth(prepared, known, healthy, torque_nm, unfit)
     order = ranked(with_crack(findings, crack, known))
@@ -235,7 +236,12 @@ def _against(
     findings = beside_reference(findings, reference, lambda f: family_change(f, *beside))
     findings = with_clearest_band(findings, signals, then[0])
     compared = level_changes(*beside)
-    return [*findings, *change_findings(compared, signals, then[0], findings), *not_healthy], compared
+    changed = change_findings(compared, signals, then[0], findings)
+    # What the comparison names of a shaft is not named again from the recording alone.
+    again = {HALF_ORDERS: {"looseness", "rub"}, OIL_WHIRL: {OIL_WHIRL}}
+    told = {(f.code, f.where.shaft) for f in changed if f.is_claim}
+    findings = [f for f in findings if not any((code, f.where.shaft) in told for code in again.get(f.code, ()))]
+    return [*findings, *changed, *not_healthy], compared
 
 
 def _of_machine(
@@ -245,6 +251,10 @@ def _of_machine(
     if not (signals.rig.pairs or signals.rig.bearings):
         title = "No gears and no bearings are described, so that none can be examined."
         surer = "A rig file with teeth and bearings; `gearsig rig example` prints one to start from."
+        if any(signals.rig.shaft_names):  # of a rotor in plain bearings there is nothing to add
+            surer = "Rolling bearings in the rig file, where there are any."
+            if not signals.has_reference:
+                surer = "A recording of the rotor when it was healthy, given with --reference, or its rolling bearings."
         yield cannot_tell("machine-not-described", title, surer=surer)
     yield from detect_mesh(signals)
     yield from detect_tooth_damage(signals)
@@ -252,6 +262,7 @@ def _of_machine(
     yield from impacts
     trains = tuple(f.where.order for f in impacts if f.where.order is not None and f.where.band_hz is not None)
     yield from detect_sidebands(signals, trains)
+    yield from detect_between_orders(signals)
     yield from detect_lines(signals, trains)
 
 

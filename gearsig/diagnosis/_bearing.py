@@ -356,7 +356,7 @@ def _reasons_to_leave_open(
         why = "no line of a mesh or shaft stands where the speed puts it, so that bearing orders may be elsewhere"
         if (times := factor_left_open(signals)) > 1:
             why = _other_speed_text(times)
-        yield why, "A tachometer, or a sensor nearer to the gears."
+        yield why, f"A tachometer, or a sensor nearer to the {'gears' if signals.rig.pairs else 'bearings'}."
     named_here = (*families.named, *(c for c in families.trains if c.bearing is not None))
     rival = next((r for c in named_here for r in c.rivals), "")
     for seen, but in (

@@ -21,6 +21,13 @@ from gearsig.diagnosis._bearing_families import (
     slip_of,
     speed_is_only_stated,
 )
+from gearsig.diagnosis._rotor import (
+    CONFIRMS_WHIRL,
+    OIL_WHIRL,
+    WHIRL_ORDERS,
+    derivatives_of_velocity,
+    shafts_of_whirl,
+)
 from gearsig.diagnosis._signals import AnalysisSignals, BandEnvelope
 from gearsig.diagnosis._types import (
     CHANGED,
@@ -38,6 +45,7 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import counted, named, percent, signed
 from gearsig.orders import order_map
 from gearsig.prepared import envelope_bands
+from gearsig.recording import MAINS_HZ, MAINS_WANDER
 from gearsig.rig import order_lines
 
 N_SEGMENTS = 8
@@ -199,14 +207,35 @@ def _speed_off(signals: AnalysisSignals, reference: AnalysisSignals) -> float:
     return signals.frequency_per_order_hz / reference.frequency_per_order_hz - 1.0
 
 
-def _meets_other_speeds(signals: AnalysisSignals, reference: AnalysisSignals) -> bool:
-    """Whether either record has speeds at which its levels differ for that alone; a speed that wanders has none."""
-    for one, other in ((signals, reference), (reference, signals)):
-        if one.angle is not None and other.angle is not None:
-            ends = np.array(one.angle.speed_range_rpm) / other.angle.mean_speed_rpm
-            if np.abs(ends - 1.0).max() > OTHER_SPEED:
-                return True
-    return False
+SPEED_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+"""Two records that run through the same speeds have them alike; a pulse that jitters is in neither end."""
+
+
+def _speeds_apart(signals: AnalysisSignals, reference: AnalysisSignals) -> float:
+    """Return the largest relative difference between the speeds that both records run through; 0 without speeds."""
+    if signals.angle is None or reference.angle is None:
+        return 0.0
+    now, then = (np.quantile(one.angle.speed_rev_per_s, SPEED_QUANTILES) for one in (signals, reference))  # type: ignore[union-attr]
+    return float(np.abs(now / then - 1.0).max())
+
+
+LIGHTEST_DAMPING = 0.01
+"""Damping ratio of the sharpest mode of a machine on its feet: bearings, joints and the ground take more."""
+
+
+def by_speed_alone_db(apart: float) -> float:
+    r"""Return by how much another speed alone may raise a line, in dB: forces by its square, a mode by its flank.
+
+    A mode's response near its resonance goes with 1/√(x² + ζ²), x the relative distance from it. Between two speeds
+    that are δ apart it differs by (u + √(u² + 4))/2 at most, u = δ/ζ.
+
+    Parameters
+    ----------
+    apart : float
+        Relative difference of the speeds, δ.
+    """
+    u = abs(apart) / LIGHTEST_DAMPING
+    return float(40 * np.log10(1 + abs(apart)) + 20 * np.log10((u + sqrt(u**2 + 4)) / 2))
 
 
 def _in_common(a: tuple[float, float], b: tuple[float, float]) -> float:
@@ -306,8 +335,18 @@ def _lines_and_noise(signals: AnalysisSignals, reference: AnalysisSignals, block
             free = [o for o in orders if o <= highest and all(abs(o - t) > 3 * now.resolution for t in taken)]
             if free:
                 taken += free
-                levels = (_sum([side.line(o, slip) for o in free]) for side in (now, then))
+                levels = [_sum([side.line(o, slip) for o in free]) for side in (now, then)]
+                if kind in ("shaft", "subharmonic"):
+                    sides = zip((signals, reference), (now, then), levels, strict=True)
+                    levels = [_without_mains(*side, name, free[0], slip) for side in sides]
                 yield _Quantity(label, kind, where, harmonic, unit, *levels)
+        for shaft, order in shafts_of_whirl(signals).items():
+            low, high = (edge * order for edge in WHIRL_ORDERS)
+            if high - low >= 4 * now.resolution:
+                place, middle = signals.where((low + high) / 2, name, shaft=shaft), sum(WHIRL_ORDERS) / 2
+                levels = [side.line((low + high) / 2, (high - low) / (high + low)) for side in (now, then)]
+                label = f"{WHIRL_ORDERS[0]:g} to {WHIRL_ORDERS[1]:g}× {shaft}"
+                yield _Quantity(label, "subharmonic", place, middle, unit, *levels)
         n_fine = 6  # the narrowest of the bands that envelopes are taken of
         for low, high in envelope_bands(signals.recording.sampling_rate_hz)[-n_fine:]:
             hertz = signals.frequency_per_order_hz, reference.frequency_per_order_hz
@@ -317,6 +356,27 @@ def _lines_and_noise(signals: AnalysisSignals, reference: AnalysisSignals, block
             label, where = f"noise {edges}", Where((name,), band_hz=(low, high))
             levels = (s.band(low / f, high / f) for s, f in zip((now, then), hertz, strict=True))
             yield _Quantity(label, "noise", where, 0.0, unit, *levels)
+
+
+def _without_mains(
+    signals: AnalysisSignals, segments: _Segments, level: _Levels, channel: str, order: float, slip: float
+) -> _Levels:
+    """Return the level of a shaft's line, not standing out where most of it is a line of the mains beside it.
+
+    A segment is short, and its lines wide. The spectrum of the whole record tells both apart where they are two of its
+    lines from each other, or the speed varies, which spreads a shaft's line and none of the mains.
+    """
+    spectrum, hertz = signals.spectra[channel], order * signals.frequency_per_order_hz
+    reach_hz = (slip * order + 2 * segments.resolution) * signals.frequency_per_order_hz
+    own_hz = 0.0 if signals.speed_varies else 2 * spectrum.resolution
+    for mains_hz in MAINS_HZ:
+        place_hz = mains_hz * round(hertz / mains_hz)
+        if place_hz > 0 and own_hz < abs(place_hz - hertz) <= reach_hz:
+            within_hz = max(MAINS_WANDER * place_hz, spectrum.resolution / 2)
+            amplitude = spectrum.largest_near(place_hz, within_hz)[1]
+            if amplitude**2 >= float(level.power.mean()):  # its mean square is half of that
+                return replace(level, stands_out=False)
+    return level
 
 
 Family = tuple[str, str, float, Where, list[float]]
@@ -468,8 +528,12 @@ def change_findings(
         What the recording shows by itself: a bearing's part that is named there is not named again.
     """
     if not changes:
-        title = "What has changed since the reference cannot be told by order: "
-        title += "the speed of one is not known, or runs through other speeds, or it is too short."
+        why = "one of the two is too short"
+        if signals.angle is None or reference.angle is None:
+            why = "the speed of one of the two is not known"
+        elif signals.speed_varies or reference.speed_varies:
+            why = "the two run through other speeds, or one is too short"
+        title = f"What has changed since the reference cannot be told by order: {why}."
         surer = "Two recordings with known speed, alike in both, of 16 revolutions or more."
         return [cannot_tell("change-not-examined", title, surer=surer)]
     findings, rest = _gains(changes)
@@ -479,8 +543,14 @@ def change_findings(
     off = _speed_off(signals, reference)
     risen = _largest([c for c in changed if c.change_db > 0 and _matters(c, rest)])
     headline = _changed(_largest(changed), off)
-    if _meets_other_speeds(signals, reference):
-        return [*findings, replace(headline, kind=Kind.NOTICE)]
+    if (apart := _speeds_apart(signals, reference)) > OTHER_SPEED:
+        beyond_db = MIN_CHANGE_DB + by_speed_alone_db(apart)
+        told = [c for c in risen if c.change_db >= beyond_db]
+        if not told:
+            return [*findings, replace(headline, kind=Kind.NOTICE), *([_left_open(apart)] if risen else [])]
+        risen = told
+        text = f"Speeds up to {100 * apart:.1f} % apart make no more than {beyond_db - MIN_CHANGE_DB:.0f} dB of it."
+        headline = replace(headline, evidence=(*headline.evidence, text))
     claimed = {f.where.bearing for f in named if f.is_claim}
     meanings = _meanings(risen, rest, signals, claimed)
     if not meanings and risen:
@@ -489,6 +559,14 @@ def change_findings(
             more = "Damage of the bearing that is named explains it: its shocks raise the noise as well."
         headline = replace(headline, evidence=(*headline.evidence, more))
     return [*findings, headline if risen else replace(headline, kind=Kind.NOTICE), *meanings]
+
+
+def _left_open(apart: float) -> Finding:
+    title = (
+        f"What the change means cannot be told: the speeds are up to {100 * apart:.1f} % apart, and a resonance that "
+        f"one of them meets may make {by_speed_alone_db(apart):.0f} dB."
+    )
+    return cannot_tell("change-at-another-speed", title, surer="A recording at the reference's speed.")
 
 
 DEEPEST_DB = 40.0
@@ -649,6 +727,7 @@ SHAFT_CAUSES: Mapping[str, tuple[str, str]] = {
         "a rub",
         "Halves and thirds of the shaft's order come and go with speed and temperature; marks at seals.",
     ),
+    OIL_WHIRL: ("oil whirl in the plain bearings", CONFIRMS_WHIRL),
 }
 
 
@@ -660,7 +739,7 @@ def _of_shaft(
     Unbalance adds 1× alone; misalignment 2×, of half of 1× or more; a bent shaft both; looseness many harmonics and
     halves; a rub halves, thirds and noise. A force that turns with the shaft makes no 2× but through a stiffness that
     bends, and shakes little in axial direction, where a bent shaft shakes most. Without a sensor there unbalance and a
-    bent shaft are one finding, as nothing tells them apart.
+    bent shaft are one finding, as nothing tells them apart. Oil that whirls adds a line a little below half.
     """
     own = [c for c in risen if c.where.shaft == shaft and c.kind in ("shaft", "subharmonic")]
     added = {c.harmonic: _velocity(c, signals, since=True) for c in own}
@@ -675,7 +754,8 @@ def _of_shaft(
     }
     doubled = sqrt(now.get(2.0, 0.0) / max(now.get(1.0, 0.0), 1e-300))
     many = sum(k >= 3 for k in added) / N_HARMONICS
-    fractions = sum(c.kind == "subharmonic" for c in own)
+    fractions = sum(c.kind == "subharmonic" and c.harmonic in SUBHARMONICS for c in own)
+    whirl = added.get(sum(WHIRL_ORDERS) / 2, 0.0) / total
     noise = any(c.kind == "noise" for c in risen)
     loose = min(1.0, many + 0.25 * fractions)  # with many harmonics, the first two say nothing by themselves
     axial = [c for c in changes if c.where.shaft == shaft and c.harmonic == 1.0 and _is_axial(c, signals)]
@@ -687,6 +767,7 @@ def _of_shaft(
         "misalignment": min(1.0, second / 0.2) * min(1.0, doubled / 0.5) * (1.0 - loose),
         "looseness": loose,
         "rub": min(1.0, 0.2 * fractions * (1 + noise)),
+        OIL_WHIRL: min(1.0, whirl / 0.2) * (1.0 - loose),
     }
     whole = sum(weights.values()) + OTHER_CAUSES
     place = max(own, key=lambda c: added[c.harmonic]).where
@@ -725,9 +806,7 @@ def _velocity(change: LevelChange, signals: AnalysisSignals, *, since: bool = Fa
     Acceleration weighs by 1/order², displacement by order².
     """
     power = 10 ** (change.level_db / 10) - since * 10 ** (change.reference_db / 10)
-    quantity = signals.recording.channels[signals.recording.index(change.where.channels[0])].quantity
-    derivatives = {"velocity": 0, "displacement": -1, "transmission_error": -1}.get(quantity, 1)
-    return float(power * change.harmonic ** (-2 * derivatives))
+    return float(power * change.harmonic ** (-2 * derivatives_of_velocity(signals, change.where.channels[0])))
 
 
 def _of_pair(name: str, risen: Sequence[LevelChange]) -> Iterator[Finding]:

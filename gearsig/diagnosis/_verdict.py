@@ -25,7 +25,8 @@ from gearsig.diagnosis._types import (
     outcome_of,
 )
 from gearsig.formatting import percent, sentence
-from gearsig.recording import Recording
+from gearsig.prepared import magnetic_pull_near
+from gearsig.recording import ChannelProblem, Recording
 from gearsig.rig import Rig
 
 DEPTH_UNKNOWN = "crack-depth-unknown"
@@ -116,6 +117,15 @@ _TITLES = {
 }
 
 
+def _problem_title(problem: ChannelProblem) -> str:
+    """State a problem; of a line at an even multiple of the mains, that a magnetic field moves metal so as well."""
+    pull = magnetic_pull_near(problem.frequency_hz) if problem.kind == "hum" and problem.frequency_hz else None
+    if pull is not None:
+        line = f"One line, {pull[1]:g} Hz, rules channel {problem.channel}"
+        return f"{line}: the magnetic field of a motor or transformer, or mains hum."
+    return _TITLES.get(problem.kind, "Channel {} is {}.").format(problem.channel, problem.kind)
+
+
 def detect_data_problems(recording: Recording) -> tuple[list[Finding], frozenset[str]]:
     """Return findings about the data, and the names of dead channels, which are not analysed further."""
     from gearsig.recording import find_problems
@@ -125,7 +135,7 @@ def detect_data_problems(recording: Recording) -> tuple[list[Finding], frozenset
         Finding(
             f"channel-{p.kind}",
             Kind.DATA_PROBLEM,
-            _TITLES.get(p.kind, "Channel {} is {}.").format(p.channel, p.kind),
+            _problem_title(p),
             Where((p.channel,), frequency_hz=p.frequency_hz),
             confidence=0.95,
             confidence_basis="direct inspection of the samples",
@@ -282,7 +292,7 @@ def spoiled(findings: Iterable[Finding], channels: Sequence[str]) -> frozenset[s
 
 def withheld_crack(findings: Iterable[Finding], *, asked: bool) -> CannotTell | None:
     """Return why the depth of a crack is withheld where every channel is spoiled; None where nobody asked."""
-    reason = " ".join(f.title for f in findings if f.code in TRUST)
+    reason = " ".join(f.title for f in findings if f.code in TRUST).rstrip(".")  # it ends a sentence
     return CannotTell("How deep is a crack?", reason, "Correct what is doubtful, or measure again.") if asked else None
 
 

@@ -1,0 +1,206 @@
+"""Lines between the multiples of a rotor's speed: half orders of loose or rubbing parts, and whirling oil."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearsig.diagnosis._signals import AnalysisSignals, PlacedLine, line_at
+from gearsig.diagnosis._types import Finding, Kind, p_text
+from gearsig.formatting import named, percent
+from gearsig.prepared import MAINS_TOLERANCE, LinesOverFloor
+from gearsig.recording import MAINS_HZ
+
+HALF_ORDERS, OIL_WHIRL = "half-orders", "oil-whirl"
+"""Codes of the findings."""
+
+WHIRL_ORDERS = (0.38, 0.49)
+"""Of the oil in plain bearings, which turns with a little less than half the shaft's speed; exactly half is a rub's or
+a loose part's (ISO 13373-3:2015; A. Muszynska, *Rotordynamics*, 2005, ch. 4)."""
+
+CONFIRMS_WHIRL = (
+    "An orbit that is round and turns with the shaft; the line keeps its share of the speed, and changes with the "
+    "oil's temperature and the load. A belt's keeps its share as well, whatever the oil."
+)
+
+CLEAR_DB = 12.0
+"""A line that noise alone exceeds once in 10⁷."""
+
+N_HALVES, MINIMUM_HALVES = 8, 3
+"""Half orders that are looked at, from 0.5 on, and how many are a family."""
+
+OF_SOME_SIZE = 0.1
+"""Velocity of the largest such line over that of the largest multiple of the shaft, below which it is no suspicion."""
+
+UNSTEADY = 0.1
+"""Relative range of a speed from which lines pass resonances, which make peaks of their own."""
+
+
+@dataclass(frozen=True)
+class _Between:
+    """Lines between a shaft's multiples in one channel, their size beside the largest multiple, and their chance."""
+
+    channel: str
+    places: tuple[float, ...]
+    largest: PlacedLine
+    size: float
+    p_value: float
+
+
+def detect_between_orders(signals: AnalysisSignals) -> Iterator[Finding]:
+    """Yield what stands at halves of a shaft's order, or a little below one half, of machines without gears.
+
+    Sound rotors have neither. A gear train has shafts at all ratios, and a run-up's lines pass resonances.
+    """
+    angle = signals.angle
+    if signals.rig.pairs or not signals.order_excess or angle is None or not angle.is_steady(UNSTEADY):
+        return
+    for shaft, order in signals.known_shaft_orders.items():
+        seen = [_at_halves(signals, channel, order) for channel in signals.order_excess]
+        halves = max((one for one in seen if one is not None), key=lambda one: one.size, default=None)
+        if halves is not None:
+            yield _half_orders(signals, shaft, halves)
+    for shaft, order in shafts_of_whirl(signals).items():
+        whirls = [_whirl(signals, channel, order) for channel in signals.order_excess]
+        whirl = max((one for one in whirls if one is not None), key=lambda one: one.size, default=None)
+        if whirl is not None:
+            yield _oil_whirl(signals, shaft, order, whirl)
+
+
+def shafts_of_whirl(signals: AnalysisSignals) -> dict[str, float]:
+    """Return name and order of the shafts that may run in plain bearings: described ones without a rolling bearing."""
+    rolling = {bearing.shaft for bearing in signals.rig.bearings}
+    described = {} if signals.rig.pairs else signals.known_shaft_orders
+    return {name: order for name, order in described.items() if name and name not in rolling}
+
+
+def _at_halves(signals: AnalysisSignals, channel: str, order: float) -> _Between | None:
+    """Return the half orders that stand out of a channel's spectrum, if chance or a slower train do not explain them.
+
+    By chance a place meets one of the spectrum's lines with the share of the axis that lines take; so many of the
+    places do with a binomial probability. A slower train has lines at the quarters as well.
+    """
+    from scipy.stats import binom
+
+    excess = signals.order_excess[channel]
+    places = [place for k in range(N_HALVES) if _is_free(signals, excess, place := (k + 0.5) * order)]
+    lines = [(place, line) for place in places if (line := _clear(excess, place)) is not None]
+    if len(lines) < MINIMUM_HALVES:
+        return None
+    quarters = sum(_clear(excess, (k / 2 + 0.25) * order) is not None for k in range(2 * N_HALVES))
+    if quarters >= len(lines):
+        return None
+    chance = float(binom.sf(len(lines) - 1, len(places), _share_of_lines(excess, N_HALVES * order)))
+    p_value = min(1.0, chance * len(signals.order_excess) * len(signals.known_shaft_orders))
+    if p_value > signals.settings.false_alarm_probability:
+        return None
+    top_place, top = max(lines, key=lambda line: _as_velocity(signals, channel, line[0], line[1].amplitude))
+    size = _as_velocity(signals, channel, top_place, top.amplitude) / _largest_multiple(signals, channel, order)
+    return _Between(channel, tuple(place for place, _ in lines), top, size, p_value)
+
+
+def _whirl(signals: AnalysisSignals, channel: str, order: float) -> _Between | None:
+    """Return the line a little below half the order; None where its multiples stand out as well, as a belt's do."""
+    excess = signals.order_excess[channel]
+    low, high = (edge * order for edge in WHIRL_ORDERS)
+    place = excess.spectrum.largest_near((low + high) / 2, (high - low) / 2)[0]
+    line = _clear(excess, place) if low < place < high and _is_free(signals, excess, place) else None
+    if line is None or _clear(excess, 2 * line.position) is not None:
+        return None
+    size = _as_velocity(signals, channel, place, line.amplitude) / _largest_multiple(signals, channel, order)
+    return _Between(channel, (place,), line, size, 0.0)
+
+
+def _clear(excess: LinesOverFloor, place: float) -> PlacedLine | None:
+    """Return the line at a place where it stands out of noise, and is the highest about it."""
+    line = line_at(excess, place)
+    return line if line is not None and line.is_highest and line.ratio_db >= CLEAR_DB else None
+
+
+def _is_free(signals: AnalysisSignals, excess: LinesOverFloor, place: float) -> bool:
+    """Whether neither a supply nor a described rolling bearing puts a line at an order."""
+    hertz, width_hz = (x * signals.frequency_per_order_hz for x in (place, 2 * excess.spectrum.resolution))
+    supply_hz = [mains_hz * max(1, round(hertz / mains_hz)) for mains_hz in MAINS_HZ]
+    if any(abs(hertz - line_hz) <= max(MAINS_TOLERANCE * line_hz, width_hz) for line_hz in supply_hz):
+        return False
+    slip = signals.settings.bearing_slip
+    for bearing in signals.rig.bearings:
+        ratio = signals.rig.ratio(bearing.shaft)
+        for part in bearing.orders().values() if ratio else ():
+            of_part = part * (ratio or 1.0) * max(1, round(place / (part * (ratio or 1.0))))
+            if abs(place - of_part) <= slip * of_part and of_part <= 3 * part * (ratio or 1.0):
+                return False
+    return True
+
+
+def _share_of_lines(excess: LinesOverFloor, highest: float) -> float:
+    """Return the share of an axis on which a place is within 1.5 lines of a peak that stands out."""
+    n = excess.spectrum.index_of(highest)
+    values = excess.spectrum.values[: n + 2]
+    is_peak = (values[1:-1] >= values[:-2]) & (values[1:-1] > values[2:])
+    stands_out = values[1:-1] >= 10 ** (CLEAR_DB / 20) * excess.floor[1 : n + 1]
+    return min(0.5, 3.0 * float(np.sum(is_peak & stands_out)) / max(n, 1))
+
+
+def _largest_multiple(signals: AnalysisSignals, channel: str, order: float) -> float:
+    """Return the largest of a shaft's first multiples, as velocity."""
+    excess = signals.order_excess[channel]
+    lines = ((k * order, line_at(excess, k * order)) for k in range(1, N_HALVES + 1))
+    sizes = [_as_velocity(signals, channel, place, line.amplitude) for place, line in lines if line is not None]
+    return max(sizes, default=1e-300)
+
+
+def _as_velocity(signals: AnalysisSignals, channel: str, order: float, amplitude: float) -> float:
+    """Return a line's amplitude as of velocity, up to a factor that is one for all lines of a channel."""
+    return max(amplitude, 1e-300) / order ** derivatives_of_velocity(signals, channel)
+
+
+def derivatives_of_velocity(signals: AnalysisSignals, channel: str) -> int:
+    """Return how many times velocity is differentiated to what a channel measures; of unknown ones as acceleration."""
+    quantity = signals.recording.channels[signals.recording.index(channel)].quantity
+    return {"velocity": 0, "displacement": -1, "transmission_error": -1}.get(quantity, 1)
+
+
+_BASIS = "how well the textbook's signs fit, one recording alone; not calibrated"
+
+
+def _half_orders(signals: AnalysisSignals, shaft: str, halves: _Between) -> Finding:
+    count, name = len(halves.places), named("shaft", shaft) if shaft else "the shaft"
+    orders = ", ".join(f"{place:g}" for place in halves.places)
+    chance = f"chance of so many {p_text(halves.p_value)}"
+    return Finding(
+        HALF_ORDERS,
+        Kind.SUSPICION if halves.size >= OF_SOME_SIZE else Kind.NOTICE,
+        f"Perhaps looseness or a rub of {name}: lines stand at halves of its order.",
+        signals.where(halves.largest.position, halves.channel, shaft=shaft),
+        halves.largest.strength("noise floor"),
+        0.5,
+        _BASIS,
+        (
+            f"{count} of the first {N_HALVES} stand out in {halves.channel}: orders {orders}; {chance}.",
+            f"The largest has {percent(halves.size)} of the velocity of the shaft's largest multiple.",
+            "A four-stroke engine, or a shaft at exactly half the speed, would show the same.",
+        ),
+        "Bolts, feet and fits of the bearings; seals for marks; an earlier recording of the machine.",
+    )
+
+
+def _oil_whirl(signals: AnalysisSignals, shaft: str, order: float, whirl: _Between) -> Finding:
+    at = f"{whirl.largest.position / order:.3f}"
+    return Finding(
+        OIL_WHIRL,
+        Kind.SUSPICION if whirl.size >= OF_SOME_SIZE else Kind.NOTICE,
+        f"Perhaps oil whirl in the plain bearings of {named('shaft', shaft)}, or a belt: a line stands at {at} of its "
+        "order.",
+        signals.where(whirl.largest.position, whirl.channel, shaft=shaft),
+        whirl.largest.strength("noise floor"),
+        0.4,
+        _BASIS,
+        (
+            f"It has {percent(whirl.size)} of the velocity of the shaft's largest multiple.",
+            "No rolling bearing is described on that shaft; the cage of one would turn at nearly the same rate.",
+        ),
+        CONFIRMS_WHIRL,
+    )
