@@ -11,6 +11,7 @@ import numpy as np
 
 from gearsig.diagnosis._bearing_families import (
     BEARING_PARTS,
+    BESIDE_SHAFT,
     RACES,
     Candidate,
     Families,
@@ -207,7 +208,8 @@ def _unnamed_finding(signals: AnalysisSignals, candidate: Candidate) -> Finding:
         if abs(order / shaft - 1) <= 0.03
     ]
     mains = mains_beside(signals, candidate)
-    strong = candidate.modulation >= CLEAR_MODULATION and not (near and not speed_is_confirmed(signals)) and not mains
+    is_shafts = bool(_shaft_as_stated(signals, candidate)) or bool(near and not speed_is_confirmed(signals))
+    strong = candidate.modulation >= CLEAR_MODULATION and not is_shafts and not mains
     causes = ["A rolling bearing that is not in the rig file is the usual cause; other machines and belts do it too."]
     if mains:
         causes = [f"It is the rate of {mains}, or of what that supply feeds."]
@@ -224,18 +226,37 @@ def _unnamed_finding(signals: AnalysisSignals, candidate: Candidate) -> Finding:
     if (times := factor_left_open(signals)) > 1:
         causes.append(sentence(_other_speed_text(times)))
     surer = "Give the bearings in the rig file: then the part is named, or they are ruled out."
+    explained = _unexplained_by(signals.rig)
+    if shaft := _shaft_as_stated(signals, candidate):
+        explained, surer = f"may be {shaft} itself: the speed is stated and taken as constant", "A tachometer."
     return Finding(
         "non-synchronous-impacts",
         Kind.SUSPICION if strong else Kind.NOTICE,
         f"Impacts at order {order:.4f} of {where.order_shaft or 'the shaft'} ({signals.hertz_text(order)}), which "
-        f"{_unexplained_by(signals.rig)}.",
+        f"{explained}.",
         where,
         _strength(candidate),
         confidence,
         f"{_family_basis(candidate, confidence)}, all orders and bands tried; what causes it is not known",
         (f"{_family_text(candidate)}.", _modulation_text(candidate), *near, *causes),
-        "" if signals.rig.bearings else surer,
+        "" if signals.rig.bearings and not shaft else surer,
     )
+
+
+def _shaft_as_stated(signals: AnalysisSignals, candidate: Candidate) -> str:
+    """Name the multiple of a shaft that a family lies beside, where the speed is stated and held constant; or empty.
+
+    A speed that wanders spreads the shaft's lines, and those of a race that is struck nearly a whole number of times a
+    turn: with its sidebands they are a train at a rate beside the shaft's.
+    """
+    if signals.angle is None or signals.angle.method != "constant":
+        return ""
+    order = candidate.comb.fundamental
+    for name, turns in signals.known_shaft_orders.items():
+        k = round(order / turns)
+        if k >= 1 and abs(order / (k * turns) - 1) <= BESIDE_SHAFT:
+            return f"{f'{k}× ' if k > 1 else ''}{named('shaft', name) or 'the shaft'}"
+    return ""
 
 
 def _unexplained_by(rig: Rig) -> str:
@@ -366,6 +387,10 @@ def _reasons_to_leave_open(
         if seen:
             parts = ", ".join(part_text(c.name, c.bearing.name) for c in seen if c.bearing)
             yield f"lines stand at the order of the {parts}, but {but}", longer
+    for train in families.trains:
+        if shaft := _shaft_as_stated(signals, train):
+            why = f"impacts come at order {train.comb.fundamental:.4f}, which is {shaft} or a part's, and the speed is "
+            yield f"{why}stated and taken as constant", "A tachometer."
     if doubtful := doubtful_races(signals, list(envelopes)):
         races = ", ".join(dict.fromkeys(part_text(c.name, c.bearing.name) for c in doubtful if c.bearing))
         chance = f"the chance of so many is {p_text(doubtful[0].p_value)}"

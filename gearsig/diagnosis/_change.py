@@ -21,6 +21,7 @@ from gearsig.diagnosis._bearing_families import (
     slip_of,
     speed_is_only_stated,
 )
+from gearsig.diagnosis._lines import SPREAD_OF_STATED
 from gearsig.diagnosis._rotor import (
     CONFIRMS_WHIRL,
     OIL_WHIRL,
@@ -223,16 +224,11 @@ LIGHTEST_DAMPING = 0.01
 """Damping ratio of the sharpest mode of a machine on its feet: bearings, joints and the ground take more."""
 
 
-def by_speed_alone_db(apart: float) -> float:
+def _by_speed_alone_db(apart: float) -> float:
     r"""Return by how much another speed alone may raise a line, in dB: forces by its square, a mode by its flank.
 
     A mode's response near its resonance goes with 1/√(x² + ζ²), x the relative distance from it. Between two speeds
     that are δ apart it differs by (u + √(u² + 4))/2 at most, u = δ/ζ.
-
-    Parameters
-    ----------
-    apart : float
-        Relative difference of the speeds, δ.
     """
     u = abs(apart) / LIGHTEST_DAMPING
     return float(40 * np.log10(1 + abs(apart)) + 20 * np.log10((u + sqrt(u**2 + 4)) / 2))
@@ -331,20 +327,36 @@ def _lines_and_noise(signals: AnalysisSignals, reference: AnalysisSignals, block
         highest = min(now.highest_order, then.highest_order)
         slip = STATED_SPEED if speed_is_only_stated(signals) or speed_is_only_stated(reference) else 0.0
         taken: list[float] = []
+        mains_hz: set[float] = set()
         for label, kind, harmonic, where, orders in _families(signals, name, now.resolution):
             free = [o for o in orders if o <= highest and all(abs(o - t) > 3 * now.resolution for t in taken)]
             if free:
                 taken += free
                 levels = [_sum([side.line(o, slip) for o in free]) for side in (now, then)]
                 if kind in ("shaft", "subharmonic"):
-                    sides = zip((signals, reference), (now, then), levels, strict=True)
-                    levels = [_without_mains(*side, name, free[0], slip) for side in sides]
+                    sides = list(zip((signals, reference), (now, then), levels, strict=True))
+                    beside_hz = [_mains_in_line(*side, name, free[0], slip) for side in sides]
+                    mains_hz |= {hertz for hertz in beside_hz if hertz}
+                    levels = [
+                        replace(level, stands_out=level.stands_out and not hertz and _is_at(*side[:2], name, free[0]))
+                        for side, level, hertz in zip(sides, levels, beside_hz, strict=True)
+                    ]
                 yield _Quantity(label, kind, where, harmonic, unit, *levels)
+        for line_hz in sorted(mains_hz):
+            orders = [line_hz / one.frequency_per_order_hz for one in (signals, reference)]
+            if max(orders) <= highest:
+                levels = [side.line(order) for side, order in zip((now, then), orders, strict=True)]
+                where = Where((name,), frequency_hz=line_hz)
+                yield _Quantity(f"{line_hz:g} Hz of the mains", "mains", where, 0.0, unit, *levels)
         for shaft, order in shafts_of_whirl(signals).items():
             low, high = (edge * order for edge in WHIRL_ORDERS)
-            if high - low >= 4 * now.resolution:
+            if high - low >= 2 * now.resolution:
                 place, middle = signals.where((low + high) / 2, name, shaft=shaft), sum(WHIRL_ORDERS) / 2
                 levels = [side.line((low + high) / 2, (high - low) / (high + low)) for side in (now, then)]
+                levels = [
+                    replace(level, stands_out=level.stands_out and _is_at(*side, name, (low + high) / 2, high - low))
+                    for side, level in zip(((signals, now), (reference, then)), levels, strict=True)
+                ]
                 label = f"{WHIRL_ORDERS[0]:g} to {WHIRL_ORDERS[1]:g}× {shaft}"
                 yield _Quantity(label, "subharmonic", place, middle, unit, *levels)
         n_fine = 6  # the narrowest of the bands that envelopes are taken of
@@ -358,10 +370,21 @@ def _lines_and_noise(signals: AnalysisSignals, reference: AnalysisSignals, block
             yield _Quantity(label, "noise", where, 0.0, unit, *levels)
 
 
-def _without_mains(
+def _is_at(signals: AnalysisSignals, segments: _Segments, channel: str, order: float, wide: float = 0.0) -> bool:
+    """Whether the line that the wide ones of the segments show is at an order, or within a range about it.
+
+    The whole record tells what stands beside it: whirling oil beside half, a race's lines beside a multiple.
+    """
+    spectrum = signals.order_excess[channel].spectrum
+    place = spectrum.largest_near(order, max(segments.resolution, wide / 2 + spectrum.resolution))[0]
+    is_stated = signals.angle is not None and signals.angle.method == "constant"
+    return abs(place - order) <= max(2 * spectrum.resolution, wide / 2, SPREAD_OF_STATED * order * is_stated)
+
+
+def _mains_in_line(
     signals: AnalysisSignals, segments: _Segments, level: _Levels, channel: str, order: float, slip: float
-) -> _Levels:
-    """Return the level of a shaft's line, not standing out where most of it is a line of the mains beside it.
+) -> float:
+    """Return the multiple of the mains that makes most of a shaft's line, in Hz; 0 where none does.
 
     A segment is short, and its lines wide. The spectrum of the whole record tells both apart where they are two of its
     lines from each other, or the speed varies, which spreads a shaft's line and none of the mains.
@@ -375,8 +398,8 @@ def _without_mains(
             within_hz = max(MAINS_WANDER * place_hz, spectrum.resolution / 2)
             amplitude = spectrum.largest_near(place_hz, within_hz)[1]
             if amplitude**2 >= float(level.power.mean()):  # its mean square is half of that
-                return replace(level, stands_out=False)
-    return level
+                return place_hz
+    return 0.0
 
 
 Family = tuple[str, str, float, Where, list[float]]
@@ -541,10 +564,11 @@ def change_findings(
     if not changed:
         return [*findings, _unchanged(rest)] if rest else findings
     off = _speed_off(signals, reference)
-    risen = _largest([c for c in changed if c.change_db > 0 and _matters(c, rest)])
+    # Hum of a cable and a motor's field are no fault by themselves, but what has changed is said.
+    risen = _largest([c for c in changed if c.change_db > 0 and c.kind != "mains" and _matters(c, rest)])
     headline = _changed(_largest(changed), off)
     if (apart := _speeds_apart(signals, reference)) > OTHER_SPEED:
-        beyond_db = MIN_CHANGE_DB + by_speed_alone_db(apart)
+        beyond_db = MIN_CHANGE_DB + _by_speed_alone_db(apart)
         told = [c for c in risen if c.change_db >= beyond_db]
         if not told:
             return [*findings, replace(headline, kind=Kind.NOTICE), *([_left_open(apart)] if risen else [])]
@@ -564,7 +588,7 @@ def change_findings(
 def _left_open(apart: float) -> Finding:
     title = (
         f"What the change means cannot be told: the speeds are up to {100 * apart:.1f} % apart, and a resonance that "
-        f"one of them meets may make {by_speed_alone_db(apart):.0f} dB."
+        f"one of them meets may make {_by_speed_alone_db(apart):.0f} dB."
     )
     return cannot_tell("change-at-another-speed", title, surer="A recording at the reference's speed.")
 

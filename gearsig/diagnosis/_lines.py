@@ -157,6 +157,10 @@ def factor_left_open(signals: AnalysisSignals) -> int:
     return gcd(*seen) or 1
 
 
+SPREAD_OF_STATED = 0.01
+"""Relative distance to either side over which the lines of a shaft are spread where its speed is held constant: one
+that wanders by as much is called steady."""
+
 STANDING_OUT_DB, GONE_DB = 24.0, 12.0
 """By which a line stands out of a few revolutions where it can be followed, and below its usual level is gone: noise
 alone leaves 24 dB, and two lines that beat do not vanish together."""
@@ -471,6 +475,10 @@ def _unexplained(signals: AnalysisSignals, trains: Sequence[float]) -> Finding |
             wide = foot if order >= 4 * foot else 0.0  # closer lines are masked at least themselves
             # The skirt is a line's foot where the speed wanders by as little as that.
             excess = excess.without_multiples(order, half_width=wide, skirt=5e-4)  # noqa: PLW2901
+            if signals.angle is not None and signals.angle.method == "constant":
+                spread = excess.without_multiples(order, skirt=SPREAD_OF_STATED).masked
+                is_low = excess.spectrum.positions <= (N_COUNTED + 0.5) * order
+                excess = replace(excess, masked=excess.masked | (spread & is_low))  # noqa: PLW2901
         for bearing in signals.rig.bearings:
             ratio = signals.rig.ratio(bearing.shaft)
             for order in bearing.orders().values() if ratio is not None else ():

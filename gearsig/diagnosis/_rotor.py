@@ -72,8 +72,9 @@ def detect_between_orders(signals: AnalysisSignals) -> Iterator[Finding]:
 def shafts_of_whirl(signals: AnalysisSignals) -> dict[str, float]:
     """Return name and order of the shafts that may run in plain bearings: described ones without a rolling bearing."""
     rolling = {bearing.shaft for bearing in signals.rig.bearings}
-    described = {} if signals.rig.pairs else signals.known_shaft_orders
-    return {name: order for name, order in described.items() if name and name not in rolling}
+    described = () if signals.rig.pairs else signals.rig.shaft_names
+    orders = signals.known_shaft_orders
+    return {name: orders[name] for name in described if name in orders and name not in rolling}
 
 
 def _at_halves(signals: AnalysisSignals, channel: str, order: float) -> _Between | None:

@@ -241,7 +241,7 @@ class LevelChange:
     label : str
         E.g. "1× rotor", "2× mesh stage 1", "outer race of front", "noise 300 to 700 Hz".
     kind : str
-        "overall", "shaft", "subharmonic", "mesh", "sidebands", "bearing" or "noise".
+        "overall", "shaft", "subharmonic", "mains", "mesh", "sidebands", "bearing" or "noise".
     where : Where
     harmonic : float
         Of the shaft or of the mesh; 0 for the rest.

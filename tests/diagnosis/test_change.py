@@ -125,16 +125,40 @@ def test_another_gain_is_no_other_machine() -> None:
     assert "changed-since-reference" not in codes(analysis)
 
 
-def test_at_another_speed_a_change_is_told_but_means_nothing_yet() -> None:
-    analysis = beside_healthy(HEALTHY | {1.0: 0.5}, speed_rpm=1800.0)
+@pytest.mark.parametrize(
+    ("speed_rpm", "once", "means"), [(1800.0, 0.5, False), (1560.0, 0.5, False), (1560.0, 2.0, True)]
+)
+def test_at_another_speed_a_change_means_what_a_resonance_that_one_of_both_meets_does_not_make(
+    speed_rpm: float, once: float, *, means: bool
+) -> None:
+    """Of 1 % damping: 4 % of speed make 12.5 dB at most, and 0.7 dB by the square; a change is 6 dB more."""
+    analysis = beside_healthy(HEALTHY | {1.0: once}, speed_rpm=speed_rpm)
+    assert finding(analysis, "changed-since-reference").kind is (Kind.SUSPICION if means else Kind.NOTICE)
+    assert ("unbalance" in codes(analysis)) == means
+    assert ("change-at-another-speed" in codes(analysis)) == (not means)
+    assert analysis.outcome is (Outcome.SUSPICION if means else Outcome.CANNOT_TELL)
+
+
+def test_a_line_of_the_mains_beside_a_multiple_of_the_shaft_is_named_as_theirs_and_is_no_fault() -> None:
+    """2 × 1480 rpm are 49.33 Hz, and a segment tells lines apart from 1.4 Hz on; all of it told a misalignment."""
+    healthy = rotor(HEALTHY, seed=2, speed_rpm=1480.0)
+    analysis = analyze(rotor(HEALTHY | {3000 / 1480: 0.3}, seed=1, speed_rpm=1480.0), reference=healthy)
+    assert [c.label for c in analysis.level_changes if c.is_change] == ["50 Hz of the mains"]
     assert finding(analysis, "changed-since-reference").kind is Kind.NOTICE
-    assert "unbalance" not in codes(analysis)
+    assert not codes(analysis, Kind.FAULT, Kind.SUSPICION)
 
 
-def test_a_speed_that_wanders_by_a_percent_is_one_speed() -> None:
-    """What changed means as much as at a steady speed: no force grows by the square of 1.01, 6 dB."""
+def test_nobody_asks_for_a_crack_of_a_rotor_whose_channels_hum() -> None:
+    analysis = beside_healthy(HEALTHY | {3000 / 1480: 5.0}, speed_rpm=1480.0)
+    assert "channel-hum" in codes(analysis)
+    assert "crack-depth-unknown" not in codes(analysis)
+
+
+@pytest.mark.parametrize("share", [0.01, 0.1])
+def test_records_that_run_through_the_same_speeds_are_of_one_speed(share: float) -> None:
+    """What changed means as much as at a steady speed: forces that grow with its square are in both."""
     t = np.arange(int(SECONDS * SAMPLING_RATE_HZ)) / SAMPLING_RATE_HZ
-    turns = 25.0 * (t - 0.01 / np.pi * np.cos(np.pi * t))
+    turns = 25.0 * (t - share / np.pi * np.cos(np.pi * t))
     pulses = PulseTimes(np.interp(np.arange(np.ceil(turns[0]), turns[-1]), turns, t), shaft="rotor")
 
     def wandering(once: float, seed: int) -> Recording:

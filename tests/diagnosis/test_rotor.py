@@ -1,0 +1,87 @@
+"""Rotors without gears: half orders, whirling oil, and what a stated speed that wanders makes of the shaft's lines."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gearsig.diagnosis import Kind, Outcome, analyze
+from gearsig.recording import Channel, Recording
+from gearsig.rig import Bearing, ConstantSpeed, Rig, Shaft
+from tests.diagnosis.machines import codes, finding
+
+PLAIN = Rig(shafts=(Shaft("rotor"),))
+ROLLING = replace(PLAIN, bearings=(Bearing("front", "rotor", 9, 7.94, 39.04),))
+HEALTHY = {1.0: 0.1, 2.0: 0.02, 3.0: 0.01}
+HALVES = {k + 0.5: 0.03 for k in range(6)}
+TURNS_HZ = 27.7
+CLAIMS = (Kind.FAULT, Kind.SUSPICION)
+
+
+def record(
+    lines: Mapping[float, float], rig: Rig = PLAIN, *, wander: float = 0.0, impacts: float = 0.0, seed: int = 1
+) -> Recording:
+    """Return an acceleration with lines (order → amplitude), and impacts at an order, in white noise."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(int(6.0 * 2048)) / 2048.0
+    turns = TURNS_HZ * (t - wander * np.cos(2 * np.pi * 0.25 * t) / (2 * np.pi * 0.25))
+    x = 0.02 * rng.standard_normal(len(t))
+    if impacts:
+        x += 0.3 * rng.standard_normal(len(t)) * np.cos(np.pi * impacts * turns) ** 24
+    for order, amplitude in lines.items():
+        x += amplitude * np.cos(2 * np.pi * (order * turns + rng.uniform()))
+    speed = ConstantSpeed(60 * TURNS_HZ, "rotor")
+    return Recording(x[None, :], 2048.0, (Channel("a1", "acceleration", "m/s^2"),), speed, rig)
+
+
+@pytest.mark.parametrize(
+    ("lines", "rig", "claims"),
+    [
+        (HEALTHY, ROLLING, []),
+        (HEALTHY | HALVES, ROLLING, ["half-orders"]),
+        (HEALTHY | HALVES, PLAIN, ["half-orders"]),
+        (HEALTHY | {0.28 * k: 0.03 for k in range(1, 20)}, PLAIN, []),  # a belt
+        (HEALTHY | HALVES | {k / 4: 0.03 for k in range(1, 24)}, PLAIN, []),  # a shaft at a quarter of the speed
+        (HEALTHY | {0.44: 0.05}, PLAIN, ["oil-whirl"]),
+        (HEALTHY | {0.44: 0.05}, ROLLING, []),  # no oil film there; a cage's order is nearly the same
+        (HEALTHY | {0.44 * k: 0.05 / k for k in (1, 2, 3)}, PLAIN, []),  # a belt
+        (HEALTHY | {0.44: 0.05}, Rig(), []),  # a machine of which nothing is known
+    ],
+)
+def test_half_orders_and_oil_whirl_are_suspected_and_belts_are_not(
+    lines: Mapping[float, float], rig: Rig, claims: list[str]
+) -> None:
+    assert codes(analyze(record(lines, rig)), *CLAIMS) == claims
+
+
+def test_lines_of_the_mains_are_no_half_orders() -> None:
+    """Of a shaft at a third of 100 Hz, 1.5, 4.5 and 7.5 times its speed are multiples of 50 Hz."""
+    hum = record(HEALTHY | {k + 0.5: 0.03 for k in (1, 4, 7)})
+    at = 60 * 100 / 3
+    hum = replace(hum, sampling_rate_hz=2048.0 * at / (60 * TURNS_HZ), speed=ConstantSpeed(at, "rotor"))
+    assert not codes(analyze(hum), *CLAIMS)
+
+
+def test_oil_whirl_is_what_has_changed_and_is_said_once() -> None:
+    analysis = analyze(record(HEALTHY | {0.44: 0.05}), reference=record(HEALTHY, seed=2))
+    assert codes(analysis, *CLAIMS) == ["changed-since-reference", "oil-whirl"]
+    analysis = analyze(record(HEALTHY | HALVES), reference=record(HEALTHY, seed=2))
+    assert "half-orders" not in codes(analysis)
+    assert "looseness" in codes(analysis, *CLAIMS)
+
+
+def test_impacts_beside_a_multiple_of_a_speed_that_is_only_stated_are_no_strangers() -> None:
+    """An inner race that is struck 5.03 times a turn, through the load: with its sidebands, lines at 5.03/5 of it."""
+    rng, rate_hz = np.random.default_rng(1), 8192.0
+    t = np.arange(int(5.0 * rate_hz)) / rate_hz
+    turns = 50.9 * (t - 0.001 * np.cos(2 * np.pi * 0.2 * t) / (2 * np.pi * 0.2))
+    x = 0.05 * rng.standard_normal(len(t))
+    struck = np.cos(np.pi * 5.03 * turns) ** 24 * np.clip(np.cos(2 * np.pi * turns), 0.05, None)
+    x += 0.5 * rng.standard_normal(len(t)) * struck
+    x += sum(a * np.cos(2 * np.pi * k * turns + k) for k, a in ((1, 0.5), (2, 0.04), (3, 0.03), (4, 0.02), (5, 0.02)))
+    rig = replace(PLAIN, bearings=(Bearing("front", "rotor", 8, 7.145, 28.519),))
+    speed = ConstantSpeed(60 * 50.9 * 1.005, "rotor")
+    analysis = analyze(Recording(x[None, :], rate_hz, (Channel("a1", "acceleration", "m/s^2"),), speed, rig))
+    assert finding(analysis, "non-synchronous-impacts").kind is Kind.NOTICE
+    assert analysis.outcome is not Outcome.NO_FAULT
