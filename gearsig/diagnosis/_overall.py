@@ -18,6 +18,9 @@ MEANINGS = {
     "C": "not fit for long service: find the cause at the next opportunity",
     "D": "severe enough to damage the machine",
 }
+CAN_DO_THAT = "can do that."
+"""Ends the sentence of what may be behind the source of most of the vibration."""
+
 DOMINANT = 0.7
 """Share of the squared velocity from which one source makes it."""
 
@@ -93,7 +96,7 @@ def _without_zone(signals: AnalysisSignals, largest: Indicator) -> Finding:
 
 
 def _possible(source: str, causes: str) -> list[str]:
-    return [f"{causes[0].upper()}{causes[1:]} can do that."] if source else []
+    return [f"{causes[0].upper()}{causes[1:]} {CAN_DO_THAT}"] if source else []
 
 
 def _source(signals: AnalysisSignals, velocity: Indicator) -> tuple[str, str]:

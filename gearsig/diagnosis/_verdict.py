@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from gearsig.angle import ShaftAngle
 from gearsig.diagnosis._lines import MESH_ELSEWHERE, NEAR_ZERO, SPEED_UNKNOWN, SURER_BEYOND_ZERO
-from gearsig.diagnosis._overall import VIBRATION_ZONE
+from gearsig.diagnosis._overall import CAN_DO_THAT, VIBRATION_ZONE
 from gearsig.diagnosis._sampling_rate import SAMPLING_RATE
 from gearsig.diagnosis._types import (
     CHANGED,
@@ -59,7 +59,8 @@ def verdict_of(findings: tuple[Finding, ...], *, has_reference: bool = False) ->
     """
     doubt = said_first(findings, claims=outcome_of(findings) in (Outcome.FAULT, Outcome.SUSPICION))
     unfit = next((f.title for f in findings if f.code in (REFERENCE_UNFIT, REFERENCE_NOT_HEALTHY)), "")
-    zone = next((f.title for f in findings if f.code == VIBRATION_ZONE and f.kind is Kind.NOTICE), "")
+    zoned = next((f for f in findings if f.code == VIBRATION_ZONE and f.kind is Kind.NOTICE), None)
+    zone = zoned.title if zoned is not None else ""
     changed, unchanged = (next((f.title for f in findings if f.code == code), "") for code in (CHANGED, UNCHANGED))
     others = tuple(f for f in findings if f.code not in (CHANGED, UNCHANGED))
     claims = [f for f in others if f.is_claim]
@@ -68,7 +69,8 @@ def verdict_of(findings: tuple[Finding, ...], *, has_reference: bool = False) ->
         return " ".join(filter(None, (doubt, changed, zone, unfit)))
     said = _said(others, has_reference=has_reference)
     if zone and said.startswith(NO_FAULT):
-        said = f"{zone} What is wrong does not show.{said.removeprefix(NO_FAULT)}"
+        causes = [text for text in zoned.evidence if text.endswith(CAN_DO_THAT)] if zoned is not None else []
+        said = f"{zone} {next(iter(causes), 'What is wrong does not show.')}{said.removeprefix(NO_FAULT)}"
         zone = ""
     return " ".join(filter(None, (doubt, changed, said, zone, unchanged, unfit)))
 

@@ -97,3 +97,6 @@ def test_no_machine_in_zone_d_is_said_to_have_no_fault() -> None:
     analysis = analyze(motor(6.0, rig))
     assert analysis.verdict.startswith(finding(analysis, "vibration-zone").title)
     assert "No fault" not in analysis.verdict
+    assert next(text for text in finding(analysis, "vibration-zone").evidence if "unbalance" in text.lower()) in (
+        analysis.verdict
+    )
