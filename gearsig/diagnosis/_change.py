@@ -327,27 +327,16 @@ def _lines_and_noise(signals: AnalysisSignals, reference: AnalysisSignals, block
         highest = min(now.highest_order, then.highest_order)
         slip = STATED_SPEED if speed_is_only_stated(signals) or speed_is_only_stated(reference) else 0.0
         taken: list[float] = []
-        mains_hz: set[float] = set()
         for label, kind, harmonic, where, orders in _families(signals, name, now.resolution):
             free = [o for o in orders if o <= highest and all(abs(o - t) > 3 * now.resolution for t in taken)]
             if free:
                 taken += free
                 levels = [_sum([side.line(o, slip) for o in free]) for side in (now, then)]
+                quantity = _Quantity(label, kind, where, harmonic, unit, *levels)
                 if kind in ("shaft", "subharmonic"):
-                    sides = list(zip((signals, reference), (now, then), levels, strict=True))
-                    beside_hz = [_mains_in_line(*side, name, free[0], slip) for side in sides]
-                    mains_hz |= {hertz for hertz in beside_hz if hertz}
-                    levels = [
-                        replace(level, stands_out=level.stands_out and not hertz and _is_at(*side[:2], name, free[0]))
-                        for side, level, hertz in zip(sides, levels, beside_hz, strict=True)
-                    ]
-                yield _Quantity(label, kind, where, harmonic, unit, *levels)
-        for line_hz in sorted(mains_hz):
-            orders = [line_hz / one.frequency_per_order_hz for one in (signals, reference)]
-            if max(orders) <= highest:
-                levels = [side.line(order) for side, order in zip((now, then), orders, strict=True)]
-                where = Where((name,), frequency_hz=line_hz)
-                yield _Quantity(f"{line_hz:g} Hz of the mains", "mains", where, 0.0, unit, *levels)
+                    sides = ((signals, now), (reference, then))
+                    quantity = _of_shaft_alone(quantity, sides, free[0], slip, highest)
+                yield quantity
         for shaft, order in shafts_of_whirl(signals).items():
             low, high = (edge * order for edge in WHIRL_ORDERS)
             if high - low >= 2 * now.resolution:
@@ -368,6 +357,28 @@ def _lines_and_noise(signals: AnalysisSignals, reference: AnalysisSignals, block
             label, where = f"noise {edges}", Where((name,), band_hz=(low, high))
             levels = (s.band(low / f, high / f) for s, f in zip((now, then), hertz, strict=True))
             yield _Quantity(label, "noise", where, 0.0, unit, *levels)
+
+
+def _of_shaft_alone(
+    quantity: _Quantity, sides: Sequence[tuple[AnalysisSignals, _Segments]], order: float, slip: float, highest: float
+) -> _Quantity:
+    """Return a shaft's line, not standing out where it lies elsewhere; or the line of the mains that hides it.
+
+    That counts in the louder record: where it hides a weaker line, a shaft's has risen by as much and more.
+    """
+    channel, levels = quantity.where.channels[0], (quantity.now, quantity.then)
+    louder = int(levels[1].power.mean() > levels[0].power.mean())
+    mains_hz = _mains_in_line(*sides[louder], levels[louder], channel, order, slip)
+    orders = [mains_hz / signals.frequency_per_order_hz for signals, _ in sides]
+    if mains_hz > 0 and max(orders) <= highest:
+        lines = [segments.line(place) for (_, segments), place in zip(sides, orders, strict=True)]
+        where = Where((channel,), frequency_hz=mains_hz)
+        return _Quantity(f"{mains_hz:g} Hz of the mains", "mains", where, 0.0, quantity.unit, *lines)
+    now, then = (
+        replace(level, stands_out=level.stands_out and _is_at(*side, channel, order))
+        for side, level in zip(sides, levels, strict=True)
+    )
+    return replace(quantity, now=now, then=then)
 
 
 def _is_at(signals: AnalysisSignals, segments: _Segments, channel: str, order: float, wide: float = 0.0) -> bool:

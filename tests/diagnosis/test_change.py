@@ -146,6 +146,9 @@ def test_a_line_of_the_mains_beside_a_multiple_of_the_shaft_is_named_as_theirs_a
     assert [c.label for c in analysis.level_changes if c.is_change] == ["50 Hz of the mains"]
     assert finding(analysis, "changed-since-reference").kind is Kind.NOTICE
     assert not codes(analysis, Kind.FAULT, Kind.SUSPICION)
+    humming = rotor(HEALTHY | {3000 / 1480: 0.03}, seed=2, speed_rpm=1480.0)  # then the shaft's line is hidden
+    analysis = analyze(rotor(HEALTHY | {2.0: 0.3}, seed=1, speed_rpm=1480.0), reference=humming)
+    assert "misalignment" in codes(analysis, Kind.SUSPICION)
 
 
 def test_nobody_asks_for_a_crack_of_a_rotor_whose_channels_hum() -> None:
