@@ -12,6 +12,7 @@ import numpy as np
 from gearsig.diagnosis._bearing_families import (
     BEARING_PARTS,
     BESIDE_SHAFT,
+    N_MULTIPLES,
     RACES,
     Candidate,
     Families,
@@ -208,7 +209,9 @@ def _unnamed_finding(signals: AnalysisSignals, candidate: Candidate) -> Finding:
         if abs(order / shaft - 1) <= 0.03
     ]
     mains = mains_beside(signals, candidate)
-    is_shafts = bool(_shaft_as_stated(signals, candidate)) or bool(near and not speed_is_confirmed(signals))
+    multiple, shaft = _shaft_as_stated(signals, candidate)
+    # A shaft may well turn there; that it is struck every other turn is no better than an unknown part.
+    is_shafts = (multiple > 0 and multiple.is_integer()) or bool(near and not speed_is_confirmed(signals))
     strong = candidate.modulation >= CLEAR_MODULATION and not is_shafts and not mains
     causes = ["A rolling bearing that is not in the rig file is the usual cause; other machines and belts do it too."]
     if mains:
@@ -227,7 +230,9 @@ def _unnamed_finding(signals: AnalysisSignals, candidate: Candidate) -> Finding:
         causes.append(sentence(_other_speed_text(times)))
     surer = "Give the bearings in the rig file: then the part is named, or they are ruled out."
     explained = _unexplained_by(signals.rig)
-    if shaft := _shaft_as_stated(signals, candidate):
+    if shaft and not multiple.is_integer():
+        causes.append("Loose or rubbing parts strike every other turn.")
+    if shaft:
         explained, surer = f"may be {shaft} itself: the speed is stated and taken as constant", "A tachometer."
     return Finding(
         "non-synchronous-impacts",
@@ -243,20 +248,21 @@ def _unnamed_finding(signals: AnalysisSignals, candidate: Candidate) -> Finding:
     )
 
 
-def _shaft_as_stated(signals: AnalysisSignals, candidate: Candidate) -> str:
-    """Name the multiple of a shaft that a family lies beside, where the speed is stated and held constant; or empty.
+def _shaft_as_stated(signals: AnalysisSignals, candidate: Candidate) -> tuple[float, str]:
+    """Return the multiple or half of a shaft's order that a family lies beside, in numbers and in words.
 
-    A speed that wanders spreads the shaft's lines, and those of a race that is struck nearly a whole number of times a
-    turn: with its sidebands they are a train at a rate beside the shaft's.
+    Of a speed that is stated and held constant only: one that wanders spreads the shaft's lines, and those of a race
+    that is struck nearly a whole number of times a turn: with its sidebands they are a train at a rate beside the
+    shaft's. (0, "") if there is none.
     """
     if signals.angle is None or signals.angle.method != "constant":
-        return ""
+        return 0.0, ""
     order = candidate.comb.fundamental
     for name, turns in signals.known_shaft_orders.items():
-        k = round(order / turns)
-        if k >= 1 and abs(order / (k * turns) - 1) <= BESIDE_SHAFT:
-            return f"{f'{k}× ' if k > 1 else ''}{named('shaft', name) or 'the shaft'}"
-    return ""
+        k = round(2 * order / turns) / 2
+        if 0 < k <= N_MULTIPLES and abs(order / (k * turns) - 1) <= BESIDE_SHAFT:
+            return k, f"{f'{k:g}× ' if k != 1 else ''}{named('shaft', name) or 'the shaft'}"
+    return 0.0, ""
 
 
 def _unexplained_by(rig: Rig) -> str:
@@ -388,7 +394,7 @@ def _reasons_to_leave_open(
             parts = ", ".join(part_text(c.name, c.bearing.name) for c in seen if c.bearing)
             yield f"lines stand at the order of the {parts}, but {but}", longer
     for train in families.trains:
-        if shaft := _shaft_as_stated(signals, train):
+        if shaft := _shaft_as_stated(signals, train)[1]:
             why = f"impacts come at order {train.comb.fundamental:.4f}, which is {shaft} or a part's, and the speed is "
             yield f"{why}stated and taken as constant", "A tachometer."
     if doubtful := doubtful_races(signals, list(envelopes)):

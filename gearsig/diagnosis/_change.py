@@ -25,6 +25,7 @@ from gearsig.diagnosis._lines import SPREAD_OF_STATED
 from gearsig.diagnosis._rotor import (
     CONFIRMS_WHIRL,
     OIL_WHIRL,
+    UNSTEADY,
     WHIRL_ORDERS,
     derivatives_of_velocity,
     shafts_of_whirl,
@@ -126,7 +127,8 @@ def level_changes(
     B. L. Welch, "The generalization of 'Student's' problem when several different population variances are involved",
     1947. C. Alexopoulos, A. F. Seila, "Output data analysis", in *Handbook of Simulation*, 1998 (batch means).
     """
-    if (signals.speed_varies or reference.speed_varies) and abs(_speed_off(signals, reference)) > OTHER_SPEED:
+    is_run_up = any(s.angle is not None and not s.angle.is_steady(UNSTEADY) for s in (signals, reference))
+    if is_run_up and abs(_speed_off(signals, reference)) > OTHER_SPEED:
         return ()
     try:
         block_rev = _segment_rev(signals, reference)
@@ -355,7 +357,7 @@ def _lines_and_noise(signals: AnalysisSignals, reference: AnalysisSignals, block
                 continue
             edges = f"{low:.0f} to {high:.0f} Hz" if high < 1000 else f"{low / 1000:.2g} to {high / 1000:.2g} kHz"
             label, where = f"noise {edges}", Where((name,), band_hz=(low, high))
-            levels = (s.band(low / f, high / f) for s, f in zip((now, then), hertz, strict=True))
+            levels = [s.band(low / f, high / f) for s, f in zip((now, then), hertz, strict=True)]
             yield _Quantity(label, "noise", where, 0.0, unit, *levels)
 
 
@@ -565,7 +567,7 @@ def change_findings(
         why = "one of the two is too short"
         if signals.angle is None or reference.angle is None:
             why = "the speed of one of the two is not known"
-        elif signals.speed_varies or reference.speed_varies:
+        elif abs(_speed_off(signals, reference)) > OTHER_SPEED:
             why = "the two run through other speeds, or one is too short"
         title = f"What has changed since the reference cannot be told by order: {why}."
         surer = "Two recordings with known speed, alike in both, of 16 revolutions or more."
