@@ -28,7 +28,7 @@ from gearsig.diagnosis._bearing_families import (
     speed_is_only_stated,
     underlying_impulse_train,
 )
-from gearsig.diagnosis._lines import factor_left_open, speed_is_confirmed
+from gearsig.diagnosis._lines import N_COUNTED, factor_left_open, speed_is_confirmed
 from gearsig.diagnosis._signals import AnalysisSignals, BandEnvelope, KurtogramBand, without_shafts, witness_text
 from gearsig.diagnosis._types import (
     WITH_ASSUMED_DATA,
@@ -260,7 +260,8 @@ def _shaft_as_stated(signals: AnalysisSignals, candidate: Candidate) -> tuple[fl
     order = candidate.comb.fundamental
     for name, turns in signals.known_shaft_orders.items():
         k = round(2 * order / turns) / 2
-        if 0 < k <= N_MULTIPLES and abs(order / (k * turns) - 1) <= BESIDE_SHAFT:
+        reach = N_COUNTED if k.is_integer() else N_MULTIPLES  # a wheel's blades, or halves
+        if 0 < k <= reach and abs(order / (k * turns) - 1) <= BESIDE_SHAFT:
             return k, f"{f'{k:g}× ' if k != 1 else ''}{named('shaft', name) or 'the shaft'}"
     return 0.0, ""
 

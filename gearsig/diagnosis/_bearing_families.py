@@ -130,7 +130,8 @@ def _is_of_family(excess: LinesOverFloor, places: FloatArray, family: float, sid
     if sideband:
         values, last = excess.spectrum.values, len(excess.spectrum.values) - 1
         height, other_height = (values[np.clip(excess.line_numbers(x), 0, last)] for x in (places, others))
-        near = near & (other_height >= height)
+        # Nearer than the main lobe's half width they are one line, and which of the two is higher is chance.
+        near = near & ((other_height >= height) | (np.abs(others - places) < excess.spectrum.resolution))
     return near
 
 
@@ -284,6 +285,9 @@ def find_families(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Fa
 SAME_FAMILY = 5e-3
 """Relative distance of two fundamentals that are one: a bearing's slip differs from day to day."""
 
+FOUR_IN_FIVE = 0.8
+"""Of a family's lines: another may stand where one of them would be."""
+
 SECOND_DB = 12.0
 """A family so much weaker than another, in its own envelope or in the clearest one, is a by-product of it: sums and
 differences with the shaft and the cage, and the other bearing's sensor."""
@@ -310,9 +314,26 @@ def _is_sideband(signals: AnalysisSignals, candidate: Candidate, carrier: Candid
     is_stronger = carrier.name in RACES and carrier.strength_db > candidate.strength_db
     if not shaft or not (turns or is_stronger):
         return False
+    if turns and _lies_on_sidebands(candidate, carrier, shaft):
+        return True
+    if candidate.name == "BPFI" and _lies_on_sidebands(carrier, candidate, shaft):
+        return False  # and not the other way about
     distance = abs(candidate.comb.fundamental - carrier.comb.fundamental)
     n = round(distance / shaft)
     return 1 <= n <= 3 and abs(distance - n * shaft) <= 2 * candidate.envelope.excess.spectrum.resolution
+
+
+def _lies_on_sidebands(candidate: Candidate, carrier: Candidate, shaft: float) -> bool:
+    """Whether the peaks of a family are where another's multiples have up to three sidebands, four in five of them.
+
+    Of a race that is struck nearly a whole number of times a turn they lie about the multiples of many an order, but
+    not on them.
+    """
+    peaks, own = np.array(candidate.comb.positions), carrier.comb.fundamental
+    sidebands = shaft * np.arange(-3, 4)
+    numbers = np.maximum(np.rint((peaks[:, None] - sidebands) / own), 1)
+    beside = np.abs(peaks[:, None] - numbers * own - sidebands).min(axis=1)
+    return len(peaks) > 0 and float(np.mean(beside <= candidate.envelope.excess.spectrum.resolution)) >= FOUR_IN_FIVE
 
 
 def _strength_in(envelope: BandEnvelope, fundamental: float) -> float:

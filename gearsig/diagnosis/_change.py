@@ -30,7 +30,7 @@ from gearsig.diagnosis._rotor import (
     derivatives_of_velocity,
     shafts_of_whirl,
 )
-from gearsig.diagnosis._signals import AnalysisSignals, BandEnvelope
+from gearsig.diagnosis._signals import AnalysisSignals, BandEnvelope, is_of_tones, without_shafts
 from gearsig.diagnosis._types import (
     CHANGED,
     MIN_CHANGE_DB,
@@ -46,7 +46,7 @@ from gearsig.diagnosis._types import (
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import counted, named, percent, signed
 from gearsig.orders import order_map
-from gearsig.prepared import envelope_bands
+from gearsig.prepared import best_comb, envelope_bands
 from gearsig.recording import MAINS_HZ, MAINS_WANDER
 from gearsig.rig import order_lines
 
@@ -134,7 +134,7 @@ def level_changes(
         block_rev = _segment_rev(signals, reference)
         quantities = [
             *_lines_and_noise(signals, reference, block_rev),
-            *_bearing_parts(signals, envelopes, reference_envelopes, block_rev),
+            *_bearing_parts(signals, envelopes, reference, reference_envelopes, block_rev),
         ]
     except RefusalError:
         return ()
@@ -448,17 +448,18 @@ def _families(signals: AnalysisSignals, channel: str, resolution: float) -> Iter
 def _bearing_parts(
     signals: AnalysisSignals,
     envelopes: Sequence[BandEnvelope],
+    reference: AnalysisSignals,
     reference_envelopes: Sequence[BandEnvelope],
     block_rev: int,
 ) -> Iterator[_Quantity]:
     """Yield each known part's family of lines in the band of each channel's envelopes where either record has most."""
     bands = {(e.channel, e.band_hz): e for e in reference_envelopes}
     shafts, slip, parts = tuple(signals.known_shaft_orders.values()), slip_of(signals), expected_parts(signals)
-    loudest: dict[tuple[int, str], _Quantity] = {}
+    loudest: dict[tuple[int, str], tuple[_Quantity, BandEnvelope, BandEnvelope]] = {}
     for envelope in envelopes:
         other = bands.get((envelope.channel, envelope.band_hz))
         both = [_depths(e, block_rev, shafts) for e in (envelope, other) if e is not None]
-        if len(both) < 2 or None in both:
+        if other is None or None in both:
             continue
         for number, (bearing, name, order) in enumerate(parts):
             now, then = (_family(depths, order, slip) for depths in both if depths is not None)
@@ -467,10 +468,33 @@ def _bearing_parts(
             place = signals.where(order, envelope.channel, shaft=bearing.shaft, bearing=bearing.name)
             where = replace(place, band_hz=envelope.band_hz)
             quantity = _Quantity(part_text(name, bearing.name), "bearing", where, 0.0, "", now, then)
-            key = number, envelope.channel
-            loudest[key] = max(loudest.get(key, quantity), quantity, key=lambda q: q.mean_power)
+            one, key = (quantity, envelope, other), (number, envelope.channel)
+            loudest[key] = max(loudest.get(key, one), one, key=lambda found: found[0].mean_power)
     channels = list(dict.fromkeys(e.channel for e in envelopes))
-    yield from (loudest[key] for key in sorted(loudest, key=lambda key: (key[0], channels.index(key[1]))))
+    for key in sorted(loudest, key=lambda key: (key[0], channels.index(key[1]))):
+        quantity, envelope, other = loudest[key]
+        yield _without_beats(quantity, ((signals, envelope), (reference, other)), parts[key[0]][2])
+
+
+def _without_beats(
+    quantity: _Quantity, sides: Sequence[tuple[AnalysisSignals, BandEnvelope]], order: float
+) -> _Quantity:
+    """Return a part's family, not standing out where the louder record's is gone with the steady tones.
+
+    Carriers and slots of a supply that runs at another frequency beat elsewhere, and change no bearing.
+    """
+    levels = (quantity.now, quantity.then)
+    power = [float(level.power.mean()) for level in levels]
+    louder = int(power[1] > power[0])
+    if not levels[louder].stands_out or max(power) < 10 ** (MIN_CHANGE_DB / 10) * min(power):
+        return quantity  # no change is told of it
+    signals, envelope = sides[louder]
+    slip = slip_of(signals)
+    comb = best_comb(without_shafts(signals, envelope.excess), order * (1 - slip), order * (1 + slip))
+    if comb is None or not is_of_tones(signals, envelope, comb.fundamental):
+        return quantity
+    now, then = (replace(level, stands_out=False) for level in levels)
+    return replace(quantity, now=now, then=then)
 
 
 def _depths(envelope: BandEnvelope, block_rev: int, shafts: Sequence[float] = ()) -> _Segments | None:

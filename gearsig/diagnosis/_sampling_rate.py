@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from gearsig.angle import ShaftAngle, comb_elsewhere
 from gearsig.checks import FloatArray
-from gearsig.diagnosis._lines import mains_lines, speed_is_confirmed
+from gearsig.diagnosis._lines import SPREAD_OF_STATED, mains_lines, speed_is_confirmed
+from gearsig.diagnosis._rotor import derivatives_of_velocity
 from gearsig.diagnosis._signals import AnalysisSignals, BandEnvelope
 from gearsig.diagnosis._types import CannotTell, Finding, Kind
 from gearsig.formatting import unit_text
@@ -75,6 +76,9 @@ AS_GOOD = 0.6
 
 FAR_APART = 2.5
 """Ratio of factors from which the larger may stand for a slower shaft that explains a race as well."""
+
+LOWEST_OF_VELOCITY = 0.1
+"""Share of a shaft's order below which velocity is mostly the drift of the sensor."""
 
 NAMED_AS_WELL = 0.35
 """Share of the best factor's sum from which another factor is said beside the preferred one."""
@@ -457,10 +461,11 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
     explained, highest = sums[factor], ranges[factor]
     # So does one race or element, which strikes twice a spin: the stated rate asks for no mistake.
     by_one_part = min((evidence(1.0, highest, CLOSE_TOLERANCE, at=[part]) for part in ones), default=0.0)
-    if by_one_part <= AS_GOOD * explained or (
+    stands = (factor < 1 and _turns_as_stated(signals)) or (
         (factor > 1 or not races)
         and (stated < SHARE_OF_STATED * explained or evidence(1.0, highest, CLOSE_TOLERANCE, ()) <= explained)
-    ):
+    )
+    if by_one_part <= AS_GOOD * explained or stands:
         return None
     close = [f for f in candidates if abs(f / factor - 1) <= STATED_SPEED_TOLERANCE]
     factor = min(close, key=lambda f: evidence(f, highest, CLOSE_TOLERANCE))
@@ -473,6 +478,24 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
         f"{_power_text(stated)}.",
         others=others[:2],
     )
+
+
+def _turns_as_stated(signals: AnalysisSignals) -> bool:
+    """Whether a channel moves most, as velocity, at the order of a shaft as it is stated.
+
+    Were the rate too high or the speed too low by a factor, nothing would turn so slowly: blades have an unbalanced
+    wheel's line below their own.
+    """
+    for channel, excess in signals.order_excess.items():
+        orders = excess.spectrum.positions
+        beyond = orders > LOWEST_OF_VELOCITY * min(signals.known_shaft_orders.values())
+        clear = beyond & (excess.spectrum.values > excess.floor * 10 ** (CLEAR_DB / 20))
+        if clear.any():
+            per_order = orders[clear] ** float(derivatives_of_velocity(signals, channel))
+            top = float(orders[clear][np.argmax(excess.spectrum.values[clear] / per_order)])
+            if any(abs(top / turns - 1) <= SPREAD_OF_STATED for turns in signals.known_shaft_orders.values()):
+                return True
+    return False
 
 
 def _preferred(sums: dict[float, float], usual: Sequence[float], of_one_part: Callable[[float], float]) -> float:

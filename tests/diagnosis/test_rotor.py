@@ -8,7 +8,7 @@ import pytest
 
 from gearsig.diagnosis import Kind, Outcome, analyze
 from gearsig.recording import Channel, Recording
-from gearsig.rig import Bearing, ConstantSpeed, Rig, Shaft
+from gearsig.rig import Bearing, ConstantSpeed, PulseTimes, Rig, Shaft
 from tests.diagnosis.machines import codes, finding
 
 PLAIN = Rig(shafts=(Shaft("rotor"),))
@@ -71,17 +71,62 @@ def test_oil_whirl_is_what_has_changed_and_is_said_once() -> None:
     assert "looseness" in codes(analysis, *CLAIMS)
 
 
-def test_impacts_beside_a_multiple_of_a_speed_that_is_only_stated_are_no_strangers() -> None:
-    """An inner race that is struck 5.03 times a turn, through the load: with its sidebands, lines at 5.03/5 of it."""
-    rng, rate_hz = np.random.default_rng(1), 8192.0
+def inner_race(strikes: float, turns_hz: float, *, stated: bool, seed: int) -> Recording:
+    """Return a race that is struck nearly five times a turn, through the load; the speed wanders by 0.2 %."""
+    rng, rate_hz = np.random.default_rng(seed), 8192.0
     t = np.arange(int(5.0 * rate_hz)) / rate_hz
-    turns = 50.9 * (t - 0.001 * np.cos(2 * np.pi * 0.2 * t) / (2 * np.pi * 0.2))
+    turns = turns_hz * (t - 0.001 * np.cos(2 * np.pi * 0.2 * t) / (2 * np.pi * 0.2))
     x = 0.05 * rng.standard_normal(len(t))
-    struck = np.cos(np.pi * 5.03 * turns) ** 24 * np.clip(np.cos(2 * np.pi * turns), 0.05, None)
+    struck = np.cos(np.pi * strikes * turns) ** 24 * np.clip(np.cos(2 * np.pi * turns), 0.05, None)
     x += 0.5 * rng.standard_normal(len(t)) * struck
     x += sum(a * np.cos(2 * np.pi * k * turns + k) for k, a in ((1, 0.5), (2, 0.04), (3, 0.03), (4, 0.02), (5, 0.02)))
     rig = replace(PLAIN, bearings=(Bearing("front", "rotor", 8, 7.145, 28.519),))
-    speed = ConstantSpeed(60 * 50.9 * 1.005, "rotor")
-    analysis = analyze(Recording(x[None, :], rate_hz, (Channel("a1", "acceleration", "m/s^2"),), speed, rig))
+    pulses = PulseTimes(np.interp(np.arange(np.ceil(turns[0]), turns[-1]), turns, t), shaft="rotor")
+    speed = ConstantSpeed(60 * turns_hz * 1.005, "rotor") if stated else pulses
+    return Recording(x[None, :], rate_hz, (Channel("a1", "acceleration", "m/s^2"),), speed, rig)
+
+
+@pytest.mark.parametrize(("strikes", "turns_hz"), [(5.018, 28.0), (5.0245, 32.4)])
+def test_lines_that_a_race_s_sidebands_explain_as_well_are_no_other_race_and_no_stranger(
+    strikes: float, turns_hz: float
+) -> None:
+    """Its sidebands are near the multiples of a fifth of its order, and near those of the outer race's, 2.998."""
+    analysis = analyze(inner_race(strikes, turns_hz, stated=False, seed=1))
+    assert codes(analysis, *CLAIMS) == ["bearing-inner-race"]
+
+
+def test_beats_of_tones_that_a_supply_s_frequency_shifts_change_no_bearing() -> None:
+    rng, rate_hz = np.random.default_rng(4), 8192.0
+    t = np.arange(int(6.0 * rate_hz)) / rate_hz
+
+    def beating(apart_hz: float) -> Recording:
+        x = 0.02 * rng.standard_normal(len(t)) + 0.1 * np.cos(2 * np.pi * TURNS_HZ * t)
+        x += sum(0.05 * np.cos(2 * np.pi * (1500.0 + k * apart_hz) * t + k) for k in range(4))
+        speed = ConstantSpeed(60 * TURNS_HZ, "rotor")
+        return Recording(x[None, :], rate_hz, (Channel("a1", "acceleration", "m/s^2"),), speed, ROLLING)
+
+    race_hz = ROLLING.bearings[0].orders()["BPFO"] * TURNS_HZ
+    analysis = analyze(beating(race_hz), reference=beating(1.3 * race_hz))
+    assert not codes(analysis, *CLAIMS)
+
+
+def test_blades_of_an_unbalanced_wheel_are_no_wrong_speed_and_no_strangers() -> None:
+    """Eight put the strongest lines on multiples of eight; what moves most as velocity still turns once."""
+    rng, rate_hz = np.random.default_rng(1), 4096.0
+    t = np.arange(int(6.0 * rate_hz)) / rate_hz
+    turns = TURNS_HZ * (t - 0.002 * np.cos(2 * np.pi * 0.25 * t) / (2 * np.pi * 0.25))
+    x = 0.05 * rng.standard_normal(len(t)) + np.cos(2 * np.pi * turns)
+    x += sum(0.5 / k * np.cos(2 * np.pi * 8 * k * turns + k) for k in range(1, 8))
+    bearings = tuple(Bearing(name, "rotor", 8, 15.081, 65.0) for name in ("front", "rear"))
+    speed, channel = ConstantSpeed(60 * TURNS_HZ, "rotor"), Channel("a1", "acceleration", "m/s^2")
+    for rig in (replace(PLAIN, bearings=bearings), ROLLING):
+        analysis = analyze(Recording(x[None, :], rate_hz, (channel,), speed, rig))
+        assert "sampling-rate-doubtful" not in codes(analysis)
+        assert not codes(analysis, *CLAIMS)
+
+
+def test_impacts_beside_a_multiple_of_a_speed_that_is_only_stated_are_no_strangers() -> None:
+    """With its sidebands, a race that is struck 5.03 times a turn has lines at a fifth of that."""
+    analysis = analyze(inner_race(5.03, 50.9, stated=True, seed=1))
     assert finding(analysis, "non-synchronous-impacts").kind is Kind.NOTICE
     assert analysis.outcome is Outcome.CANNOT_TELL
