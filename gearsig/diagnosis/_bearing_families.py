@@ -20,6 +20,7 @@ from gearsig.diagnosis._signals import (
     is_of_tones,
     without_shafts,
 )
+from gearsig.peaks import parabola_vertex
 from gearsig.prepared import MAINS_TOLERANCE, Comb, LinesOverFloor, best_comb, comb_at
 from gearsig.rig import Bearing
 from gearsig.spectra import Spectrum
@@ -128,11 +129,19 @@ def _is_of_family(excess: LinesOverFloor, places: FloatArray, family: float, sid
     others = sideband + np.maximum(np.rint((places - sideband) / family), 0) * family
     near: NDArray[np.bool_] = np.abs(others - places) < 2 * excess.spectrum.resolution
     if sideband:
-        values, last = excess.spectrum.values, len(excess.spectrum.values) - 1
-        height, other_height = (values[np.clip(excess.line_numbers(x), 0, last)] for x in (places, others))
-        # Nearer than the main lobe's half width they are one line, and which of the two is higher is chance.
-        near = near & ((other_height >= height) | (np.abs(others - places) < excess.spectrum.resolution))
+        peaks = _peaks_at(excess.spectrum, excess.line_numbers(places))
+        near = near & (np.abs(others - peaks) <= np.abs(places - peaks))
     return near
+
+
+def _peaks_at(spectrum: Spectrum, lines: NDArray[np.int64]) -> FloatArray:
+    """Return the position of the highest peak within two lines of each, between the lines by a parabola."""
+    values, last = spectrum.values, len(spectrum.values) - 2
+    near = np.clip(lines[:, None] + np.arange(-2, 3), 1, last)
+    top = np.take_along_axis(near, values[near].argmax(axis=1)[:, None], axis=1)[:, 0]
+    logs = np.log(np.maximum(values[top[:, None] + np.arange(-1, 2)], 1e-300))
+    peaks: FloatArray = spectrum.positions[top] + parabola_vertex(*logs.T)[0] * spectrum.resolution
+    return peaks
 
 
 BEARING_PARTS = {
