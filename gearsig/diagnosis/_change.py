@@ -210,6 +210,9 @@ def _speed_off(signals: AnalysisSignals, reference: AnalysisSignals) -> float:
     return signals.frequency_per_order_hz / reference.frequency_per_order_hz - 1.0
 
 
+SPREAD_LINES = 8
+"""Of a spectrum over frequency, over which a speed that varies spreads a line."""
+
 SPEED_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 """Two records that run through the same speeds have them alike; a pulse that jitters is in neither end."""
 
@@ -400,11 +403,14 @@ def _mains_in_line(
     """Return the multiple of the mains that makes most of a shaft's line, in Hz; 0 where none does.
 
     A segment is short, and its lines wide. The spectrum of the whole record tells both apart where they are two of its
-    lines from each other, or the speed varies, which spreads a shaft's line and none of the mains.
+    lines from each other, or the speed varies so much that it spreads a shaft's line, and none of the mains.
     """
     spectrum, hertz = signals.spectra[channel], order * signals.frequency_per_order_hz
     reach_hz = (slip * order + 2 * segments.resolution) * signals.frequency_per_order_hz
-    own_hz = 0.0 if signals.speed_varies else 2 * spectrum.resolution
+    low_rpm, high_rpm = signals.angle.speed_range_rpm if signals.angle is not None else (0.0, 0.0)
+    spread_hz = order * (high_rpm - low_rpm) / 60
+    # Spread over so many lines, a shaft's leaves none of them half of the power; over fewer, it may be any of them.
+    own_hz = 0.0 if spread_hz > SPREAD_LINES * spectrum.resolution else spread_hz / 2 + 2 * spectrum.resolution
     for mains_hz in MAINS_HZ:
         place_hz = mains_hz * round(hertz / mains_hz)
         if place_hz > 0 and own_hz < abs(place_hz - hertz) <= reach_hz:

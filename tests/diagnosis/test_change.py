@@ -157,7 +157,7 @@ def test_nobody_asks_for_a_crack_of_a_rotor_whose_channels_hum() -> None:
     assert "crack-depth-unknown" not in codes(analysis)
 
 
-@pytest.mark.parametrize(("share", "faster", "once"), [(0.01, 1.0, 0.5), (0.1, 1.0, 0.5), (0.012, 1.035, 2.0)])
+@pytest.mark.parametrize(("share", "faster", "once"), [(0.0055, 1.0, 0.5), (0.1, 1.0, 0.5), (0.012, 1.035, 2.0)])
 def test_records_that_run_through_nearly_the_same_speeds_are_compared(share: float, faster: float, once: float) -> None:
     """Of alike ones what changed means as much as at a steady speed: forces that grow with its square are in both."""
     t = np.arange(int(SECONDS * SAMPLING_RATE_HZ)) / SAMPLING_RATE_HZ
@@ -170,6 +170,9 @@ def test_records_that_run_through_nearly_the_same_speeds_are_compared(share: flo
 
     analysis = analyze(wandering(once, 1), reference=wandering(0.1, 2, 25.0 * faster))
     assert "unbalance" in codes(analysis, Kind.SUSPICION)
+    if share < 0.01:  # through the mains' frequency it is the shaft's line still
+        analysis = analyze(wandering(once, 1, 50.04), reference=wandering(0.1, 2, 50.04))
+        assert "unbalance" in codes(analysis, Kind.SUSPICION)
 
 
 def test_a_smaller_level_is_told_and_no_suspicion() -> None:
