@@ -87,7 +87,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 @cache
-def _parser() -> Callable[..., object]:
+def _parser() -> Callable[..., int | None]:
     """Read all commands' options from their signatures, which takes a tenth of a second, once."""
     return typer.main.get_command(app)
 

@@ -213,7 +213,7 @@ def show_publications() -> None:
         show_words(
             {
                 "the publication says": [claim.statement for claim in item.claims],
-                "the model gives": [claim.found for claim in item.claims],
+                "the model gives": [claim.number for claim in item.claims],
                 "verdict": [claim.judgement for claim in item.claims],
             }
         )
