@@ -191,7 +191,7 @@ def _examined(
         findings, compared = _against(findings, signals, envelopes, reference_analysis, then, healthy)
     # Doubts come last, when all that they could lower is there; the crack's depth takes no channel that they spoil.
     findings, unfit = lowered(findings, names), dead | spoiled(findings, names)
-    crack: Answer | None = withheld_crack(findings, asked=healthy is not None and bool(known.pairs))
+    crack: Answer | None = withheld_crack(findings, is_asked=healthy is not None and bool(known.pairs))
     if not unfit.issuperset(names):
         crack = crack_depth(prepared, known, healthy, torque_nm, unfit)
     order = ranked(with_crack(findings, crack, known))
@@ -239,8 +239,8 @@ def _against(
     changed = change_findings(compared, signals, then[0], findings)
     # What the comparison names of a shaft is not named again from the recording alone.
     again = {HALF_ORDERS: {"looseness", "rub"}, OIL_WHIRL: {OIL_WHIRL}}
-    told = {(f.code, f.where.shaft) for f in changed if f.is_claim}
-    findings = [f for f in findings if not any((code, f.where.shaft) in told for code in again.get(f.code, ()))]
+    named = {(f.code, f.where.shaft) for f in changed if f.is_claim}
+    findings = [f for f in findings if not any((code, f.where.shaft) in named for code in again.get(f.code, ()))]
     return [*findings, *changed, *not_healthy], compared
 
 
@@ -444,11 +444,11 @@ def _check_reference(recording: Recording, reference: Recording) -> None:
     names = recording.vibration_names()
     missing = [name for name in names if name not in reference.channel_names]
     if names and len(missing) == len(names):
-        found = ", ".join(reference.channel_names)
+        names_text = ", ".join(reference.channel_names)
         raise InputError(
             f"the reference has no channel {missing[0]!r}",
             where=where,
-            allowed=f"same channels: {found}",
+            allowed=f"same channels: {names_text}",
             remedy=_columns_remedy(recording, reference),
         )
 

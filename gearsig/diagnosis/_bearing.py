@@ -79,7 +79,7 @@ def detect_bearings(
     """
     cleaned = [
         replace(envelope, excess=without_shafts(signals, envelope.excess))
-        for envelope in (*envelopes, *(own.envelope for own in kurtogram_bands))
+        for envelope in (*envelopes, *(kurtogram_band.envelope for kurtogram_band in kurtogram_bands))
     ]
     if signals.angle is None:
         return list(_over_frequency(signals, cleaned))
@@ -185,9 +185,11 @@ def _is_among_hunting_lines(signals: AnalysisSignals, candidate: Candidate) -> b
 
     Teeth that differ meet in turn, and modulate the mesh at multiples of that order: in a short record they are dense.
     """
-    width, own = 2.0 * candidate.envelope.excess.spectrum.resolution, candidate.comb.fundamental
+    width, fundamental = 2.0 * candidate.envelope.excess.spectrum.resolution, candidate.comb.fundamental
     hunting = [o for p in signals.rig.pairs if (o := hunting_tooth_order(signals.rig, p)) is not None]
-    return candidate.name == "FTF" and any(abs(own - round(own / order) * order) <= width for order in hunting)
+    return candidate.name == "FTF" and any(
+        abs(fundamental - round(fundamental / order) * order) <= width for order in hunting
+    )
 
 
 def _bearings_named(candidate: Candidate) -> str:

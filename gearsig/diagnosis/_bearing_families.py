@@ -117,10 +117,10 @@ def _is_seen_between(
     multiples = excess.free_lines_at(np.arange(1, int(reach / family) + 1) * family)
     own_db, between_db = (excess.over_floor_db(lines) for lines in (multiples, further[seen]))
     # What is seen is over 6 dB, so that lines weaker than 6 dB and the scatter have none between that are too weak.
-    telling = own_db >= SEEN_DB + AS_STRONG_DB
-    if telling.any():
-        between_db = between_db[further[seen] <= multiples[telling].max()]
-        own_db = own_db[telling]
+    is_seen = own_db >= SEEN_DB + AS_STRONG_DB
+    if is_seen.any():
+        between_db = between_db[further[seen] <= multiples[is_seen].max()]
+        own_db = own_db[is_seen]
     return len(between_db) > 0 and bool(np.median(between_db) >= np.median(own_db) - AS_STRONG_DB)
 
 
@@ -338,10 +338,10 @@ def _lies_on_sidebands(candidate: Candidate, carrier: Candidate, shaft: float) -
     Of a race that is struck nearly a whole number of times a turn they lie about the multiples of many an order, but
     not on them.
     """
-    peaks, own = np.array(candidate.comb.positions), carrier.comb.fundamental
+    peaks, fundamental = np.array(candidate.comb.positions), carrier.comb.fundamental
     sidebands = shaft * np.arange(-3, 4)
-    numbers = np.maximum(np.rint((peaks[:, None] - sidebands) / own), 1)
-    beside = np.abs(peaks[:, None] - numbers * own - sidebands).min(axis=1)
+    numbers = np.maximum(np.rint((peaks[:, None] - sidebands) / fundamental), 1)
+    beside = np.abs(peaks[:, None] - numbers * fundamental - sidebands).min(axis=1)
     return len(peaks) > 0 and float(np.mean(beside <= candidate.envelope.excess.spectrum.resolution)) >= FOUR_IN_FIVE
 
 
@@ -499,8 +499,8 @@ DOUBTFUL = 0.05
 
 def doubtful_races(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> list[Candidate]:
     """Return families at races' orders that chance hardly explains, and which were no finding all the same."""
-    found = _at_parts(signals, envelopes)
-    return [c for c in found if c.name in RACES and c.p_value <= DOUBTFUL]
+    candidates = _at_parts(signals, envelopes)
+    return [c for c in candidates if c.name in RACES and c.p_value <= DOUBTFUL]
 
 
 IN_VIBRATION, SEEN_IN_VIBRATION, WITHOUT_GAPS = 24, 6, 0.75
@@ -519,7 +519,7 @@ def races_in_vibration(signals: AnalysisSignals, envelopes: Sequence[BandEnvelop
     races = [(part_text(name, b.name), order) for b, name, order in expected_parts(signals) if name in RACES]
     multiples, slip = np.arange(1, IN_VIBRATION + 1), slip_of(signals)
     allowed = signals.settings.false_alarm_probability / max(len(races) * len(signals.order_excess), 1)
-    found = []
+    damaged_races = []
     for channel, lines in signals.order_excess.items():
         free = without_shafts(signals, lines)
         for race, order in races:
@@ -531,8 +531,8 @@ def races_in_vibration(signals: AnalysisSignals, envelopes: Sequence[BandEnvelop
             first_six = comb.fundamental * np.arange(1, N_MULTIPLES + 1)
             is_hidden = all(len(e.excess.free_lines_at(first_six)) < MINIMUM_LINES for e in envelopes)
             if is_hidden and len(comb.positions) >= WITHOUT_GAPS * len(between):
-                found.append((channel, race, comb))
-    return sorted(found, key=lambda one: one[2].p_value)
+                damaged_races.append((channel, race, comb))
+    return sorted(damaged_races, key=lambda one: one[2].p_value)
 
 
 def _chance_among_others(
@@ -548,15 +548,15 @@ def _chance_among_others(
     A race that turns through the load fills the spectrum with lines a shaft's order apart, elements that differ with
     such a cage's turn apart: they would make the family they belong to look like chance.
     """
-    own = family.comb.fundamental
+    fundamental = family.comb.fundamental
     shaft = signals.rig.ratio(bearing.shaft) or 0.0
     steps = [step for step in (shaft, shaft * bearing.orders().get("FTF", 0.0)) if step > 0]
     sides = np.array([side * k * step for step in steps for k in (1, 2, 3) for side in (-1, 1)])
-    carriers = own * np.arange(N_MULTIPLES + 1)
+    carriers = fundamental * np.arange(N_MULTIPLES + 1)
     chances = []
     for there in _families(envelopes, low, high):
         chances.append(there.p_value)
-        if there.p_value > SEEN_THERE or abs(there.comb.fundamental / own - 1) > SAME_FAMILY:
+        if there.p_value > SEEN_THERE or abs(there.comb.fundamental / fundamental - 1) > SAME_FAMILY:
             continue
         excess = there.envelope.excess
         masked = excess.masked.copy()
@@ -564,7 +564,7 @@ def _chance_among_others(
         of_family = _widened(excess, carriers[1:], 2)
         masked[of_family] = excess.masked[of_family]
         comb = best_comb(replace(excess, masked=masked), low, high)
-        if comb is not None and abs(comb.fundamental / own - 1) <= SAME_FAMILY:
+        if comb is not None and abs(comb.fundamental / fundamental - 1) <= SAME_FAMILY:
             chances[-1] = min(there.p_value, comb.p_value)
     return _chance_over(envelopes, family, chances)
 
@@ -644,7 +644,7 @@ def _with_rivals(signals: AnalysisSignals, candidate: Candidate) -> Candidate:
     shaft, of half of it or of twice the mains beside it; and of an outer race, elements that differ, where lines a
     cage's turn apart are as strong.
     """
-    own = _own_weight(signals, candidate)
+    weight = _own_weight(signals, candidate)
     parts = expected_parts(signals)
     order_of_part = next(o for b, name, o in parts if (b, name) == (candidate.bearing, candidate.name))
     near = nearest_bearing(signals, candidate.loudest or candidate.envelope.channel)
@@ -669,15 +669,17 @@ def _with_rivals(signals: AnalysisSignals, candidate: Candidate) -> Candidate:
     if candidate.name == "BPFO":
         shallow = min(1.0, (SHALLOW / max(candidate.modulation, 1e-9)) ** 2)
         differ = _elements_differ(signals, candidate)
-        others += own * max(shallow, float(differ))  # at the same order, with the same slip
+        others += weight * max(shallow, float(differ))  # at the same order, with the same slip
         if differ:
             rivals.append("a damaged element or cage, whose lines a cage's turn apart are there as strong,")
         elif shallow > 0.5:
             rivals.append("elements that differ, passing the load of a sound race,")
     if candidate.of_tones:
-        others += own * AS_BEATS
+        others += weight * AS_BEATS
         rivals.append("beats of steady tones, without which nothing shows there,")
-    return replace(candidate, rivals=tuple(rivals), of_same_order=tuple(of_same_order), share=own / (own + others))
+    return replace(
+        candidate, rivals=tuple(rivals), of_same_order=tuple(of_same_order), share=weight / (weight + others)
+    )
 
 
 AS_BEATS = 10.0
@@ -707,15 +709,15 @@ def _shaft_beside(signals: AnalysisSignals, candidate: Candidate) -> str:
     It explains the family where that holds for half of the lines that the family shows, and not for the first alone: a
     line that a wandering speed spreads is spread about each of its multiples.
     """
-    spectrum, own = candidate.envelope.excess.spectrum, candidate.comb.fundamental
-    seen = [round(position / own) for position in candidate.comb.positions]
+    spectrum, fundamental = candidate.envelope.excess.spectrum, candidate.comb.fundamental
+    seen = [round(position / fundamental) for position in candidate.comb.positions]
     for shaft, order in signals.known_shaft_orders.items():
-        k = round(own / order)
-        if k < 1 or not 0 < abs(own / (k * order) - 1) <= BESIDE_SHAFT:
+        k = round(fundamental / order)
+        if k < 1 or not 0 < abs(fundamental / (k * order) - 1) <= BESIDE_SHAFT:
             continue
         as_strong = [
-            _amplitude_beside(spectrum, m * k * order, m * own)
-            >= 0.5 * spectrum.largest_near(m * own, 2 * spectrum.resolution)[1]
+            _amplitude_beside(spectrum, m * k * order, m * fundamental)
+            >= 0.5 * spectrum.largest_near(m * fundamental, 2 * spectrum.resolution)[1]
             for m in sorted({1, *seen})
         ]
         if as_strong[0] and 2 * sum(as_strong) >= len(as_strong):
@@ -723,15 +725,15 @@ def _shaft_beside(signals: AnalysisSignals, candidate: Candidate) -> str:
     return ""
 
 
-def _amplitude_beside(spectrum: Spectrum, place: float, own: float) -> float:
+def _amplitude_beside(spectrum: Spectrum, place: float, strong: float) -> float:
     """Return the largest amplitude within two lines of a place, without the lobe of another line where it reaches in.
 
     Two places nearer to each other than two lines are one.
     """
     reach = 2 * spectrum.resolution
-    if abs(place - own) <= reach:
-        return spectrum.largest_near(own, reach)[1]
-    near = (np.abs(spectrum.positions - place) <= reach) & (np.abs(spectrum.positions - own) > 1.25 * reach)
+    if abs(place - strong) <= reach:
+        return spectrum.largest_near(strong, reach)[1]
+    near = (np.abs(spectrum.positions - place) <= reach) & (np.abs(spectrum.positions - strong) > 1.25 * reach)
     return float(spectrum.values[near].max(initial=0.0))
 
 
@@ -752,18 +754,18 @@ def parts_on_shaft(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) 
         if any(abs(j * turn / (k * shaft) - 1) < SAME_BEARING_ORDER for turn in turns for j in range(1, k)):
             continue
         multiples = np.arange(2, 3 * k + 2)
-        own = multiples % k == 0
-        between = ~own & (multiples % k != 1) & (multiples % k != k - 1)
+        is_carrier = multiples % k == 0
+        between = ~is_carrier & (multiples % k != 1) & (multiples % k != k - 1)
         for envelope in envelopes:
             spectrum = envelope.excess.spectrum
             if multiples[-1] * shaft >= spectrum.positions[-1]:
                 continue
             heights = np.array([spectrum.largest_near(m * shaft, 2 * spectrum.resolution)[1] for m in multiples])
-            over_floor_db = envelope.excess.over_floor_db(envelope.excess.line_numbers(multiples[own] * shaft))
+            over_floor_db = envelope.excess.over_floor_db(envelope.excess.line_numbers(multiples[is_carrier] * shaft))
             highest_between = heights[between].max(initial=0.0)
-            carriers = np.flatnonzero(own)
+            carriers = np.flatnonzero(is_carrier)
             beside = np.maximum(heights[np.maximum(carriers - 1, 0)], heights[carriers + 1])
-            is_alone = heights[own].min() >= 2 * highest_between and bool(np.all(heights[own] >= beside))
+            is_alone = heights[is_carrier].min() >= 2 * highest_between and bool(np.all(heights[is_carrier] >= beside))
             if over_floor_db.min() >= 12.0 and is_alone:
                 parts.setdefault((k, bearing.shaft), []).append(part_text(name, bearing.name))
                 break
@@ -776,12 +778,12 @@ def _half_beside(signals: AnalysisSignals, candidate: Candidate) -> str:
     Loose parts strike every other turn: half the shaft's order is then there, too, half as strong or stronger. A race's
     sidebands are on all halves as well if it is on one, so that no slower train is told from it.
     """
-    spectrum, own = candidate.envelope.excess.spectrum, candidate.comb.fundamental
+    spectrum, fundamental = candidate.envelope.excess.spectrum, candidate.comb.fundamental
     reach = 2 * spectrum.resolution
-    needed = 0.5 * spectrum.largest_near(own, reach)[1]
+    needed = 0.5 * spectrum.largest_near(fundamental, reach)[1]
     for shaft, order in signals.known_shaft_orders.items():
-        k = int(own / order) + 0.5
-        is_beside = abs(own / (k * order) - 1) <= BESIDE_SHAFT
+        k = int(fundamental / order) + 0.5
+        is_beside = abs(fundamental / (k * order) - 1) <= BESIDE_SHAFT
         if is_beside and all(spectrum.largest_near(half * order, reach)[1] >= needed for half in (0.5, k)):
             return f"the {k:g}-fold order of shaft {shaft or 'of reference'}, of loose parts,"
     return ""

@@ -274,13 +274,13 @@ class RecordBlocks:
             part = self.read(slice(begin, min(self.n_samples, first + BLOCK_SAMPLES + reach)))
             if isinstance(speed, TachometerChannel):
                 edges = tachometer_edges(part, speed)
-                found = edges.times_s
+                times_s = edges.times_s
                 # By the levels of the first block, where they are not given.
                 speed = replace(speed, threshold=edges.threshold, hysteresis=edges.hysteresis)
             else:
                 assert isinstance(part.speed, PulseTimes)  # noqa: S101 - said to the type checker: of the same file
-                found = part.speed.times_s
-            at = found + begin / rate
+                times_s = part.speed.times_s
+            at = times_s + begin / rate
             times.append(at[(at >= first / rate) & (at < (first + BLOCK_SAMPLES) / rate)])
         pulses = PulseTimes(np.concatenate(times), speed.pulses_per_revolution, speed.shaft)
         return find_shaft_angle(replace(self.head, speed=pulses))
@@ -335,8 +335,8 @@ class RecordBlocks:
     def _grid(self, channel: str, angle: ShaftAngle) -> int:
         """Return the samples per revolution that the first block calls for."""
         n = min(BLOCK_SAMPLES, self.n_samples)
-        own = angle.between(0.0, n / self.head.sampling_rate_hz)
-        return resample_to_angle(self.read(slice(0, n)), own, channels=(channel,)).samples_per_revolution
+        covered = angle.between(0.0, n / self.head.sampling_rate_hz)
+        return resample_to_angle(self.read(slice(0, n)), covered, channels=(channel,)).samples_per_revolution
 
     def _unit(self, channel: str) -> str:
         return self.head.channels[self.head.index(channel)].unit
@@ -414,5 +414,5 @@ def record_blocks(
 
 def _moved(angle: ShaftAngle, start_s: float, end_s: float, revolution: int) -> ShaftAngle:
     """Return the angle of a part of the record, on the part's own time, from a revolution that becomes 0."""
-    own = angle.between(start_s, end_s)
-    return replace(own, time_s=own.time_s - start_s, revolutions=own.revolutions - revolution)
+    between = angle.between(start_s, end_s)
+    return replace(between, time_s=between.time_s - start_s, revolutions=between.revolutions - revolution)

@@ -274,8 +274,8 @@ class _Segments:
     @classmethod
     def of(cls, signal: AngleSignal, channel: str, block_rev: int) -> _Segments:
         """Return those of a channel, without overlap: then the segments' noise is independent."""
-        found = order_map(signal, channel, revolutions_per_block=block_rev, overlap=0.0, scaling="power")
-        return cls(found.values, found.resolution)
+        spectra = order_map(signal, channel, revolutions_per_block=block_rev, overlap=0.0, scaling="power")
+        return cls(spectra.values, spectra.resolution)
 
     @cached_property
     def mean(self) -> FloatArray:
@@ -316,8 +316,8 @@ class _Segments:
 def _sum(levels: Sequence[_Levels]) -> _Levels:
     """Add mean squares; they stand out if the lines that do hold half of all."""
     power = np.sum([one.power for one in levels], axis=0)
-    standing = sum(float(one.power.sum()) for one in levels if one.stands_out)
-    return _Levels(power, 2 * standing >= float(power.sum()))
+    power_of_standing = sum(float(one.power.sum()) for one in levels if one.stands_out)
+    return _Levels(power, 2 * power_of_standing >= float(power.sum()))
 
 
 def _lines_and_noise(signals: AnalysisSignals, reference: AnalysisSignals, block_rev: int) -> Iterator[_Quantity]:
@@ -440,11 +440,13 @@ def _families(signals: AnalysisSignals, channel: str, resolution: float) -> Iter
                 yield f"{k}× {shaft}".strip(), "shaft", k, where, [k * order]
     for pair in rig.pairs:
         for shaft in (pair.driver, pair.driven):
-            own = [x.order for x in lines if (x.kind, x.element, x.modulating_shaft) == ("sideband", pair.name, shaft)]
+            sidebands = [
+                x.order for x in lines if (x.kind, x.element, x.modulating_shaft) == ("sideband", pair.name, shaft)
+            ]
             ratio = rig.ratio(shaft)
-            if own and ratio is not None and ratio >= closest:
+            if sidebands and ratio is not None and ratio >= closest:
                 where = replace(signals.where(ratio, channel, gear=f"{pair.name}/{shaft}"), frequency_hz=None)
-                yield f"sidebands of {pair.name} by {shaft}", "sidebands", 0.0, where, [o for o in own if o > 0]
+                yield f"sidebands of {pair.name} by {shaft}", "sidebands", 0.0, where, [o for o in sidebands if o > 0]
     fastest = max(signals.known_shaft_orders.items(), key=lambda item: item[1])
     for part in SUBHARMONICS if not rig.pairs else ():  # between the shafts of a gear train all ratios are taken
         where = signals.where(part * fastest[1], channel, shaft=fastest[0])
@@ -463,9 +465,9 @@ def _bearing_parts(
     shafts, slip, parts = tuple(signals.known_shaft_orders.values()), slip_of(signals), expected_parts(signals)
     loudest: dict[tuple[int, str], tuple[_Quantity, BandEnvelope, BandEnvelope]] = {}
     for envelope in envelopes:
-        other = bands.get((envelope.channel, envelope.band_hz))
-        both = [_depths(e, block_rev, shafts) for e in (envelope, other) if e is not None]
-        if other is None or None in both:
+        reference_envelope = bands.get((envelope.channel, envelope.band_hz))
+        both = [_depths(e, block_rev, shafts) for e in (envelope, reference_envelope) if e is not None]
+        if reference_envelope is None or None in both:
             continue
         for number, (bearing, name, order) in enumerate(parts):
             now, then = (_family(depths, order, slip) for depths in both if depths is not None)
@@ -474,12 +476,12 @@ def _bearing_parts(
             place = signals.where(order, envelope.channel, shaft=bearing.shaft, bearing=bearing.name)
             where = replace(place, band_hz=envelope.band_hz)
             quantity = _Quantity(part_text(name, bearing.name), "bearing", where, 0.0, "", now, then)
-            one, key = (quantity, envelope, other), (number, envelope.channel)
+            one, key = (quantity, envelope, reference_envelope), (number, envelope.channel)
             loudest[key] = max(loudest.get(key, one), one, key=lambda found: found[0].mean_power)
     channels = list(dict.fromkeys(e.channel for e in envelopes))
     for key in sorted(loudest, key=lambda key: (key[0], channels.index(key[1]))):
-        quantity, envelope, other = loudest[key]
-        yield _without_beats(quantity, ((signals, envelope), (reference, other)), parts[key[0]][2])
+        quantity, envelope, reference_envelope = loudest[key]
+        yield _without_beats(quantity, ((signals, envelope), (reference, reference_envelope)), parts[key[0]][2])
 
 
 def _without_beats(
@@ -612,10 +614,10 @@ def change_findings(
     headline = _changed(_largest(changed), off)
     if (apart := _speeds_apart(signals, reference)) > OTHER_SPEED:
         beyond_db = MIN_CHANGE_DB + _by_speed_alone_db(apart)
-        told = [c for c in risen if c.change_db >= beyond_db]
-        if not told:
+        beyond_speed = [c for c in risen if c.change_db >= beyond_db]
+        if not beyond_speed:
             return [*findings, replace(headline, kind=Kind.NOTICE), *([_left_open(apart)] if risen else [])]
-        risen = told
+        risen = beyond_speed
         text = f"Speeds up to {100 * apart:.1f} % apart make no more than {beyond_db - MIN_CHANGE_DB:.0f} dB of it."
         headline = replace(headline, evidence=(*headline.evidence, text))
     claimed = {f.where.bearing for f in named if f.is_claim}
@@ -664,13 +666,13 @@ def _gains(changes: Sequence[LevelChange]) -> tuple[list[Finding], list[LevelCha
     """Tell channels whose levels have all changed alike, noise included, and return the changes of the others."""
     findings, rest = [], []
     for channel in dict.fromkeys(c.where.channels[0] for c in changes):
-        own = [c for c in changes if c.where.channels[0] == channel]
-        told = [c for c in own if c.stands_out and c.kind != "bearing"]
-        shifts = np.array([c.change_db for c in told])
+        of_channel = [c for c in changes if c.where.channels[0] == channel]
+        lines = [c for c in of_channel if c.stands_out and c.kind != "bearing"]
+        shifts = np.array([c.change_db for c in lines])
         gain = float(np.median(shifts))
         spread = float(np.percentile(np.abs(shifts - gain), 90))
-        if len(told) < 4 or abs(gain) < MIN_CHANGE_DB / 2 or spread > SAME_GAIN_DB:
-            rest += own
+        if len(lines) < 4 or abs(gain) < MIN_CHANGE_DB / 2 or spread > SAME_GAIN_DB:
+            rest += of_channel
             continue
         findings.append(
             Finding(
@@ -680,7 +682,7 @@ def _gains(changes: Sequence[LevelChange]) -> tuple[list[Finding], list[LevelCha
                 "another gain, unit or sensor rather than another machine.",
                 Where((channel,)),
                 confidence=0.9,
-                confidence_basis=f"{len(told)} levels within {spread:.2g} dB of each other",
+                confidence_basis=f"{len(lines)} levels within {spread:.2g} dB of each other",
                 surer="Check sensor, range and unit of both recordings.",
             )
         )
@@ -808,8 +810,8 @@ def _of_shaft(
     bends, and shakes little in axial direction, where a bent shaft shakes most. Without a sensor there unbalance and a
     bent shaft are one finding, as nothing tells them apart. Oil that whirls adds a line a little below half.
     """
-    own = [c for c in risen if c.where.shaft == shaft and c.kind in ("shaft", "subharmonic")]
-    added = {c.harmonic: _velocity(c, signals, since=True) for c in own}
+    of_shaft = [c for c in risen if c.where.shaft == shaft and c.kind in ("shaft", "subharmonic")]
+    added = {c.harmonic: _velocity(c, signals, since=True) for c in of_shaft}
     total = sum(added.values())
     if total <= 0:
         return
@@ -817,11 +819,11 @@ def _of_shaft(
     now = {
         c.harmonic: _velocity(c, signals)
         for c in changes
-        if c.where.shaft == shaft and c.kind == "shaft" and c.where.channels == own[0].where.channels
+        if c.where.shaft == shaft and c.kind == "shaft" and c.where.channels == of_shaft[0].where.channels
     }
     doubled = sqrt(now.get(2.0, 0.0) / max(now.get(1.0, 0.0), 1e-300))
     many = sum(k >= 3 for k in added) / N_HARMONICS
-    fractions = sum(c.kind == "subharmonic" and c.harmonic in SUBHARMONICS for c in own)
+    fractions = sum(c.kind == "subharmonic" and c.harmonic in SUBHARMONICS for c in of_shaft)
     whirl = added.get(sum(WHIRL_ORDERS) / 2, 0.0) / total
     noise = any(c.kind == "noise" for c in risen)
     loose = min(1.0, many + 0.25 * fractions)  # with many harmonics, the first two say nothing by themselves
@@ -837,10 +839,10 @@ def _of_shaft(
         OIL_WHIRL: min(1.0, whirl / 0.2) * (1.0 - loose),
     }
     whole = sum(weights.values()) + OTHER_CAUSES
-    place = max(own, key=lambda c: added[c.harmonic]).where
+    place = max(of_shaft, key=lambda c: added[c.harmonic]).where
     name = f" of {place.shaft}" if place.shaft else ""
     text = "Of what has been added in velocity, " + ", ".join(
-        f"{percent(power / total)} is at {c.label}" for c in own if (power := added[c.harmonic]) >= 0.01 * total
+        f"{percent(power / total)} is at {c.label}" for c in of_shaft if (power := added[c.harmonic]) >= 0.01 * total
     )
     for causes in _told_apart(weights, are_told=bool(axial)):
         share = sum(weights[cause] for cause in causes) / whole
@@ -886,11 +888,13 @@ def _of_pair(name: str, risen: Sequence[LevelChange]) -> Iterator[Finding]:
         )
         title = f"Perhaps wear, another load, or misaligned teeth at {named('gear pair', name)}."
         yield Finding("mesh-risen", Kind.SUSPICION, title, mesh[0].where, None, 0.5, _FIT, _told(mesh), confirm)
-    for one in sides:
+    for sideband in sides:
         confirm = "The average of that shaft: one tooth or all around; run-out, keys and couplings; another load."
-        shaft = one.where.gear.partition("/")[2]
+        shaft = sideband.where.gear.partition("/")[2]
         title = f"Perhaps an eccentric, loose or damaged gear on shaft {shaft}."
-        yield Finding("sidebands-risen", Kind.SUSPICION, title, one.where, None, 0.5, _FIT, _told([one]), confirm)
+        yield Finding(
+            "sidebands-risen", Kind.SUSPICION, title, sideband.where, None, 0.5, _FIT, _told([sideband]), confirm
+        )
 
 
 def _of_bearing(change: LevelChange) -> Finding:

@@ -386,10 +386,10 @@ def _mains(signals: AnalysisSignals) -> Finding | None:
 
     Where no speed is known, a shaft may: of two poles, or one that is not driven by the mains at all.
     """
-    found = mains_lines(signals)
-    if found is None:
+    lines = mains_lines(signals)
+    if lines is None:
         return None
-    name, mains, line = found
+    name, mains, line = lines
     times = max(1, round(line.position / mains))
     title = f"Lines of the {mains:.0f} Hz mains stand in channel {name}."
     confidence, surer = 0.8, "Switch the machine off and record again: hum stays."
@@ -570,7 +570,7 @@ def combination(signals: AnalysisSignals, order: float, spectrum: Spectrum, trai
                 }
     inside = {text: place for text, place in places.items() if 0 < place < highest}
     if len(inside) * 2 * near <= BY_CHANCE * highest:
-        text = min(inside, key=lambda one: abs(inside[one] - order), default="")
+        text = min(inside, key=lambda label: abs(inside[label] - order), default="")
         if text and abs(inside[text] - order) <= near:
             return text
     return ""

@@ -147,7 +147,7 @@ class LongAnalysis:
             evidence.append(
                 f"{name}: rms {rms.min():.4g} to {rms.max():.4g} {unit} over all of it, highest at {at_s:.4g} s."
             )
-        told = Finding(
+        note = Finding(
             "part-of-long-record",
             Kind.NOTICE,
             f"The recording lasts {self.duration_s:.5g} s, longer than memory; shown are {shown.start_s:.5g} to "
@@ -157,7 +157,7 @@ class LongAnalysis:
         )
         return replace(
             shown.analysis,
-            findings=ranked([*shown.analysis.findings, told]),
+            findings=ranked([*shown.analysis.findings, note]),
             verdict=self.verdict,
             indicators=usual.analysis.indicators,
         )
@@ -216,8 +216,8 @@ def analyze_file(
     for part, reason in _chosen(record, overview, left_bytes):
         announce(reason)
         recording = record.read(part)
-        found = analyze(recording, reference=healthy, torque_nm=torque_nm)
-        parts.append(AnalysedPart(part.start / rate, part.start / rate + recording.duration_s, reason, found))
+        analysis = analyze(recording, reference=healthy, torque_nm=torque_nm)
+        parts.append(AnalysedPart(part.start / rate, part.start / rate + recording.duration_s, reason, analysis))
     return LongAnalysis(record.head.name, record.n_samples / rate, overview, tuple(parts))
 
 
@@ -340,18 +340,20 @@ def long_overview(head: Recording, n_samples: int, read: Callable[[slice], Recor
     n_spectra = 0
     spectra: tuple[Spectrum, ...] = ()
     for first, block in _blocks(head, n_samples, read, interval):
-        own = block.samples[[block.index(name) for name in names]]
-        figures += list(_figures(own[:, : _step(head, interval)], interval, last=first + own.shape[1] >= n_samples))
+        samples = block.samples[[block.index(name) for name in names]]
+        figures += list(
+            _figures(samples[:, : _step(head, interval)], interval, last=first + samples.shape[1] >= n_samples)
+        )
         # Spectra begin at multiples of half their length in the whole record, as those of the whole record do.
         skip = -first % hop
-        n_here = max(0, (min(own.shape[1], _step(head, interval) + hop) - skip - N_PER_SPECTRUM) // hop + 1)
-        if first + own.shape[1] < n_samples:
+        n_here = max(0, (min(samples.shape[1], _step(head, interval) + hop) - skip - N_PER_SPECTRUM) // hop + 1)
+        if first + samples.shape[1] < n_samples:
             n_here = len(range(first + skip, first + _step(head, interval), hop))
         if n_here:
             end = skip + (n_here - 1) * hop + N_PER_SPECTRUM
             spectra = tuple(
                 power_density(row[skip:end], head.sampling_rate_hz, n_per_block=N_PER_SPECTRUM, unit=unit, source=name)
-                for row, name, unit in zip(own, names, _units(head), strict=True)
+                for row, name, unit in zip(samples, names, _units(head), strict=True)
             )
             new = [spectrum.values * n_here for spectrum in spectra]
             sums = [a + b for a, b in zip(sums, new, strict=True)] if sums else new
@@ -414,17 +416,17 @@ def _chosen(
     level = np.log(np.maximum(overview.rms, 1e-300)).mean(axis=0)
     impulsive = overview.kurtosis.max(axis=0)
     usual = int(np.argmin(np.abs(level - np.median(level))))
-    wanted = [
+    candidates = [
         (usual, USUAL),
         (int(np.argmax(level)), "the highest level"),
         (int(np.argmax(impulsive)), f"the most impulsive second, kurtosis {impulsive.max():.3g}"),
     ]
-    found: list[tuple[int, str]] = []
-    for second, reason in wanted:
+    chosen: list[tuple[int, str]] = []
+    for second, reason in candidates:
         if reasons and reason not in reasons:
             continue
         middle = round((overview.time_s[second] + INTERVAL_S / 2) * record.head.sampling_rate_hz)
         first = min(max(0, middle - n_part // 2), max(0, record.n_samples - n_part))
-        if all(abs(first - other) >= n_part // 2 for other, _ in found):
-            found.append((first, reason))
-    return [(slice(first, first + n_part), reason) for first, reason in sorted(found)]
+        if all(abs(first - other) >= n_part // 2 for other, _ in chosen):
+            chosen.append((first, reason))
+    return [(slice(first, first + n_part), reason) for first, reason in sorted(chosen)]

@@ -138,17 +138,19 @@ def modulation_of(
 
 
 def _summed(cells: Cells, order: float, carriers: float, floor: float) -> Modulation | None:
-    power = {k: sum(sum(cell) for (_, own), cell in cells.items() if own == k) for k in range(1, MAX_TIMES + 1)}
+    power = {
+        k: sum(sum(cell) for (_, explained), cell in cells.items() if explained == k) for k in range(1, MAX_TIMES + 1)
+    }
     total = sum(power.values())
     # What a pair needs in order to count: below it, "not modulated" and "hidden" are the same.
     hidden_db = 10 * log10(max(2 * 10 ** (CLEAR_DB / 10) * floor / (carriers + total), 1e-30))
     if hidden_db >= NOTABLE_DB:
         return None
     times = _times_per_revolution(power)
-    own = {times, 2 * times}
-    if not any(min(cell) > 0 for (_, k), cell in cells.items() if k in own):
+    explained = {times, 2 * times}
+    if not any(min(cell) > 0 for (_, k), cell in cells.items() if k in explained):
         return Modulation(1, order, hidden_db)
-    level = 10 * log10(sum(power.get(k, 0.0) for k in own) / carriers)
+    level = 10 * log10(sum(power.get(k, 0.0) for k in explained) / carriers)
     return Modulation(times, times * order, max(level, hidden_db))
 
 
@@ -283,11 +285,11 @@ def _unknown_family(signals: AnalysisSignals, pair: GearPair, trains: Sequence[f
     if mesh is None:
         return
     combs = {name: _family(signals, excess, pair, trains) for name, excess in signals.order_excess.items()}
-    found = {name: comb for name, comb in combs.items() if comb is not None}
-    channel = min(found, key=lambda name: found[name].p_value, default=None)
+    found_combs = {name: comb for name, comb in combs.items() if comb is not None}
+    channel = min(found_combs, key=lambda name: found_combs[name].p_value, default=None)
     if channel is None:
         return
-    comb, excess = found[channel], signals.order_excess[channel]
+    comb, excess = found_combs[channel], signals.order_excess[channel]
     p_value = min(1.0, comb.p_value * len(combs))
     shafts = signals.known_shaft_orders.values()
     # The spacing may be a known shaft's after all: skirts of its lines, where the speed is not exactly known.
@@ -301,9 +303,9 @@ def _unknown_family(signals: AnalysisSignals, pair: GearPair, trains: Sequence[f
     surer = "Give the teeth of all gears: a shaft of that order would explain it."
     teeth = mesh / comb.fundamental
     if None in (pair.driver_teeth, pair.driven_teeth) and abs(teeth - round(teeth)) <= 0.1:
-        other = pair.driven if pair.driven_teeth is None else pair.driver
-        evidence.append(f"A gear with {round(teeth)} teeth on shaft {other} would modulate the mesh just so.")
-        surer = f"Count the teeth on shaft {other}; with them in the rig file that gear is examined as well."
+        other_shaft = pair.driven if pair.driven_teeth is None else pair.driver
+        evidence.append(f"A gear with {round(teeth)} teeth on shaft {other_shaft} would modulate the mesh just so.")
+        surer = f"Count the teeth on shaft {other_shaft}; with them in the rig file that gear is examined as well."
     if signals.angle is not None and signals.angle.method == "pulses":
         # Pulses per revolution are mistaken by factors up to 4: the marks of a coupling, of a four-hole disc.
         wrong = [n for n in (2, 3, 4) if abs(comb.fundamental - 1 / n) <= excess.spectrum.resolution]

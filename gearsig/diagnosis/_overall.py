@@ -34,13 +34,13 @@ SPEED_RANGE_RPM = (120.0, 30_000.0)
 """Of the standard."""
 
 
-def detect_vibration_zone(signals: AnalysisSignals, found: Iterable[Indicator]) -> list[Finding]:
+def detect_vibration_zone(signals: AnalysisSignals, indicators: Iterable[Indicator]) -> list[Finding]:
     """Judge the largest overall velocity by machine group and mounting, or say why the standard does not apply.
 
     Of machines whose rig file has no [machine] only what makes most of it is said.
     """
     machine = signals.rig.machine
-    velocities = [i for i in found if i.name == "overall velocity"]
+    velocities = [i for i in indicators if i.name == "overall velocity"]
     if machine is None:
         return [_without_zone(signals, max(velocities, key=lambda i: i.value))] if velocities else []
     reason = _why_not(machine, signals, velocities)

@@ -84,10 +84,10 @@ def _around(channel: str, centre: _Peak, peaks: Sequence[_Peak], levels: Sequenc
     for level in levels:
         if level is centre.level or not level.frequency_hz[0] < centre.frequency_hz < level.frequency_hz[-1]:
             continue
-        own = [p for p in peaks if p.level is level]
-        chances.append((len(own), log(level.frequency_hz[-1] / max(level.frequency_hz[0], 1e-9))))
-        if own:
-            close = min(own, key=lambda p: abs(log(p.frequency_hz / centre.frequency_hz)))
+        of_level = [p for p in peaks if p.level is level]
+        chances.append((len(of_level), log(level.frequency_hz[-1] / max(level.frequency_hz[0], 1e-9))))
+        if of_level:
+            close = min(of_level, key=lambda p: abs(log(p.frequency_hz / centre.frequency_hz)))
             nearest.append((abs(log(close.frequency_hz / centre.frequency_hz)), close))
     best: _Cluster | None = None
     for n, (distance, _) in enumerate(sorted(nearest, key=lambda pair: pair[0]), start=1):

@@ -321,15 +321,15 @@ class StrongSpectra:
 
         places, seen = self._on_shafts(speed)
         smeared = np.zeros(0)
-        found = log10(n_speeds)
+        log_p = log10(n_speeds)
         for part, sideband in parts:
             slip, n_new, seen_with_it = self._with_part((part, sideband), speed, seen)
-            found += log10(3.0)
+            log_p += log10(3.0)
             if n_new >= 2:
                 family = _family(part * slip, sideband, self.highest / speed) * speed
                 smeared = np.concatenate([smeared, family])
                 seen = seen_with_it
-                found += log10(len(SLIPS) / 3)
+                log_p += log10(len(SLIPS) / 3)
         for lines, on_place in zip(self.spectra, seen, strict=True):
             m, n = int(on_place.sum()), len(lines.orders)
             if not m:
@@ -337,8 +337,8 @@ class StrongSpectra:
             widths = np.concatenate([np.full(len(places), lines.half_width), _smeared(lines, smeared)])
             middles = np.concatenate([places, smeared])
             covered = _covered(middles - widths, middles + widths, lines.lowest, lines.highest)
-            found += log10(max(float(betainc(m, n - m + 1, covered)), 1e-30))  # the binomial sum in closed form
-        return min(0.0, found)
+            log_p += log10(max(float(betainc(m, n - m + 1, covered)), 1e-30))  # the binomial sum in closed form
+        return min(0.0, log_p)
 
 
 def _strong_of_all(spectra: Sequence[LinesOverFloor], shafts: Sequence[float], highest: float) -> StrongSpectra:

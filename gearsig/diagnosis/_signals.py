@@ -201,9 +201,9 @@ def line_at(
     spectrum = excess.spectrum
     if place > spectrum.positions[-1]:
         return None
-    found, amplitude = spectrum.largest_near(place, 1.5 * spectrum.resolution if within is None else within)
+    position, amplitude = spectrum.largest_near(place, 1.5 * spectrum.resolution if within is None else within)
     highest = spectrum.largest_near(place, 6.0 * spectrum.resolution if around is None else around)[1]
-    return replace(PlacedLine.at(excess, spectrum.index_of(found)), is_highest=amplitude >= highest)
+    return replace(PlacedLine.at(excess, spectrum.index_of(position)), is_highest=amplitude >= highest)
 
 
 def compute_signals(
@@ -511,14 +511,14 @@ def channel_analysis(
     The envelope shown is the one in which the surest family of impacts was found, else the one whose lines stand out
     most; the channel's own band is shown where it bears out a damage that is claimed of a bearing.
     """
-    own = next((band for band in kurtogram_bands if band.envelope.channel == name), None)
-    candidates = [e for e in (*envelopes, *([own.envelope] if own else [])) if e.channel == name]
+    kurtogram_band = next((band for band in kurtogram_bands if band.envelope.channel == name), None)
+    candidates = [e for e in (*envelopes, *([kurtogram_band.envelope] if kurtogram_band else [])) if e.channel == name]
     named = (e for f in findings for e in candidates if f.where.band_hz == e.band_hz and name in f.where.channels)
     clearest = max(candidates, key=lambda e: float(e.excess.scores().sum()), default=None)
     envelope = next(named, clearest)
     orders = [f.where.order for f in findings if f.where.bearing and f.is_claim and name in f.where.channels]
-    if own is not None and not any(witness(own, order) for order in orders if order is not None):
-        own = None
+    if kurtogram_band is not None and not any(witness(kurtogram_band, order) for order in orders if order is not None):
+        kurtogram_band = None
     averages = {}
     for shaft in signals.shafts:
         averages[shaft.shaft, "average"] = shaft.averages[name]
@@ -534,7 +534,7 @@ def channel_analysis(
         order_spectrum=signals.order_excess[name].spectrum if name in signals.order_excess else None,
         order_map=signals.order_maps.get(name),
         averages=averages,
-        kurtogram=own.kurtogram if own else None,
-        kurtogram_band=own.band if own else None,
+        kurtogram=kurtogram_band.kurtogram if kurtogram_band else None,
+        kurtogram_band=kurtogram_band.band if kurtogram_band else None,
         order_levels=tuple(levels),
     )

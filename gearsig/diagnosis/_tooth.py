@@ -525,8 +525,8 @@ def _damage(examined: _Examined) -> Finding:
     clear = examined.reaches(CLEAR) and not assumed and not examined.is_at_mark
     tooth = int(place.angle_rev * shaft.teeth[0]) + 1 if len(shaft.teeth) == 1 and examined.has_mark else None
     at = f"at {360 * place.angle_rev:.0f}°, tooth {tooth} of {shaft.teeth[0]}," if tooth else "at one place"
-    own = signals.rig.ratio(shaft.shaft) or 1.0
-    equal = [n for n, order in signals.known_shaft_orders.items() if abs(order / own - 1) < 1e-9 and n != shaft.shaft]
+    ratio = signals.rig.ratio(shaft.shaft) or 1.0
+    equal = [n for n, order in signals.known_shaft_orders.items() if abs(order / ratio - 1) < 1e-9 and n != shaft.shaft]
     what = "Local tooth damage" if clear else "A local event, perhaps tooth damage,"
     shares = zip(shaft.separated, place.channel_shares, strict=True)
     pairs = [pair.name for pair in signals.rig.pairs_on(shaft.shaft)]
@@ -610,8 +610,8 @@ def _nothing_shows(signals: AnalysisSignals, examined: list[_Examined]) -> list[
                 surer=_surer(signals),
             )
         )
-    findings += [_withheld(one) for one in withheld]
-    findings += [_doubtful(one) for one in doubtful]
+    findings += [_withheld(tooth) for tooth in withheld]
+    findings += [_doubtful(tooth) for tooth in doubtful]
     findings += _undecided(noisy, "noise would hide an event of half the average's size")
     return findings + _undecided(uneven, "they differ so much from each other that damage may hide among them")
 

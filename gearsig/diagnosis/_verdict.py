@@ -67,12 +67,14 @@ def verdict_of(findings: tuple[Finding, ...], *, has_reference: bool = False) ->
     # A change that no pattern explains is a suspicion by itself, and said already.
     if not claims and outcome_of(findings) is Outcome.SUSPICION:
         return " ".join(filter(None, (doubt, changed, zone, unfit)))
-    said = _said(others, has_reference=has_reference)
-    if zone and said.startswith(NO_FAULT):
+    examined_text = _said(others, has_reference=has_reference)
+    if zone and examined_text.startswith(NO_FAULT):
         causes = [text for text in zoned.evidence if text.endswith(CAN_DO_THAT)] if zoned is not None else []
-        said = f"{zone} {next(iter(causes), 'What is wrong does not show.')}{said.removeprefix(NO_FAULT)}"
+        examined_text = (
+            f"{zone} {next(iter(causes), 'What is wrong does not show.')}{examined_text.removeprefix(NO_FAULT)}"
+        )
         zone = ""
-    return " ".join(filter(None, (doubt, changed, said, zone, unchanged, unfit)))
+    return " ".join(filter(None, (doubt, changed, examined_text, zone, unchanged, unfit)))
 
 
 def _said(findings: tuple[Finding, ...], *, has_reference: bool) -> str:
@@ -85,10 +87,10 @@ def _said(findings: tuple[Finding, ...], *, has_reference: bool) -> str:
         claim += f" (at most {percent(first.confidence)} sure)" if kind is Kind.FAULT else ""
         claim += f", and {len(more)} more" if more else ""
         return " ".join([f"{kind.value.capitalize()}: {claim}.", *(f.title for f in unused)])
-    said = [f.title for f in findings if f.code in EXAMINED]
+    titles = [f.title for f in findings if f.code in EXAMINED]
     if outcome is Outcome.NO_FAULT:
         has_teeth = any(f.code == "no-tooth-local-damage" for f in findings)
-        return " ".join([NO_FAULT, *said, *([WITHOUT_REFERENCE] if has_teeth and not has_reference else [])])
+        return " ".join([NO_FAULT, *titles, *([WITHOUT_REFERENCE] if has_teeth and not has_reference else [])])
     others = [f for f in findings if f not in unused and (f.code in HINDERING or f.kind is Kind.CANNOT_TELL)]
     gaps = [*unused, *others]
     nothing = "Nothing was examined that would show a fault."
@@ -97,7 +99,7 @@ def _said(findings: tuple[Finding, ...], *, has_reference: bool) -> str:
     elif has_reference:
         nothing = "What shows, the reference shows as well."
     why = " ".join(f.title for f in gaps[:2]) or nothing
-    return " ".join(["Cannot tell.", why, *said, *_remedy(gaps)])
+    return " ".join(["Cannot tell.", why, *titles, *_remedy(gaps)])
 
 
 def _remedy(gaps: list[Finding]) -> list[str]:
@@ -194,7 +196,7 @@ def speed_doubts(angle: ShaftAngle | CannotTell, rig: Rig) -> list[Finding]:
     """Compare the speed with the rig's nominal speed and tolerance, and see whether it comes near standstill."""
     if not isinstance(angle, ShaftAngle):
         return []
-    found = []
+    doubts = []
     low, high = angle.speed_range_rpm
     nominal = rig.nominal_speed_rpm(angle.shaft if angle.shaft in rig.shaft_names else "")
     tolerance = rig.operating_point.speed_tolerance_percent / 100
@@ -203,7 +205,7 @@ def speed_doubts(angle: ShaftAngle | CannotTell, rig: Rig) -> list[Finding]:
         near = min((f for n in range(2, 11) for f in (n, 1 / n)), key=lambda f: abs(ratio / f - 1))
         pulses = f" {near:.3g} pulses per revolution would explain it." if abs(ratio / near - 1) < 0.03 else ""
         title = f"The speed, {angle.mean_speed_rpm:.5g} rpm, is {ratio:.3g} times the rig's {nominal:.5g} rpm"
-        found.append(
+        doubts.append(
             Finding(
                 OFF_NOMINAL,
                 Kind.DATA_PROBLEM,
@@ -218,8 +220,8 @@ def speed_doubts(angle: ShaftAngle | CannotTell, rig: Rig) -> list[Finding]:
     if low < NEAR_ZERO_SHARE * high:
         title = f"The speed falls to {low:.3g} rpm, near standstill: whether the shaft turns on or back is not told."
         where = Where(shaft=angle.shaft)
-        found.append(Finding(NEAR_ZERO, Kind.DATA_PROBLEM, title, where, surer=SURER_BEYOND_ZERO))
-    return found
+        doubts.append(Finding(NEAR_ZERO, Kind.DATA_PROBLEM, title, where, surer=SURER_BEYOND_ZERO))
+    return doubts
 
 
 def without_synchronous_hum(findings: Iterable[Finding], angle: ShaftAngle | CannotTell, rig: Rig) -> list[Finding]:
@@ -285,17 +287,19 @@ def _of_channels(problem: Finding) -> set[str]:
 
 def spoiled(findings: Iterable[Finding], channels: Sequence[str]) -> frozenset[str]:
     """Return the channels from which no depth of a crack is to be read."""
-    found: set[str] = set()
+    spoiled_channels: set[str] = set()
     for finding in findings:
         if finding.code in TRUST:
-            found |= _of_channels(finding) or set(channels)
-    return frozenset(found)
+            spoiled_channels |= _of_channels(finding) or set(channels)
+    return frozenset(spoiled_channels)
 
 
-def withheld_crack(findings: Iterable[Finding], *, asked: bool) -> CannotTell | None:
+def withheld_crack(findings: Iterable[Finding], *, is_asked: bool) -> CannotTell | None:
     """Return why the depth of a crack is withheld where every channel is spoiled; None where nobody asked."""
     reason = " ".join(f.title for f in findings if f.code in TRUST).rstrip(".")  # it ends a sentence
-    return CannotTell("How deep is a crack?", reason, "Correct what is doubtful, or measure again.") if asked else None
+    return (
+        CannotTell("How deep is a crack?", reason, "Correct what is doubtful, or measure again.") if is_asked else None
+    )
 
 
 def said_first(findings: Sequence[Finding], *, claims: bool) -> str:
