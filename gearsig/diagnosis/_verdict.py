@@ -32,7 +32,9 @@ from gearsig.rig import Rig
 DEPTH_UNKNOWN = "crack-depth-unknown"
 """Code of the finding that a given reference did not tell the depth of a crack."""
 
-WITHOUT_REFERENCE = "Damage of many teeth would only show against an earlier recording."
+WITHOUT_REFERENCE = "Unbalance and misalignment would only show against an earlier recording."
+TEETH_WITHOUT_REFERENCE = "Damage of many teeth, unbalance and misalignment would only show against an earlier recording."
+"""What one recording alone does not tell: their lines are those of sound machines, only higher."""
 
 NO_FAULT = "No fault shows."
 
@@ -90,7 +92,9 @@ def _said(findings: tuple[Finding, ...], *, has_reference: bool) -> str:
     titles = [f.title for f in findings if f.code in EXAMINED]
     if outcome is Outcome.NO_FAULT:
         has_teeth = any(f.code == "no-tooth-local-damage" for f in findings)
-        return " ".join([NO_FAULT, *titles, *([WITHOUT_REFERENCE] if has_teeth and not has_reference else [])])
+        alone = TEETH_WITHOUT_REFERENCE if has_teeth else WITHOUT_REFERENCE
+        turns = has_teeth or bool(titles)  # of a drive that starts and stops nothing steady was looked at
+        return " ".join([NO_FAULT, *titles, *([alone] if turns and not has_reference else [])])
     others = [f for f in findings if f not in unused and (f.code in HINDERING or f.kind is Kind.CANNOT_TELL)]
     gaps = [*unused, *others]
     nothing = "Nothing was examined that would show a fault."
