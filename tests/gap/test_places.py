@@ -58,6 +58,7 @@ def tone(order: float, amplitude: float) -> Added:
     return lambda _, r: amplitude * np.cos(2 * np.pi * order * r + 0.3)
 
 
+@pytest.mark.slow
 def test_only_a_race_with_lines_of_its_own_is_not_counted_against() -> None:
     """A tooth strikes once a turn, a ball at the race's order: both make the envelope's features of bearings rise."""
 

@@ -241,6 +241,7 @@ def test_poincare_section_scatters_with_roughness(rough_runs: dict[float, Respon
     assert spread[1] < spread[2] < spread[3]
 
 
+@pytest.mark.slow
 def test_friction_over_normal_force_surges_with_roughness(rough_runs: dict[float, Response]) -> None:
     """Σf/ΣN cannot pass the greatest coefficient, 0.031, 0.050, 0.147 at the three roughnesses; it comes to a third of
     it, since the ends of the path, where sliding is fast, are shared by two pairs that slide in opposite directions."""
