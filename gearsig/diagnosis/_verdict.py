@@ -32,9 +32,8 @@ from gearsig.rig import Rig
 DEPTH_UNKNOWN = "crack-depth-unknown"
 """Code of the finding that a given reference did not tell the depth of a crack."""
 
-WITHOUT_REFERENCE = "Unbalance and misalignment would only show against an earlier recording."
-TEETH_WITHOUT_REFERENCE = "Damage of many teeth, unbalance and misalignment would only show against an earlier recording."
-"""What one recording alone does not tell: their lines are those of sound machines, only higher."""
+NOT_ALONE = "{} and misalignment would only show against an earlier recording."
+"""What one recording alone does not tell: its lines are those of healthy machines, only higher."""
 
 NO_FAULT = "No fault shows."
 
@@ -92,9 +91,9 @@ def _said(findings: tuple[Finding, ...], *, has_reference: bool) -> str:
     titles = [f.title for f in findings if f.code in EXAMINED]
     if outcome is Outcome.NO_FAULT:
         has_teeth = any(f.code == "no-tooth-local-damage" for f in findings)
-        alone = TEETH_WITHOUT_REFERENCE if has_teeth else WITHOUT_REFERENCE
-        turns = has_teeth or bool(titles)  # of a drive that starts and stops nothing steady was looked at
-        return " ".join([NO_FAULT, *titles, *([alone] if turns and not has_reference else [])])
+        is_steady = has_teeth or bool(titles)  # a drive that starts and stops has no lines to look at
+        open_ones = NOT_ALONE.format("Damage of many teeth, unbalance" if has_teeth else "Unbalance")
+        return " ".join([NO_FAULT, *titles, *([open_ones] if is_steady and not has_reference else [])])
     others = [f for f in findings if f not in unused and (f.code in HINDERING or f.kind is Kind.CANNOT_TELL)]
     gaps = [*unused, *others]
     nothing = "Nothing was examined that would show a fault."
