@@ -48,7 +48,7 @@ def name_of(path: Path) -> str:
 
 
 def statements(tree: ast.AST) -> Iterator[ast.AST]:
-    """Yield all statements below a node, without looking into expressions, in which a tenth of the time goes."""
+    """Yield all statements below a node, without looking into expressions, which most nodes are of."""
     for field in ("body", "orelse", "finalbody", "handlers", "cases"):
         for node in getattr(tree, field, ()):
             yield node

@@ -20,8 +20,7 @@ from gearsig.diagnosis._signals import (
     is_of_tones,
     without_shafts,
 )
-from gearsig.peaks import parabola_vertex
-from gearsig.prepared import MAINS_TOLERANCE, Comb, LinesOverFloor, best_comb, comb_at
+from gearsig.prepared import MAINS_TOLERANCE, Comb, LinesOverFloor, best_comb, comb_at, peak_position
 from gearsig.rig import Bearing
 from gearsig.spectra import Spectrum
 
@@ -109,7 +108,8 @@ def _is_seen_between(
     """
     places = np.arange(1, int(reach / fundamental) + 1) * fundamental
     sidebands = [0.0, *(side * k * shaft for shaft in shafts for k in (1, 2, 3) for side in (-1, 1))]
-    explained = np.any([_is_of_family(excess, places, family, sideband) for sideband in sidebands], axis=0)
+    peaks, resolution = _peaks_at(excess.spectrum, excess.line_numbers(places)), excess.spectrum.resolution
+    explained = np.any([_is_of_family(places, peaks, resolution, family, sideband) for sideband in sidebands], axis=0)
     further = excess.free_lines_at(places[~explained])
     seen = excess.log_ratio[further] >= SEEN_DB * np.log(10) / 10
     if len(further) < 3 or float(np.mean(seen)) < 0.5:
@@ -124,12 +124,13 @@ def _is_seen_between(
     return len(between_db) > 0 and bool(np.median(between_db) >= np.median(own_db) - AS_STRONG_DB)
 
 
-def _is_of_family(excess: LinesOverFloor, places: FloatArray, family: float, sideband: float) -> NDArray[np.bool_]:
+def _is_of_family(
+    places: FloatArray, peaks: FloatArray, resolution: float, family: float, sideband: float
+) -> NDArray[np.bool_]:
     """Whether a multiple of the family, shifted by `sideband`, is near and meets the peak at least as well."""
     others = sideband + np.maximum(np.rint((places - sideband) / family), 0) * family
-    near: NDArray[np.bool_] = np.abs(others - places) < 2 * excess.spectrum.resolution
+    near: NDArray[np.bool_] = np.abs(others - places) < 2 * resolution
     if sideband:
-        peaks = _peaks_at(excess.spectrum, excess.line_numbers(places))
         near = near & (np.abs(others - peaks) <= np.abs(places - peaks))
     return near
 
@@ -139,9 +140,7 @@ def _peaks_at(spectrum: Spectrum, lines: NDArray[np.int64]) -> FloatArray:
     values, last = spectrum.values, len(spectrum.values) - 2
     near = np.clip(lines[:, None] + np.arange(-2, 3), 1, last)
     top = np.take_along_axis(near, values[near].argmax(axis=1)[:, None], axis=1)[:, 0]
-    logs = np.log(np.maximum(values[top[:, None] + np.arange(-1, 2)], 1e-300))
-    peaks: FloatArray = spectrum.positions[top] + parabola_vertex(*logs.T)[0] * spectrum.resolution
-    return peaks
+    return np.array([peak_position(spectrum, i) for i in top.tolist()])
 
 
 BEARING_PARTS = {

@@ -466,18 +466,21 @@ def _bearing_parts(
     loudest: dict[tuple[int, str], tuple[_Quantity, BandEnvelope, BandEnvelope]] = {}
     for envelope in envelopes:
         reference_envelope = bands.get((envelope.channel, envelope.band_hz))
-        both = [_depths(e, block_rev, shafts) for e in (envelope, reference_envelope) if e is not None]
-        if reference_envelope is None or None in both:
+        if reference_envelope is None:
+            continue
+        depths_now, depths_then = (_depths(e, block_rev, shafts) for e in (envelope, reference_envelope))
+        if depths_now is None or depths_then is None:
             continue
         for number, (bearing, name, order) in enumerate(parts):
-            now, then = (_family(depths, order, slip) for depths in both if depths is not None)
+            now, then = (_family(depths, order, slip) for depths in (depths_now, depths_then))
             if now is None or then is None:
                 continue
             place = signals.where(order, envelope.channel, shaft=bearing.shaft, bearing=bearing.name)
             where = replace(place, band_hz=envelope.band_hz)
             quantity = _Quantity(part_text(name, bearing.name), "bearing", where, 0.0, "", now, then)
-            one, key = (quantity, envelope, reference_envelope), (number, envelope.channel)
-            loudest[key] = max(loudest.get(key, one), one, key=lambda found: found[0].mean_power)
+            key = number, envelope.channel
+            if key not in loudest or quantity.mean_power > loudest[key][0].mean_power:
+                loudest[key] = quantity, envelope, reference_envelope
     channels = list(dict.fromkeys(e.channel for e in envelopes))
     for key in sorted(loudest, key=lambda key: (key[0], channels.index(key[1]))):
         quantity, envelope, reference_envelope = loudest[key]

@@ -138,9 +138,7 @@ def modulation_of(
 
 
 def _summed(cells: Cells, order: float, carriers: float, floor: float) -> Modulation | None:
-    power = {
-        k: sum(sum(cell) for (_, explained), cell in cells.items() if explained == k) for k in range(1, MAX_TIMES + 1)
-    }
+    power = {k: sum(sum(cell) for (_, number), cell in cells.items() if number == k) for k in range(1, MAX_TIMES + 1)}
     total = sum(power.values())
     # What a pair needs in order to count: below it, "not modulated" and "hidden" are the same.
     hidden_db = 10 * log10(max(2 * 10 ** (CLEAR_DB / 10) * floor / (carriers + total), 1e-30))

@@ -31,6 +31,9 @@ CLEAR_DB = 12.0
 N_HALVES, MINIMUM_HALVES = 8, 3
 """Half orders that are looked at, from 0.5 on, and how many are a family."""
 
+N_OF_A_PART = 3
+"""Multiples of a bearing part's order that its lines reach to."""
+
 OF_SOME_SIZE = 0.1
 """Velocity of the largest such line over that of the largest multiple of the shaft, below which it is no suspicion."""
 
@@ -52,7 +55,7 @@ class _Between:
 def detect_between_orders(signals: AnalysisSignals) -> Iterator[Finding]:
     """Yield what stands at halves of a shaft's order, or a little below one half, of machines without gears.
 
-    Sound rotors have neither. A gear train has shafts at all ratios, and a run-up's lines pass resonances.
+    Healthy rotors have neither. A gear train has shafts at all ratios, and a run-up's lines pass resonances.
     """
     angle = signals.angle
     if signals.rig.pairs or not signals.order_excess or angle is None or not angle.is_steady(UNSTEADY):
@@ -128,10 +131,10 @@ def _is_free(signals: AnalysisSignals, excess: LinesOverFloor, place: float) -> 
         return False
     slip = signals.settings.bearing_slip
     for bearing in signals.rig.bearings:
-        ratio = signals.rig.ratio(bearing.shaft)
-        for part in bearing.orders().values() if ratio else ():
-            of_part = part * (ratio or 1.0) * max(1, round(place / (part * (ratio or 1.0))))
-            if abs(place - of_part) <= slip * of_part and of_part <= 3 * part * (ratio or 1.0):
+        ratio = signals.rig.ratio(bearing.shaft) or 0.0
+        for fundamental in (part * ratio for part in bearing.orders().values() if ratio):
+            k = max(1, round(place / fundamental))
+            if k <= N_OF_A_PART and abs(place - k * fundamental) <= slip * k * fundamental:
                 return False
     return True
 

@@ -165,23 +165,16 @@ def _backlash(examined: StartStop, rig: Rig, then: Analysis | None) -> Iterator[
     backlash = examined.backlash
     if backlash is None or rig.contact is None:
         return
-    usual_um, deviation_um, whose, minimum_ratio = (
-        2.0 * rig.contact.half_backlash_um,
-        backlash.uncertainty_um,
-        "rig",
-        1.15,
-    )
+    usual_um, deviation_um = 2.0 * rig.contact.half_backlash_um, backlash.uncertainty_um
+    whose, minimum_ratio = "rig", 1.15
     basis = "as far as the rig file's backlash is that of the new gears"
     before = None if then is None or then.motion is None else then.motion.backlash
     if before is not None and before.method == backlash.method:
         usual_um, deviation_um = before.backlash_um, float(np.hypot(before.uncertainty_um, deviation_um))
         whose, minimum_ratio, basis = "reference", 1.05, "as far as temperature and load are the reference's"
     is_pure = backlash.method.startswith("both flanks")
-    grown = (
-        is_pure
-        and usual_um > 0.0
-        and backlash.backlash_um > max(minimum_ratio * usual_um, usual_um + 4.0 * deviation_um)
-    )
+    grown_um = max(minimum_ratio * usual_um, usual_um + 4.0 * deviation_um)
+    grown = is_pure and usual_um > 0.0 and backlash.backlash_um > grown_um
     what = "The backlash" if is_pure else "The lost motion, deflection included,"
     title = f"{what} is {backlash.backlash_um:.4g} ± {backlash.uncertainty_um:.2g} µm along the line of action"
     title += f", where the {whose} {'says' if whose == 'rig' else 'has'} {usual_um:.4g} µm." if usual_um else "."

@@ -69,11 +69,10 @@ def verdict_of(findings: tuple[Finding, ...], *, has_reference: bool = False) ->
     if not claims and outcome_of(findings) is Outcome.SUSPICION:
         return " ".join(filter(None, (doubt, changed, zone, unfit)))
     examined_text = _said(others, has_reference=has_reference)
-    if zone and examined_text.startswith(NO_FAULT):
-        causes = [text for text in zoned.evidence if text.endswith(CAN_DO_THAT)] if zoned is not None else []
-        examined_text = (
-            f"{zone} {next(iter(causes), 'What is wrong does not show.')}{examined_text.removeprefix(NO_FAULT)}"
-        )
+    if zoned is not None and examined_text.startswith(NO_FAULT):
+        causes = (text for text in zoned.evidence if text.endswith(CAN_DO_THAT))
+        why = next(causes, "What is wrong does not show.")
+        examined_text = f"{zone} {why}{examined_text.removeprefix(NO_FAULT)}"
         zone = ""
     return " ".join(filter(None, (doubt, changed, examined_text, zone, unchanged, unfit)))
 
@@ -299,10 +298,10 @@ def spoiled(findings: Iterable[Finding], channels: Sequence[str]) -> frozenset[s
 
 def withheld_crack(findings: Iterable[Finding], *, is_asked: bool) -> CannotTell | None:
     """Return why the depth of a crack is withheld where every channel is spoiled; None where nobody asked."""
+    if not is_asked:
+        return None
     reason = " ".join(f.title for f in findings if f.code in TRUST).rstrip(".")  # it ends a sentence
-    return (
-        CannotTell("How deep is a crack?", reason, "Correct what is doubtful, or measure again.") if is_asked else None
-    )
+    return CannotTell("How deep is a crack?", reason, "Correct what is doubtful, or measure again.")
 
 
 def said_first(findings: Sequence[Finding], *, claims: bool) -> str:

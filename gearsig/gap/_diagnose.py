@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -21,14 +22,7 @@ from gearsig.gap._gearless import diagnose_gearless, place_of_unexpected, unexpe
 from gearsig.gap._inputs import is_gearless, twin_rig, with_stage
 from gearsig.gap._labelled import LabelledRecording, labelled_changes
 from gearsig.gap._next_recording import next_recordings, next_steps
-from gearsig.gap._places import (
-    ComparedPair,
-    compared_pair,
-    counted_against,
-    gap_places,
-    ranked_places,
-    without_silent_races,
-)
+from gearsig.gap._places import compared_pair, counted_against, gap_places, ranked_places, without_silent_races
 from gearsig.gap._population import load_learned
 from gearsig.gap._reduction import ReducedRecording
 from gearsig.gap._report import (
@@ -103,6 +97,9 @@ NOT_NEARER = (
     "With {title} the twin comes no nearer to data that it was not fitted to: no severity is given, and no twin with "
     "the effect. What speaks for it is how the recordings changed, by recognition alone."
 )
+
+
+Result = TypeVar("Result")
 
 
 @one_pool(PROCESSES)
@@ -230,9 +227,7 @@ def diagnose_gap(
     tell("placing it", 0.82)
     unexpected, unexpected_messages, faults = unexpected_job.result()
     outcome, unseen = with_unexpected(attribution.calibration.outcome(probabilities, known), unexpected)
-    labels = _labelled_facts(
-        attribution, _posterior(replace(attribution, labelled=None), conditions, clearest, known, gap), known
-    )
+    labels = _labelled_facts(attribution, conditions, clearest, known, gap)
     warnings = (*unseen, *(text for condition in conditions for text in warnings_of(condition)), *faults)
 
     # 6. Where, and of each cause where it sits, how severe it is and what speaks for it.
@@ -409,11 +404,16 @@ def _on_stage(
 
 
 def _labelled_facts(
-    attribution: Attribution[TriedEffect], without: Mapping[str, float], known: Mapping[str, GapEffect]
+    attribution: Attribution[TriedEffect],
+    conditions: Sequence[Condition],
+    clearest: Condition,
+    known: Mapping[str, GapEffect],
+    gap: Sequence[GapPlace],
 ) -> LabelledFacts | None:
     """Return what labelled recordings changed; None where there are none."""
     if attribution.labelled is None:
         return None
+    without = _posterior(replace(attribution, labelled=None), conditions, clearest, known, gap)
     return LabelledFacts(attribution.labelled.counts, without, attribution.calibration.outcome(without, known))
 
 
@@ -515,12 +515,13 @@ def _posterior(
 ) -> dict[str, float]:
     """Return cause → probability, with what the whole gap, its places and the races' own lines say."""
     posterior = within_the_floor(attribution.probabilities(), clearest.size.structural)
-    posterior = without_silent_races(posterior, [*map(_comparison, conditions)])
+    posterior = without_silent_races(posterior, [_beside_baseline(compared_pair, c) for c in conditions])
     return counted_against(posterior, known, gap, clearest.now.frame)
 
 
-def _comparison(condition: Condition) -> ComparedPair:
-    return compared_pair(
+def _beside_baseline(looked_for: Callable[..., Result], condition: Condition) -> Result:
+    """Return what a function of `_places` says of a condition beside its baseline."""
+    return looked_for(
         condition.now,
         condition.baseline,
         condition.floor,
@@ -531,13 +532,7 @@ def _comparison(condition: Condition) -> ComparedPair:
 
 def _places(condition: Condition) -> tuple[GapPlace, ...]:
     try:
-        return gap_places(
-            condition.now,
-            condition.baseline,
-            condition.floor,
-            condition.change,
-            is_reference=condition.reference is not None,
-        )
+        return _beside_baseline(gap_places, condition)
     except RefusalError:
         return ()
 

@@ -135,7 +135,7 @@ def counted_against(
 
 
 RACES = {"bearing_outer_race": "outer", "bearing_inner_race": "inner"}
-"""Effect → the family of lines that it makes."""
+"""Effect → the order of its bearing that it shows at, see `BearingFrame`, and the family of lines there."""
 
 MISSED_RACE = 0.2
 """Probability that a damaged race shows, and has no lines of its own: as `MISSED_FAULT`, of bearings alone."""
@@ -238,9 +238,21 @@ def compared_pair(
 ) -> ComparedPair:
     """Return a recording beside what it is compared with; parameters as of `gap_places`."""
     distances, *floors = against_floors(change, structural, is_reference=is_reference)
+    return _with_sizes(now, baseline, change.names, distances, floors, is_reference=is_reference)
+
+
+def _with_sizes(
+    now: ReducedRecording,
+    baseline: ReducedRecording,
+    names: Sequence[str],
+    distances: FloatArray,
+    floors: Sequence[FloatArray],
+    *,
+    is_reference: bool,
+) -> ComparedPair:
     # Healthy machines' differences hold their scatter already; a shorter record's may be larger.
     ratios = distances / np.maximum(*floors)
-    change_db, size = (dict(zip(change.names, values.tolist(), strict=True)) for values in (distances, ratios))
+    change_db, size = (dict(zip(names, values.tolist(), strict=True)) for values in (distances, ratios))
     return ComparedPair(now, baseline, is_reference, change_db, size)
 
 
@@ -917,7 +929,7 @@ def gap_places(
         If the reference was taken at another speed.
     """
     distances, *floors = against_floors(change, structural, is_reference=is_reference)
-    comparison = compared_pair(now, baseline, structural, change, is_reference=is_reference)
+    comparison = _with_sizes(now, baseline, change.names, distances, floors, is_reference=is_reference)
     ratios = np.array([*comparison.size.values()])
     members = {family: _located_rows(change.names, rows) for family, rows in family_members(change.names).items()}
     energies = {family: max(family_size(ratios[rows]) ** 2 - 1.0, 0.0) for family, rows in members.items()}

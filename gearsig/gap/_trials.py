@@ -21,7 +21,7 @@ from gearsig.gap._conditions import SEED, Condition, halves, observed, trial_len
 from gearsig.gap._evidence import SIGNS, SINGLE_TOOTH_FAULTS, TOOTH_FAULTS, determined_options
 from gearsig.gap._features import once, whole_and_parts
 from gearsig.gap._floors import UNPREDICTED, gap_size, shown_in
-from gearsig.gap._places import SAME_ORDER
+from gearsig.gap._places import RACES, SAME_ORDER
 from gearsig.gap._prediction import (
     INTERVAL_COST,
     WAYS_DB,
@@ -754,10 +754,6 @@ def _size(condition: Condition, scored: ObservedChange, explained: FloatArray, n
 # --------------------
 
 
-RACE_ORDERS = {"bearing_outer_race": "outer", "bearing_inner_race": "inner"}
-"""Effect → the order of its bearing that it shows at, see `BearingFrame`."""
-
-
 def place_of(added: Added, frame: GearFrame, places: Sequence[GapPlace]) -> str:
     """Return "tooth 7 of the gear on the input shaft", "bearing 2", "order 6"; empty where the effect has no place.
 
@@ -784,7 +780,7 @@ def place_of(added: Added, frame: GearFrame, places: Sequence[GapPlace]) -> str:
 
 def _bearings(name: str, fitted: str, frame: GearFrame, places: Sequence[GapPlace]) -> list[str]:
     """Return the bearings whose race stands out of the recording, or else those that look like the fitted one."""
-    race = RACE_ORDERS.get(name)
+    race = RACES.get(name)
     if race is None:
         return [fitted]
     orders = {bearing.name: float(getattr(bearing, race)) for bearing in frame.bearings}

@@ -411,8 +411,7 @@ def _described(
 ) -> Comb:
     """Fit the fundamental to the peaks, and gather the family's lines."""
     spectrum = excess.spectrum
-    peaks, positions, ratios_db = np.empty(len(multiples), np.int64), np.empty(len(multiples)), np.empty(len(multiples))
-    fitted, n = _fit_to_peaks(
+    fitted, peaks, positions, ratios_db = _fit_to_peaks(
         spectrum.values,
         spectrum.positions,
         spectrum.resolution,
@@ -421,33 +420,32 @@ def _described(
         np.asarray(origins, dtype=np.float64),
         np.asarray(multiples, dtype=np.int64),
         float(fundamental),
-        peaks,
-        positions,
-        ratios_db,
     )
-    strongest = peaks[int(np.argmax(ratios_db[:n]))] if n else None
+    strongest = peaks[int(np.argmax(ratios_db))] if len(peaks) else None
     return Comb(
         fitted,
         score,
         p_value,
-        tuple(positions[:n].tolist()),
-        tuple(ratios_db[:n].tolist()),
+        tuple(positions.tolist()),
+        tuple(ratios_db.tolist()),
         0.0 if strongest is None else float(spectrum.values[strongest]),
         0.0 if strongest is None else float(excess.floor[strongest]),
     )
 
 
 _vertex = njit(cache=True, nogil=True)(parabola_vertex)
+_over_floor_db = njit(cache=True, nogil=True)(over_floor_db)
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _fit_to_peaks(values, at, resolution, floor, masked, origins, multiples, fundamental, peaks, positions, ratios_db):  # type: ignore[no-untyped-def]
-    """Return the fitted fundamental, and how many lines of its family stand clearly above the floor; write these.
+def _fit_to_peaks(values, at, resolution, floor, masked, origins, multiples, fundamental):  # type: ignore[no-untyped-def]
+    """Return the fitted fundamental, and number, position and height of its lines that stand clearly above the floor.
 
     Least squares of position - origin = multiple · fundamental; the clearer a line, the less its position varies, by
     its power over the floor, which is cut at 30 dB.
     """
-    last = len(values) - 1
+    last, n = len(values) - 1, 0
+    peaks, positions, ratios_db = np.empty(len(multiples), np.int64), np.empty(len(multiples)), np.empty(len(multiples))
     for _ in range(N_FITS):
         n, weights, products = 0, 0.0, 0.0
         for k in range(len(multiples)):
@@ -458,7 +456,7 @@ def _fit_to_peaks(values, at, resolution, floor, masked, origins, multiples, fun
             nearest = int(np.rint((place - at[0]) / resolution))
             low, high = max(nearest - 2, 0), min(nearest + 2, last)
             i = low + int(np.argmax(values[low : high + 1]))
-            ratio_db = 20.0 * np.log10(max(values[i], 1e-300) / max(floor[i], 1e-300))
+            ratio_db = _over_floor_db(values[i], floor[i])
             if ratio_db < CLEAR_LINE_DB or masked[i]:
                 continue
             peaks[n], positions[n], ratios_db[n] = i, _peak_position(values, at, resolution, i), ratio_db
@@ -469,7 +467,7 @@ def _fit_to_peaks(values, at, resolution, floor, masked, origins, multiples, fun
         if weights == 0.0:
             break
         fundamental = products / weights
-    return fundamental, n
+    return fundamental, peaks[:n], positions[:n], ratios_db[:n]
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
