@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import resample_poly
 
 from gearsig.comparison import compare
 from gearsig.diagnosis import Analysis, CannotTell, Finding, Kind, analyze
@@ -151,6 +152,61 @@ def test_motor_bench_names_the_right_part_of_the_right_bearing_or_none(file: str
     assert likely == ([(code, "drive end")] if code else [])
     if file == "normal_0.mat":
         assert not claims(analysis)
+
+
+def motor_at(recording: Recording, factor: float) -> Recording:
+    """Return a recording whose speed is stated so many times too high."""
+    source = recording.speed_source
+    assert isinstance(source, ConstantSpeed)
+    return replace(recording, speed=replace(source, speed_rpm=factor * source.speed_rpm))
+
+
+@pytest.mark.parametrize(("file", "race"), [("OR007@6_0.mat", "outer-race"), ("IR021_0.mat", "inner-race")])
+def test_one_second_of_one_sensor_names_the_same_race(file: str, race: str) -> None:
+    # Beats of tones at the cage's order, a ninth of the outer race's, take nothing from that; of a second the race's
+    # own further lines are a tenth of all.
+    recording = BY_NAME[f"bearing_cwru/{file}"].read()
+    drive_end = next(name for name in recording.vibration_names() if "_DE_" in name)
+    part = recording.select([drive_end]).between(4.5, 5.5)
+    race_finding = found(analyze(part), f"bearing-{race}")
+    assert race_finding.kind is Kind.FAULT
+    assert race_finding.where.bearing == "drive end"
+
+
+@pytest.mark.slow
+def test_a_race_that_nobody_described_makes_no_rate_doubtful() -> None:
+    # Its order, 18 fifths of the shaft's, would be that of a shaft that turns five times slower as well.
+    recording = BY_NAME["bearing_cwru/OR007@6_0.mat"].read()
+    analysis = analyze(replace(recording, rig=replace(MOTOR, bearings=MOTOR.bearings[1:])))
+    assert claims(analysis) == {"non-synchronous-impacts"}
+    assert found(analysis, "non-synchronous-impacts").where.order == pytest.approx(3.597, abs=2e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("factor", [0.95, further(1.05)])
+def test_a_stated_speed_is_set_right_where_two_sensors_show_the_shaft(factor: float) -> None:
+    recording = motor_at(BY_NAME["bearing_cwru/IR021_0.mat"].read(), factor)
+    assert refined_angle(recording, MOTOR).mean_speed_rpm == pytest.approx(1796.3, abs=0.5)
+    assert found(analyze(recording), "bearing-inner-race").where.bearing == "drive end"
+    # One sensor alone leaves it open, and names no part of another bearing.
+    alone = analyze(recording.select(["X209_FE_time"]))
+    assert all(f.confidence <= 0.5 for f in alone.findings if f.code in RACES)
+
+
+@pytest.mark.slow
+def test_a_wrong_stated_speed_is_told_as_exactly_as_the_shaft_s_lines() -> None:
+    recording = motor_at(BY_NAME["bearing_cwru/IR021_0.mat"].read().select(["X209_DE_time"]), 0.94)
+    assert "1795.7 rpm" in found(analyze(recording), "sampling-rate-doubtful").title
+
+
+@pytest.mark.slow
+def test_a_weak_race_is_no_slower_train_s_whose_lines_are_its_sums_with_the_shaft() -> None:
+    damaged, healthy = (BY_NAME[f"bearing_cwru/{file}"].read() for file in ("OR007@6_0.mat", "normal_0.mat"))
+    background = resample_poly(np.asarray(healthy.samples[0], np.float64), 1, 4)
+    for share in (1.0, 0.25):
+        mixed = background + share * damaged.values("X130_DE_time")[: len(background)]
+        alone = replace(damaged.select(["X130_DE_time"]), samples=mixed[None, :])
+        assert found(analyze(alone), "bearing-outer-race").confidence > 0.5
 
 
 @pytest.mark.slow

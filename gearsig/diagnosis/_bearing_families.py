@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import exp, gcd, log, log10, pi, sqrt
+from math import ceil, exp, gcd, log, log10, pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,10 @@ SEEN_DB = 6.0
 
 AS_STRONG_DB = 9.0
 """Scatter of a train's lines about a smooth course: a line of two resonances' beats is weakened by so much."""
+
+AS_STRONG_BESIDE_SHAFT_DB = 3.0
+"""The same where one of a train's first six lines is a multiple of a shaft's order: sums and differences of family and
+shaft lie on such a train, too, and are weaker than the family, whereas all lines of a train are alike."""
 
 
 def underlying_impulse_train(excess: LinesOverFloor, comb: Comb, shafts: tuple[float, ...] = ()) -> Comb | None:
@@ -121,7 +125,10 @@ def _is_seen_between(
     if is_seen.any():
         between_db = between_db[further[seen] <= multiples[is_seen].max()]
         own_db = own_db[is_seen]
-    return len(between_db) > 0 and bool(np.median(between_db) >= np.median(own_db) - AS_STRONG_DB)
+    beside = (abs(k * fundamental - round(k * fundamental / turn) * turn) for turn in shafts for k in range(1, 7))
+    is_beside_shaft = any(distance <= 2 * resolution for distance in beside)
+    weaker_db = AS_STRONG_BESIDE_SHAFT_DB if is_beside_shaft else AS_STRONG_DB
+    return len(between_db) > 0 and bool(np.median(between_db) >= np.median(own_db) - weaker_db)
 
 
 def _is_of_family(
@@ -254,7 +261,12 @@ def find_families(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Fa
     pulls: list[Candidate] = []
     for _ in range(3):
         candidates = _significant(signals, envelopes)
-        if of_pull := [c for c in candidates if c.of_tones or mains_beside(signals, c)]:
+        is_pull = [c.of_tones or bool(mains_beside(signals, c)) for c in candidates]
+        of_pull, candidates = (
+            [c for c, pull in zip(candidates, is_pull, strict=True) if pull is kept] for kept in (True, False)
+        )
+        # Of a family whose multiples are a stronger one's, as a cage's are an outer race's, nothing is taken away.
+        if of_pull := [c for c in of_pull if not any(_hides(c, other) for other in candidates)]:
             pulls += of_pull
             envelopes = _without(envelopes, of_pull)
             candidates = _significant(signals, envelopes)
@@ -277,6 +289,9 @@ def find_families(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Fa
         named = _distinct(signals, pulls)
     trains = [t for t in trains if not any(t.strength_db < c.strength_db - SECOND_DB for c in named)]
     named = [c for c in named if not any(c.strength_db < t.strength_db - SECOND_DB for t in trains)]
+    if named and speed_is_only_stated(signals):
+        stranger = _strongest_family(signals, envelopes)
+        named = [c for c in named if c.strength_db >= stranger - SECOND_DB]
     clear = [c for c in named if _stands_out(signals, c)]
     unclear = [c for c in named if c not in clear]
     if not clear and not trains:  # combinations with shaft orders make further families, which are no second fault
@@ -351,6 +366,11 @@ def _strength_in(envelope: BandEnvelope, fundamental: float) -> float:
     return float(np.maximum(envelope.excess.over_floor_db(lines), 0.0).sum()) / N_MULTIPLES
 
 
+def _hides(family: Candidate, stronger: Candidate) -> bool:
+    """Whether a stronger family would go with a family's lines, if these were left out."""
+    return stronger.strength_db > family.strength_db and _is_multiple(stronger.comb.fundamental, family)
+
+
 def _is_multiple(fundamental: float, train: Candidate) -> bool:
     """Whether a family's fundamental is among the train's lines."""
     of_train, resolution = train.comb.fundamental, train.envelope.excess.spectrum.resolution
@@ -400,6 +420,17 @@ def best_unnamed(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Can
         return _where_it_is_strongest(envelopes, best)
     # Smeared lines do not stand out from families beside them; of all orders theirs is the clearest all the same.
     return known if _stands_out(signals, known) else replace(known, share=0.5 * known.share)
+
+
+def _strongest_family(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> float:
+    """Return the strength of the strongest family that is no chance, in dB: one of no known part has another cause.
+
+    Where the speed is wrong a damaged race is no part's, and its by-products are near one or another.
+    """
+    shafts = signals.known_shaft_orders.values()
+    families = _families(envelopes, 1.5 * min(shafts, default=1.0), 14.0 * max(shafts, default=1.0))
+    allowed = signals.settings.false_alarm_probability
+    return max((c.strength_db for c in families if c.p_value <= allowed), default=0.0)
 
 
 def clearest_family(envelopes: list[BandEnvelope], low: float, high: float) -> Candidate | None:
@@ -485,7 +516,7 @@ def _at_parts(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Iterat
         best = clearest_family(envelopes, low, high)
         if best is None:
             continue
-        p_value = min(1.0, _chance_among_others(signals, envelopes, best, bearing, low, high) * n_orders)
+        p_value = min(1.0, _chance_among_others(signals, envelopes, best, bearing, name, low, high) * n_orders)
         # Once it is fitted to the lines, the fundamental must still be near the order.
         near = slip * order + best.envelope.excess.spectrum.resolution / 6
         if abs(best.comb.fundamental - order) <= near:
@@ -539,28 +570,30 @@ def _chance_among_others(
     envelopes: list[BandEnvelope],
     family: Candidate,
     bearing: Bearing,
+    name: str,
     low: float,
     high: float,
 ) -> float:
-    """Return a family's chance over all envelopes, its sidebands left out of the lines that chance draws from.
+    """Return a family's chance over all envelopes, without its sidebands and further multiples among chance's lines.
 
-    A race that turns through the load fills the spectrum with lines a shaft's order apart, elements that differ with
-    such a cage's turn apart: they would make the family they belong to look like chance.
+    A race that turns through the load fills the spectrum with lines a shaft's order apart, a rolling element with such
+    a cage's turn apart, and impacts go on beyond the sixth multiple: they would make the family they belong to look
+    like chance, above all in a short record, in which each line is wide.
     """
     fundamental = family.comb.fundamental
-    shaft = signals.rig.ratio(bearing.shaft) or 0.0
-    steps = [step for step in (shaft, shaft * bearing.orders().get("FTF", 0.0)) if step > 0]
-    sides = np.array([side * k * step for step in steps for k in (1, 2, 3) for side in (-1, 1)])
-    carriers = fundamental * np.arange(N_MULTIPLES + 1)
+    step = (signals.rig.ratio(bearing.shaft) or 0.0) * (bearing.orders().get("FTF", 0.0) if name == "BSF" else 1.0)
+    sides = step * np.array([-3, -2, -1, 1, 2, 3] if step else [])
     chances = []
     for there in _families(envelopes, low, high):
         chances.append(there.p_value)
         if there.p_value > SEEN_THERE or abs(there.comb.fundamental / fundamental - 1) > SAME_FAMILY:
             continue
         excess = there.envelope.excess
+        carriers = fundamental * np.arange(int(excess.spectrum.positions[-1] / fundamental) + 1)
+        further = carriers[N_MULTIPLES + 1 :]
         masked = excess.masked.copy()
-        masked[_widened(excess, (carriers[:, None] + sides).ravel(), 1)] = True
-        of_family = _widened(excess, carriers[1:], 2)
+        masked[_widened(excess, np.concatenate(((carriers[:, None] + sides).ravel(), further)), 1)] = True
+        of_family = _widened(excess, carriers[1 : N_MULTIPLES + 1], 2)
         masked[of_family] = excess.masked[of_family]
         comb = best_comb(replace(excess, masked=masked), low, high)
         if comb is not None and abs(comb.fundamental / fundamental - 1) <= SAME_FAMILY:
@@ -673,7 +706,10 @@ def _with_rivals(signals: AnalysisSignals, candidate: Candidate) -> Candidate:
             rivals.append("a damaged element or cage, whose lines a cage's turn apart are there as strong,")
         elif shallow > 0.5:
             rivals.append("elements that differ, passing the load of a sound race,")
-    if candidate.of_tones:
+    if candidate.of_tones and _rings_in_multiples(signals, candidate):
+        others += weight
+        rivals.append("steady tones of that rate, without which nothing shows there,")
+    elif candidate.of_tones:
         others += weight * AS_BEATS
         rivals.append("beats of steady tones, without which nothing shows there,")
     return replace(
@@ -683,6 +719,29 @@ def _with_rivals(signals: AnalysisSignals, candidate: Candidate) -> Candidate:
 
 AS_BEATS = 10.0
 """How much likelier beats of tones are than impacts, where a family is gone with the tones."""
+
+AS_NEAR = 1e-3
+"""Relative distance of a rate's multiples in the vibration from the same in an envelope, up to which they are one."""
+
+NO_ACCIDENT = 1e-6
+"""Chance of lines at the multiples of a rate up to which tones do not stand there by accident."""
+
+
+def _rings_in_multiples(signals: AnalysisSignals, candidate: Candidate) -> bool:
+    """Whether a band's own lines stand at the multiples of the family's rate: tones that beat stand anywhere.
+
+    In a short record impacts, too, ring in steady lines. Multiples that are further apart than the rate is known only.
+    """
+    lines, order = signals.order_excess.get(candidate.envelope.channel), candidate.comb.fundamental
+    if lines is None:
+        return False
+    low, high = (edge_hz / signals.frequency_per_order_hz / order for edge_hz in candidate.envelope.band_hz)
+    multiples = np.arange(max(1, ceil(low)), min(int(high), int(0.1 / AS_NEAR)) + 1)
+    if len(multiples) < MINIMUM_LINES:
+        return False
+    low, high = order * (1 - AS_NEAR), order * (1 + AS_NEAR)
+    comb = best_comb(without_shafts(signals, lines), low, high, offsets=multiples)
+    return comb is not None and comb.p_value <= NO_ACCIDENT and len(comb.positions) >= MINIMUM_LINES
 
 
 def _weight_of_pull(signals: AnalysisSignals, candidate: Candidate) -> float:

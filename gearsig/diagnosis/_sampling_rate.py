@@ -65,7 +65,11 @@ SHARE_OF_STATED = 0.25
 """The stated rate explains nothing where its own sum is below that share of another rate's."""
 
 BY_ONE_RACE = 1 / 3
-"""Share of another rate's sum from which the shafts and one race at the stated rate are explanation enough."""
+"""Share of another rate's sum from which the shafts and one race at the stated rate are explanation enough, or the
+shafts alone where that rate is so many times higher that they share few lines with its own."""
+
+FEW_SHARED = 4.5
+"""Factor from which less than a quarter of a slower shaft's multiples are those of the stated one."""
 
 SHARE_OF_LEFT = 0.4
 """A lower rate is none where the stated one explains what that leaves by that share of what it explains itself: of
@@ -111,6 +115,7 @@ def _finding(
     evidence: str,
     also: Sequence[str] = (),
     others: Sequence[float] = (),
+    shaft_rpm: float | None = None,
 ) -> Finding:
     """Return the finding that the true rate is `factor` times the stated one, or the stated speed that times the true.
 
@@ -125,11 +130,14 @@ def _finding(
         What else may be wrong and do the same.
     others : sequence of float
         Further factors that explain nearly as much.
+    shaft_rpm : float or None
+        The speed that fits best, where the factor is one of a list.
     """
     stated_hz = signals.recording.sampling_rate_hz
     factors = (factor, *others)
     hertz, rpm = [f"{x * stated_hz:.6g} Hz" for x in factors], [f"{stated_rpm / x:.5g} rpm" for x in factors]
     rate = f"{hertz[0]} instead of the stated {stated_hz:.6g} Hz"
+    rpm[0] = rpm[0] if shaft_rpm is None else f"{shaft_rpm:.5g} rpm"
     speed = f"{rpm[0]} instead of the stated {stated_rpm:.5g} rpm"
     # The mains show which of the two is right; where a shaft turns at their frequency as well, they show nothing.
     scales = (1.0, factor)
@@ -286,6 +294,10 @@ class StrongSpectra:
         left = [replace(x, orders=x.orders[~y]) for x, y in zip(self.spectra, seen, strict=True)]
         return StrongSpectra(left, self.shafts)
 
+    def shaft_speed(self, factor: float) -> float:
+        """Return the order of the first shaft, as stated 1, that fits best near a factor."""
+        return self._speeds(factor, STATED_SPEED_TOLERANCE)[0]
+
     def _speed_of_shafts(self, factor: float, tolerance: float) -> tuple[float, int]:
         """Return the speed that puts most lines on multiples of the first shaft's, and how many were tried."""
         half_width = min(x.half_width for x in self.spectra)
@@ -441,8 +453,7 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
             return None
     # Where no race is described, one or another part may knock: it asks for no mistake at all, and its order may be
     # near a fraction of the shaft's. So may one that nobody described beside the shaft's own orders.
-    enough = AS_GOOD * best if not races else sums[factor]
-    if (not races or factor < 1) and has_stranger(ranges[factor], enough):
+    if (not races or factor < 1) and has_stranger(ranges[factor], sums[factor] if races else AS_GOOD * best):
         return None
     for milder in sorted(f for f in factors if f in usual and 1 < f <= factor / FAR_APART):
         of_one = of_one_part(milder)
@@ -455,10 +466,13 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
     # that turns q times slower as well.
     of_shafts = evidence(1.0, ranges[factor], at=())
     by_one_race = min((evidence(1.0, ranges[factor], at=[race]) for race in races), default=0.0)
-    if factor > 1 and by_one_race - of_shafts <= ENOUGH_OF_EACH and by_one_race <= BY_ONE_RACE * sums[factor]:
+    # Where some race strikes nearly 18 times in five turns, or a cage turns twice, all lies at multiples of a fifth. Of
+    # a shaft that turns so slowly few lines would be the stated one's; of four times, also those of a motor's supply.
+    by_shafts = factor > FEW_SHARED and of_shafts <= BY_ONE_RACE * sums[factor]
+    by_race = factor > 1 and by_one_race - of_shafts <= ENOUGH_OF_EACH and by_one_race <= BY_ONE_RACE * sums[factor]
+    if by_shafts or by_race:
         return None
-    stated = evidence(1.0, ranges[factor])
-    explained, highest = sums[factor], ranges[factor]
+    stated, explained, highest = evidence(1.0, ranges[factor]), sums[factor], ranges[factor]
     # So does one race or element, which strikes twice a spin: the stated rate asks for no mistake.
     by_one_part = min((evidence(1.0, highest, CLOSE_TOLERANCE, at=[part]) for part in ones), default=0.0)
     stands = (factor < 1 and _turns_as_stated(signals)) or (
@@ -467,7 +481,7 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
     )
     if by_one_part <= AS_GOOD * explained or stands:
         return None
-    close = [f for f in candidates if abs(f / factor - 1) <= STATED_SPEED_TOLERANCE]
+    close = (f for f in candidates if abs(f / factor - 1) <= STATED_SPEED_TOLERANCE)
     factor = min(close, key=lambda f: evidence(f, highest, CLOSE_TOLERANCE))
     return _finding(
         signals,
@@ -477,6 +491,7 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
         f"a probability of {_power_text(explained)}, were the spectra independent; with what is stated, of "
         f"{_power_text(stated)}.",
         others=others[:2],
+        shaft_rpm=60.0 * signals.frequency_per_order_hz * strong_to(highest).shaft_speed(factor),
     )
 
 

@@ -29,6 +29,10 @@ from gearsig.rig import ConstantSpeed, Rig, SpeedChannel
 STATED_SPEED_TOLERANCE = 0.03
 """How far the true speed may be from a stated one: the slip of an induction motor from no load to full load."""
 
+ROTOR_SPEED_TOLERANCE = 0.06
+"""The same without gears, whose sidebands would be taken for mesh lines so far away, and where two channels show the
+shaft: a small motor slips by as much, where the speed stated is that of its field."""
+
 LARGEST_DRIFT_REV = 0.01
 """Drift of the angle over the record that averages bear: a third of a tooth's pitch of thirty teeth."""
 
@@ -156,14 +160,29 @@ def _from_shaft_harmonics(recording: Recording, stated: ShaftAngle) -> ShaftAngl
     Each shows lines of its own, a bearing's above all; those of the shaft are common to them. A speed other than the
     stated one must show its first harmonic, and that clearer than a channel's own spectrum has one at the stated speed.
     A family on multiples of the mains says nothing, and is left out: a hum's would be taken for the shaft of any motor
-    of little slip. Cut as they are, common lines tell the fundamental to a fraction of their width only, and a line of
-    the mains beside a harmonic pulls it: the peaks in the channels' own spectra decide, see `_by_peaks`.
+    of little slip. Speeds further away are sought where none is near. Cut as they are, common lines tell the
+    fundamental to a fraction of their width only, and a line of the mains beside a harmonic pulls it: the peaks in the
+    channels' own spectra decide, see `_by_peaks`.
     """
     spectra = list(_spectra_of_shaft(recording))
     channels = spectra[: len(recording.vibration_names())]
     lines = _common_lines(spectra, len(channels))
+    near = _shaft_near(channels, lines, stated, STATED_SPEED_TOLERANCE)
+    if near is not None:
+        return near
+    further = _shaft_near(channels, lines, stated, ROTOR_SPEED_TOLERANCE)
+    if further is None:
+        return None
+    first_db = [_line_db(excess, further.mean_speed_rpm / 60) for excess in channels]
+    return further if sum(db > CLEAR_LINE_DB for db in first_db) >= 2 else None
+
+
+def _shaft_near(
+    channels: list[LinesOverFloor], lines: LinesOverFloor, stated: ShaftAngle, tolerance: float
+) -> ShaftAngle | None:
+    """Find the shaft's harmonics among the common lines within a tolerance of the stated speed."""
     hertz, resolution = stated.mean_speed_rpm / 60, lines.spectrum.resolution
-    low, high = hertz * (1 - STATED_SPEED_TOLERANCE), hertz * (1 + STATED_SPEED_TOLERANCE)
+    low, high = hertz * (1 - tolerance), hertz * (1 + tolerance)
     harmonics = np.arange(1, N_SHAFT_HARMONICS + 1)
     comb = best_comb(lines, low, high, harmonics)
     mains = [hz for hz in MAINS_HZ if comb and abs(comb.fundamental / hz - 1) <= MAINS_TOLERANCE]
@@ -175,7 +194,7 @@ def _from_shaft_harmonics(recording: Recording, stated: ShaftAngle) -> ShaftAngl
         nearer, harmonics = abs(comb.fundamental - hertz) / 2, harmonics[:n_harmonics]
         comb = best_comb(lines, hertz - nearer, hertz + nearer, harmonics)
     if comb is None or comb.p_value > 1e-3:
-        return _from_first_harmonic(channels, stated)
+        return _from_first_harmonic(channels, stated) if tolerance == STATED_SPEED_TOLERANCE else None
     fundamental_hz = _by_peaks(channels, comb.fundamental)
     if abs(fundamental_hz - hertz) > resolution:
         first_db, stated_db = (max(_line_db(excess, place) for excess in channels) for place in (fundamental_hz, hertz))
