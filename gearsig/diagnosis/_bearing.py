@@ -133,6 +133,8 @@ def _named_finding(signals: AnalysisSignals, candidate: Candidate, n_parts: int)
     suspected = Kind.SUSPICION if confidence >= WORTH_A_SUSPICION else Kind.NOTICE
 
     place = f"the {part} of {_bearings_named(candidate)}"
+    if candidate.of_elements:
+        place += ", or at its rolling elements or cage"
     title = f"{'Damage' if clear else 'Perhaps damage'} at {place}."
     if is_beyond_slip:
         title = f"May be {place}: the speed is stated and not confirmed."

@@ -184,7 +184,7 @@ class Candidate:
 
     `of_same_order` are other bearings whose same part has the very same order: no envelope tells them apart. `share` is
     the part's, these included, among all that would show at that order. `loudest` is the channel with the largest line.
-    `of_tones` says that it is gone with the steady tones.
+    `of_tones` says that it is gone with the steady tones, `of_elements` that elements which differ may be it as well.
     """
 
     comb: Comb
@@ -199,6 +199,7 @@ class Candidate:
     in_train: bool = False
     loudest: str = ""
     of_tones: bool = False
+    of_elements: bool = False
 
     @property
     def strength_db(self) -> float:
@@ -302,7 +303,14 @@ def find_families(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Fa
             further = find_families(signals, _without(envelopes, [free]))
             return replace(further, trains=(free, *further.trains))
         trains = [] if free is None else [free]
-    return Families(tuple(clear), tuple(trains), tuple(unclear))
+    return Families(tuple(_beside_elements(c, clear) for c in clear), tuple(trains), tuple(unclear))
+
+
+def _beside_elements(candidate: Candidate, named: Sequence[Candidate]) -> Candidate:
+    """Return an open outer race as its elements', too, where they or the cage show."""
+    elements = {c.bearing for c in named if c.name in ("BSF", "FTF")}
+    is_open = candidate.name == "BPFO" and candidate.share <= 0.5
+    return replace(candidate, of_elements=True) if is_open and candidate.bearing in elements else candidate
 
 
 SAME_FAMILY = 5e-3
@@ -680,7 +688,7 @@ def _with_rivals(signals: AnalysisSignals, candidate: Candidate) -> Candidate:
     parts = expected_parts(signals)
     order_of_part = next(o for b, name, o in parts if (b, name) == (candidate.bearing, candidate.name))
     near = nearest_bearing(signals, candidate.loudest or candidate.envelope.channel)
-    others, rivals, of_same_order = 0.0, [], []
+    others, rivals, of_same_order, differ = 0.0, [], [], False
     for bearing, name, order in parts:
         if (bearing, name) == (candidate.bearing, candidate.name):
             continue
@@ -713,7 +721,11 @@ def _with_rivals(signals: AnalysisSignals, candidate: Candidate) -> Candidate:
         others += weight * AS_BEATS
         rivals.append("beats of steady tones, without which nothing shows there,")
     return replace(
-        candidate, rivals=tuple(rivals), of_same_order=tuple(of_same_order), share=weight / (weight + others)
+        candidate,
+        rivals=tuple(rivals),
+        of_same_order=tuple(of_same_order),
+        share=weight / (weight + others),
+        of_elements=differ,
     )
 
 

@@ -299,7 +299,7 @@ class StrongSpectra:
         return self._speeds(factor, STATED_SPEED_TOLERANCE)[0]
 
     def _speed_of_shafts(self, factor: float, tolerance: float) -> tuple[float, int]:
-        """Return the speed that puts most lines on multiples of the first shaft's, and how many were tried."""
+        """Return the speed that puts most lines on the first shaft's, the nearest of such, and how many were tried."""
         half_width = min(x.half_width for x in self.spectra)
         n_speeds = min(4001, int(2 * tolerance * max(self.highest, 1.0) / (half_width / 1.5)) + 2)
         speeds = np.linspace(1 - tolerance, 1 + tolerance, n_speeds) / factor
@@ -308,7 +308,8 @@ class StrongSpectra:
             ratio = lines.orders[:, None] / speeds
             beside = np.abs(ratio - np.maximum(np.rint(ratio), 1)) * speeds
             on_shaft += (beside < lines.half_width).sum(axis=0)
-        return float(speeds[int(np.argmax(on_shaft))]), n_speeds
+        as_many = speeds[on_shaft == on_shaft.max()]
+        return float(as_many[int(np.argmin(np.abs(as_many - 1 / factor)))]), n_speeds
 
     def _at_shafts(self, speed: float) -> tuple[FloatArray, list[NDArray[np.bool_]]]:
         """Return the places of the shafts' multiples, and which lines of each spectrum lie there."""
