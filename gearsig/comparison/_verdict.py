@@ -258,7 +258,14 @@ def _elsewhere_text(channel: ChannelComparison, alignments: Sequence[Alignment])
     of = f" of {average.shaft}" if average.shaft else ""
     figure = plus_minus(average.correlation.value, BEYOND * average.correlation.repeatability, 3)
     possible = f"{average.best_correlation:.3f} is possible"
-    return f"The synchronous averages{of} differ: their correlation is {figure} where {possible}.", 0.0
+    text = f"The synchronous averages{of} differ: their correlation is {figure} where {possible}."
+    if average.correlation.value <= TURNED_ABOUT:
+        text += " One reads the other way round: a sensor mounted on the other side or wired the other way does."
+    return text, 0.0
+
+
+TURNED_ABOUT = -0.5
+"""Correlation up to which one average is the other one's, times −1."""
 
 
 def _most_text(channel: ChannelComparison, line: LineLevel, gain_db: float) -> str:

@@ -14,6 +14,7 @@ from gearsig.diagnosis._bearing_families import (
     BESIDE_SHAFT,
     N_MULTIPLES,
     RACES,
+    USUAL_SLIP,
     Candidate,
     Families,
     clearest_family,
@@ -55,9 +56,9 @@ SHARED_BY_OTHERS = 0.5
 
 WITH_STATED_SPEED, AT_ANOTHER_SPEED = 0.85, 0.5
 """Factors where the speed is a stated one, and nothing but the family itself speaks for it; and where another speed is
-as likely: the family lies beyond a bearing's slip then, and is the part's only if the stated speed is wrong, or is an
-element's or a cage's, which are rarer than wrong speeds, or the shafts' lines are those of a whole multiple of it as
-well, and it is the part's only if the stated speed is right."""
+as likely: the family lies beyond a bearing's slip then, and is the part's only if the stated speed is wrong, or beyond
+the usual slip and is an element's or a cage's, which are rarer than wrong speeds, or the shafts' lines are those of a
+whole multiple of it as well, and it is the part's only if the stated speed is right."""
 
 WORTH_A_SUSPICION = 0.3
 """Below this confidence a family at a part's order is worth a notice: other causes are more likely together."""
@@ -126,7 +127,7 @@ def _named_finding(signals: AnalysisSignals, candidate: Candidate, n_parts: int)
     confidence *= SHARED_BY_OTHERS ** (is_shared + is_hunting)
     is_of_other_speed = is_beyond_slip or times > 1
     if only_stated or is_of_other_speed:
-        is_likely = candidate.name in RACES and not is_of_other_speed
+        is_likely = (candidate.name in RACES or abs(slip) <= USUAL_SLIP) and not is_of_other_speed
         confidence *= WITH_STATED_SPEED if is_likely else AT_ANOTHER_SPEED
     is_open = is_shared or is_of_other_speed
     clear = not is_open and candidate.modulation >= CLEAR_MODULATION and confidence >= 0.75

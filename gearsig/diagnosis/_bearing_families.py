@@ -167,6 +167,9 @@ def part_text(name: str, bearing: str) -> str:
     return f"{BEARING_PARTS[name][0]} of {bearing}"
 
 
+USUAL_SLIP = 0.007
+"""Scatter of a part's order about its kinematic one."""
+
 SAME_BEARING_ORDER = 1e-3
 """Relative distance below which two bearings' orders are the same for any record: slip alone scatters more."""
 
@@ -667,7 +670,7 @@ def _weight(signals: AnalysisSignals, name: str, slip: float) -> float:
 
 def _typical_slip(signals: AnalysisSignals) -> float:
     """Return the scatter of a part's order about its kinematic one, with the error of a speed that is only stated."""
-    return 0.02 if speed_is_only_stated(signals) else 0.007
+    return 0.02 if speed_is_only_stated(signals) else USUAL_SLIP
 
 
 def _own_weight(signals: AnalysisSignals, candidate: Candidate) -> float:

@@ -30,7 +30,7 @@ from gearsig.gap._reduction import (
     smooth_power,
 )
 from gearsig.rig import SIDES
-from gearsig.severity import ShaftLines, difference_lines
+from gearsig.severity import ShaftLines, difference_lines, reversed_channels
 
 # --------------------
 # What changed about each mesh harmonic: the harmonic itself, what either gear repeats beside it, what nothing repeats.
@@ -318,6 +318,13 @@ def turned_difference(now: ReducedRecording, healthy: ReducedRecording, side: in
     return difference_lines(
         lines_of_shaft(now, side), lines_of_shaft(healthy, side), whole_teeth=now.marks[DRIVER] or now.marks[DRIVEN]
     )
+
+
+def as_mounted(now: ReducedRecording, healthy: ReducedRecording) -> tuple[ReducedRecording, tuple[str, ...]]:
+    """Return a reference whose channels read the way round that the recording's do, and which were turned about."""
+    lines_now, lines_healthy = (lines_of_shaft(reduced, DRIVER) for reduced in (now, healthy))
+    names = reversed_channels(lines_now, lines_healthy, whole_teeth=now.marks[DRIVER] or now.marks[DRIVEN])
+    return healthy.turned_about(names) if names else healthy, names
 
 
 def difference_residuals(now: ReducedRecording, turned: ShaftLines, side: int) -> list[ComplexArray]:

@@ -14,7 +14,13 @@ from numpy.typing import NDArray
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import percent
-from gearsig.gap._change import change_features, difference_features, lines_of_shaft, turned_difference
+from gearsig.gap._change import (
+    as_mounted,
+    change_features,
+    difference_features,
+    lines_of_shaft,
+    turned_difference,
+)
 from gearsig.gap._evidence import over_floors
 from gearsig.gap._features import STEPS_PER_TOOTH, Features, decibel, tooth_energy
 from gearsig.gap._floors import FLOOR_IN_DEVIATIONS, GapSize, StructuralFloor, gap_size, pooled_scatter
@@ -42,6 +48,7 @@ from gearsig.severity import (
     ShaftLines,
     load_calibration,
     orders_from_mesh,
+    reversed_text,
     telling_teeth_apart,
 )
 
@@ -688,7 +695,10 @@ def _condition(
         facts = replace(facts, reference=match.name)
         now = as_long_as(recording, now, match.reduced)
         now = with_common_channels(now, match.reduced, healthy, name, messages)
-    reference = None if match is None else match.reduced
+    reference = None
+    if match is not None:
+        reference, turned = as_mounted(now, match.reduced)
+        messages += [f"{name}: {reversed_text(turned)}"] if turned else []
     check_steady(now, reference)
     on_read(facts, now)
     condition = Condition(facts, now, simulated(twin, facts, now), reference, learned)

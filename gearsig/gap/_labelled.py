@@ -13,7 +13,7 @@ import numpy as np
 from gearsig.cache import keep, read_arrays
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError, RefusalError
-from gearsig.gap._change import change_features, difference_features
+from gearsig.gap._change import as_mounted, change_features, difference_features
 from gearsig.gap._conditions import Condition, HealthyReference, facts_of, matching_reference, read_healthy, simulated
 from gearsig.gap._features import Features
 from gearsig.gap._recognition import Learned, within_reach
@@ -139,7 +139,8 @@ def _change(
     match, why = matching_reference(now, prepared.rig, healthy)
     changes: dict[bool, Features] = {}
     if True in ways and match is not None:
-        changes[True] = change_features(now.of_channels(match.reduced.channels), match.reduced)
+        with_both = now.of_channels(match.reduced.channels)
+        changes[True] = change_features(with_both, as_mounted(with_both, match.reduced)[0])
     if False in ways:
         changes[False] = difference_features(now, simulated(twin, facts, now), learned.credibility)
     if not changes:

@@ -387,6 +387,15 @@ class ReducedRecording:
         """Return the recording with other sums."""
         return replace(self, channels=channels, kept={})
 
+    def turned_about(self, names: Iterable[str]) -> ReducedRecording:
+        """Return the recording with some channels times −1."""
+        turned = {
+            name: replace(sums, lines=(-sums.lines[0], -sums.lines[1]))
+            for name, sums in self.channels.items()
+            if name in names
+        }
+        return self.with_channels(self.channels | turned)
+
     def of_channels(self, names: Iterable[str]) -> ReducedRecording:
         """Return the recording with some of its channels."""
         return self.with_channels({name: self.channels[name] for name in names})

@@ -31,6 +31,8 @@ from gearsig.severity._features import (
     n_bands,
     orders_from_mesh,
     reach_cycles,
+    reversed_channels,
+    reversed_text,
     squeezed_rise_db,
     telling_teeth_apart,
 )
@@ -104,6 +106,8 @@ __all__ = [
     "percent_per_mm",
     "reach_cycles",
     "reach_of",
+    "reversed_channels",
+    "reversed_text",
     "root_thickness_mm",
     "segments",
     "squeezed_rise_db",

@@ -31,6 +31,8 @@ from gearsig.severity._features import (
     mesh_energies,
     n_bands,
     reach_cycles,
+    reversed_channels,
+    reversed_text,
     search_levels,
     shaft_lines,
     squeezed_rise_db,
@@ -154,9 +156,8 @@ def _gear_evidence(
         mesh = mesh_energies(shaft, n_bands(shaft))
         shape = event_shape(shaft, event)
         return GearEvidence(shaft, event, feature_vector(shaft, shaft, mesh, event, conditions), shaft, shaft, shape)
-    marked = any(a.has_mark and b.has_mark for a, b in zip(now, healthy, strict=True))
     _check_harmonics(healthy[i], "the reference's")
-    difference, agreement = difference_lines(shaft, healthy[i], whole_teeth=marked)
+    difference, agreement = difference_lines(shaft, healthy[i], whole_teeth=_is_marked(now, healthy))
     residual, largest = np.abs(without_regular_lines(difference)).max(axis=1), np.abs(shaft.lines).max(axis=1)
     if not np.all(residual > SMALLEST_DIFFERENCE * largest):
         raise RefusalError(
@@ -169,6 +170,11 @@ def _gear_evidence(
     features = feature_vector(difference, healthy[i], mesh, event, conditions)
     shape = event_shape(difference, event)
     return GearEvidence(shaft, event, features, difference, healthy[i], shape, agreement)
+
+
+def _is_marked(now: Sequence[ShaftLines], healthy: Sequence[ShaftLines]) -> bool:
+    """Whether either shaft has a mark in both recordings, which fixes the phase of the mesh."""
+    return any(a.has_mark and b.has_mark for a, b in zip(now, healthy, strict=True))
 
 
 def _check_harmonics(shaft: ShaftLines, whose: str = "the recording's") -> None:
@@ -540,15 +546,20 @@ def estimate_crack(
     now = pair_lines(prepared, None, facts.pair, names)
     used.check_reach(reach_of(facts, now[0].order_hz * facts.driver_teeth))
     healthy = None
+    turned: tuple[str, ...] = ()
     if reference is not None:
         before = prepare(reference, prepared.rig)
         acceleration_channels(before.recording, names, "of the reference ")
         check_same_rig(prepared.rig, before.rig)
         healthy = pair_lines(before, None, facts.pair, names)
         check_same_level(now, healthy)
+        turned = reversed_channels(now[0], healthy[0], whole_teeth=_is_marked(now, healthy))
+        signs = np.where(np.isin(now[0].channels, turned), -1.0, 1.0)[:, None]
+        healthy = tuple(replace(shaft, lines=signs * shaft.lines) for shaft in healthy)
     evidence = gear_evidence(now, healthy, facts.module_mm, facts.load_mpa, tip_relief_um)
     way = ALONE if reference is None else WITH_REFERENCE
-    return judge(evidence, used.models[way + ("" if tip_relief_um is None else RELIEF_KNOWN)], used, facts)
+    answer = judge(evidence, used.models[way + ("" if tip_relief_um is None else RELIEF_KNOWN)], used, facts)
+    return replace(answer, reasons=(*answer.reasons, reversed_text(turned))) if turned else answer
 
 
 def reach_of(facts: PairFacts, mesh_hz: float) -> dict[str, float]:

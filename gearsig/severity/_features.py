@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
-from gearsig.formatting import percent
+from gearsig.formatting import enumerated, percent
 from gearsig.prepared import PreparedRecording, best_shift, shift_scores, sliding_mean, strongest_window, turned_lines
 from gearsig.rig import GearPair
 
@@ -475,18 +475,65 @@ def difference_lines(now: ShaftLines, healthy: ShaftLines, *, whole_teeth: bool)
     check_same_speed(now, healthy)
     highest = min(now.highest_order, healthy.highest_order)
     x, r = now.lines[:, : highest + 1], healthy.lines[:, : highest + 1]
-    # The cross spectrum, summed over channels; strong lines count by their root. Mesh lines tell parts of a tooth.
-    orders = np.arange(highest + 1)
-    used = (orders > SLOW_ORDERS) & (orders <= 6 * now.teeth)
-    size = np.sqrt(np.abs(x) * np.abs(r))
-    cross = np.divide(x * np.conj(r), size, out=np.zeros_like(x), where=(size > 0) & used).sum(axis=0)
-    is_marked = now.has_mark and healthy.has_mark
-    marks = partial(_is_allowed_shift, teeth=now.teeth, whole_teeth=whole_teeth, is_marked=is_marked)
-    shift = best_shift(cross, marks)
+    orders, cross = np.arange(highest + 1), _cross_lines(now, healthy).sum(axis=0)  # over channels
+    shift = best_shift(cross, _allowed_shifts(now, healthy, whole_teeth=whole_teeth))
     pattern = np.where(telling_teeth_apart(orders, now.teeth), cross, 0.0)
     agreement = float(shift_scores(pattern, np.array([shift]))[0] / np.abs(pattern).sum()) if np.any(pattern) else 0.0
     turned = turned_lines(r, shift)
     return replace(now, lines=x - _matched(turned, x, now.teeth), highest_order=highest), agreement
+
+
+REVERSED, NOT_REVERSED = 0.6, 0.75
+"""Agreement from which a channel that is turned about fits, and share of it up to which it does not as it is: a part of
+a tooth turns some mesh harmonics about as well."""
+
+
+def reversed_channels(now: ShaftLines, healthy: ShaftLines, *, whole_teeth: bool) -> tuple[str, ...]:
+    """Return the channels that read the other way round: a sensor mounted on the other side, or crossed wires.
+
+    Of those Σ w Re(x r*) is as large with −r as it is small with r, at the shift that suits each best. Parameters as of
+    `difference_lines`.
+    """
+    cross, marks = _cross_lines(now, healthy), _allowed_shifts(now, healthy, whole_teeth=whole_teeth)
+    names = []
+    for name, of_channel in zip(now.channels, cross, strict=True):
+        size = float(np.abs(of_channel).sum())
+        if not size:
+            continue
+        as_is, turned = (
+            float(shift_scores(lines, np.array([best_shift(lines, marks)]))[0]) / size
+            for lines in (of_channel, -of_channel)
+        )
+        if turned >= REVERSED and as_is <= NOT_REVERSED * turned:
+            names.append(name)
+    return tuple(names)
+
+
+def reversed_text(channels: Sequence[str]) -> str:
+    """Say which channels read the other way round than in the reference, and what was made of it."""
+    verb, them = ("reads", "it was") if len(channels) == 1 else ("read", "they were")
+    return (
+        f"{enumerated(channels)} {verb} the other way round than in the reference, as a sensor does that is mounted on "
+        f"the other side or wired the other way: {them} turned about for the comparison."
+    )
+
+
+def _cross_lines(now: ShaftLines, healthy: ShaftLines) -> NDArray[np.complexfloating]:
+    """Return x r* of each channel, strong lines by their root, at the orders that tell parts of a tooth."""
+    highest = min(now.highest_order, healthy.highest_order)
+    x, r = now.lines[:, : highest + 1], healthy.lines[:, : highest + 1]
+    orders = np.arange(highest + 1)
+    used = (orders > SLOW_ORDERS) & (orders <= 6 * now.teeth)
+    size = np.sqrt(np.abs(x) * np.abs(r))
+    cross: NDArray[np.complexfloating] = np.divide(x * np.conj(r), size, out=np.zeros_like(x), where=(size > 0) & used)
+    return cross
+
+
+def _allowed_shifts(
+    now: ShaftLines, healthy: ShaftLines, *, whole_teeth: bool
+) -> Callable[[FloatArray], NDArray[np.bool_]]:
+    is_marked = now.has_mark and healthy.has_mark
+    return partial(_is_allowed_shift, teeth=now.teeth, whole_teeth=whole_teeth, is_marked=is_marked)
 
 
 def _is_allowed_shift(shifts_rev: FloatArray, teeth: int, *, whole_teeth: bool, is_marked: bool) -> NDArray[np.bool_]:
