@@ -84,6 +84,9 @@ FAR_APART = 2.5
 LOWEST_OF_VELOCITY = 0.1
 """Share of a shaft's order below which velocity is mostly the drift of the sensor."""
 
+SLIGHT = 0.12
+"""By which a stated speed may be wrong without a slip of the pen: that of a motor's field, or of another load."""
+
 NAMED_AS_WELL = 0.35
 """Share of the best factor's sum from which another factor is said beside the preferred one."""
 
@@ -520,9 +523,12 @@ def _preferred(sums: dict[float, float], usual: Sequence[float], of_one_part: Ca
     A sum counts its places; but where q times a race's order is nearly a whole number, a shaft that turns q times
     slower explains shaft and race together. So the smallest factor that explains nearly as much gives way only to one
     that is less than `FAR_APART` times as large. One of the usual factors goes before ratios to common rates, which are
-    many. Of a rate that is too low one damaged race tells more than all, whose places cover much of the range.
+    many, but a speed that is stated a little wrong before all. Of a rate that is too low one damaged race tells more
+    than all, whose places cover much of the range.
     """
     as_good = [f for f in sums if sums[f] <= AS_GOOD * min(sums.values())]
+    if slight := [f for f in as_good if abs(f - 1) <= SLIGHT]:
+        return min(slight, key=lambda f: sums[f])
     as_good = [f for f in as_good if f in usual] or as_good
     near = [f for f in as_good if f < FAR_APART * min(as_good)]
     if len(near) > 1:

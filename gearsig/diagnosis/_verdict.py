@@ -115,21 +115,13 @@ def _remedy(gaps: list[Finding]) -> list[str]:
     return [f"{SURER_WITH}{surer}."]
 
 
-_TITLES = {
-    "wrapped": "Channel {} has overflowed: its values wrap around.",
-    "stepped": "The level of channel {} steps: gain, mounting or load changed.",
-    "reversed": "Channel {} seems to run backwards in time.",
-    "hum": "Mains hum rules channel {}.",
-}
-
-
 def _problem_title(problem: ChannelProblem) -> str:
     """State a problem; of a line at an even multiple of the mains, that a magnetic field moves metal so as well."""
     pull = magnetic_pull_near(problem.frequency_hz) if problem.kind == "hum" and problem.frequency_hz else None
     if pull is not None:
         line = f"One line, {pull[1]:g} Hz, rules channel {problem.channel}"
         return f"{line}: the magnetic field of a motor or transformer, or mains hum."
-    return _TITLES.get(problem.kind, "Channel {} is {}.").format(problem.channel, problem.kind)
+    return problem.title
 
 
 def detect_data_problems(recording: Recording) -> tuple[list[Finding], frozenset[str]]:

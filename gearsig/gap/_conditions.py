@@ -740,11 +740,12 @@ def check_steady(now: ReducedRecording, reference: ReducedRecording | None) -> N
 def _reduced(prepared: PreparedRecording) -> tuple[ReducedRecording, list[str]]:
     """Return a recording reduced without its dead channels, and notes."""
     recording, name, messages = prepared.recording, prepared.recording.name, list[str]()
-    dead = {p.channel: p for p in find_problems(recording) if p.kind == "dead"}
+    problems = find_problems(recording)
+    dead = {p.channel: p for p in problems if p.kind == "dead"}
     live = [channel for channel in recording.vibration_names() if channel not in dead]
     if not live:
-        problems = "; ".join(f"{p.channel}: {p.evidence}" for p in dead.values()) or "there is none"
-        raise RefusalError(f"no vibration channel is live ({problems})", remedy="check sensors, cables and inputs")
+        why = "; ".join(f"{p.channel}: {p.evidence}" for p in dead.values()) or "there is none"
+        raise RefusalError(f"no vibration channel is live ({why})", remedy="check sensors, cables and inputs")
     unknown = [c.name for c in recording.channels if c.name in live and metres_per_second_squared(c) is None]
     if unknown:
         messages.append(
@@ -753,6 +754,9 @@ def _reduced(prepared: PreparedRecording) -> tuple[ReducedRecording, list[str]]:
         )
     reduced = reduce_recording(prepared, channels=live)
     messages += [f"{name}: channel {p.channel} is dead ({p.evidence}) and left out." for p in dead.values()]
+    # An offset or few levels hardly touch what is compared.
+    grave = [p for p in problems if p.channel in live and p.kind not in ("offset", "quantised")]
+    messages += [f"{name}: {p.title.rstrip('.')} ({p.evidence}); what differs may be no more than that." for p in grave]
     return reduced, messages
 
 

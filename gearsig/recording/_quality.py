@@ -183,6 +183,19 @@ class ChannelProblem:
     remedy: str
     frequency_hz: float | None = None
 
+    @property
+    def title(self) -> str:
+        """What is the matter, in a sentence."""
+        return _TITLES.get(self.kind, "Channel {} is {}.").format(self.channel, self.kind)
+
+
+_TITLES = {
+    "wrapped": "Channel {} has overflowed: its values wrap around.",
+    "stepped": "The level of channel {} steps: gain, mounting or load changed.",
+    "reversed": "Channel {} seems to run backwards in time.",
+    "hum": "Mains hum rules channel {}.",
+}
+
 
 def find_problems(recording: Recording) -> tuple[ChannelProblem, ...]:
     """Return the problems of the vibration channels; speed, tachometer and other channels are not looked at.

@@ -483,7 +483,7 @@ def difference_lines(now: ShaftLines, healthy: ShaftLines, *, whole_teeth: bool)
     return replace(now, lines=x - _matched(turned, x, now.teeth), highest_order=highest), agreement
 
 
-REVERSED, NOT_REVERSED = 0.6, 0.75
+REVERSED, NOT_REVERSED = 0.6, 0.9
 """Agreement from which a channel that is turned about fits, and share of it up to which it does not as it is: a part of
 a tooth turns some mesh harmonics about as well."""
 

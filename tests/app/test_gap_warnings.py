@@ -11,6 +11,7 @@ import pytest
 from gearsig.angle import find_shaft_angle
 from gearsig.errors import RefusalError
 from gearsig.gap import (
+    DRIVER,
     Added,
     OperatingCondition,
     ReducedRecording,
@@ -188,6 +189,26 @@ def test_a_dead_channel_is_left_out_and_nothing_but_dead_ones_is_refused() -> No
     samples[: len(whole.vibration_names())] = 0.0
     with pytest.raises(RefusalError, match="now: no vibration channel is live"):
         conditions_of(prepared(replace(whole, samples=samples)), (), twin())
+
+
+@pytest.mark.slow
+def test_a_channel_that_reads_the_other_way_round_or_steps_is_told() -> None:
+    before, whole = recording(0, 2).with_name("before"), recording(0, 1).with_name("now")
+    vibrations = [whole.channel_names.index(name) for name in whole.vibration_names()]
+    samples = whole.samples.copy()
+    samples[vibrations[0]] *= -1.0
+    samples[vibrations[1], samples.shape[1] // 2 :] *= 2.0
+    (as_it_was,), usual = conditions_of(prepared(whole), prepared(before), twin())
+    (condition,), notes = conditions_of(prepared(replace(whole, samples=samples)), prepared(before), twin())
+    first, second, *_ = whole.vibration_names()
+    assert not any("other way round" in text or "steps" in text for text in usual)
+    assert any(text.startswith(f"now: {first} reads the other way round") for text in notes)
+    assert any(text.startswith(f"now: The level of channel {second} steps") for text in notes)
+    (now, then), (usual_now, usual_then) = (
+        (c.now.average(first, DRIVER).lines, c.reference.average(first, DRIVER).lines)  # type: ignore[union-attr]
+        for c in (condition, as_it_was)
+    )
+    assert np.allclose(now - then, usual_then - usual_now)
 
 
 @pytest.mark.slow

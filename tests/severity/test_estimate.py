@@ -107,6 +107,18 @@ def test_gain_does_not_matter(record: Record, healthy: Recording) -> None:
     assert answer.depth_mm == pytest.approx(expected.depth_mm, rel=1e-6)
 
 
+def test_a_sensor_that_reads_the_other_way_round_than_the_reference_s_changes_no_depth(
+    record: Record, healthy: Recording
+) -> None:
+    samples = np.array(healthy.samples)
+    samples[1] *= -1.0
+    other_way = replace(healthy, samples=samples)
+    expected, answer = (crack(estimate_crack(record(2.0), reference=r)) for r in (healthy, other_way))
+    assert answer.depth_mm == pytest.approx(expected.depth_mm, rel=1e-9)
+    assert answer.reasons[-1].startswith(f"{healthy.channel_names[1]} reads the other way round")
+    assert answer.reasons[:-1] == expected.reasons
+
+
 @pytest.mark.parametrize("gain", [0.5, 2.0, 1 / 9.81])
 def test_a_reference_with_another_gain_is_refused_and_makes_no_crack(
     record: Record, healthy: Recording, gain: float
