@@ -265,10 +265,8 @@ def find_families(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Fa
     pulls: list[Candidate] = []
     for _ in range(3):
         candidates = _significant(signals, envelopes)
-        is_pull = [c.of_tones or bool(mains_beside(signals, c)) for c in candidates]
-        of_pull, candidates = (
-            [c for c, pull in zip(candidates, is_pull, strict=True) if pull is kept] for kept in (True, False)
-        )
+        of_pull = [c for c in candidates if c.of_tones or mains_beside(signals, c)]
+        candidates = [c for c in candidates if all(c is not pull for pull in of_pull)]
         # Of a family whose multiples are a stronger one's, as a cage's are an outer race's, nothing is taken away.
         if of_pull := [c for c in of_pull if not any(_hides(c, other) for other in candidates)]:
             pulls += of_pull

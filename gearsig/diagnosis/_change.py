@@ -847,13 +847,28 @@ def _of_shaft(
     text = "Of what has been added in velocity, " + ", ".join(
         f"{percent(power / total)} is at {c.label}" for c in of_shaft if (power := added[c.harmonic]) >= 0.01 * total
     )
+    evidence = (f"{text}.", *_mains_at(max(of_shaft, key=lambda c: added[c.harmonic]), signals))
     for causes in _told_apart(weights, are_told=bool(axial)):
         share = sum(weights[cause] for cause in causes) / whole
         if share >= 0.1:
             titles, confirms = zip(*(SHAFT_CAUSES[cause] for cause in causes), strict=True)
             title, confirm = f"Perhaps {' or '.join(titles)}{name}.", " Or ".join(confirms)
             likely = Kind.SUSPICION if share >= 0.3 else Kind.NOTICE
-            yield Finding(causes[0], likely, title, place, None, share, _FIT, (f"{text}.",), confirm)
+            yield Finding(causes[0], likely, title, place, None, share, _FIT, evidence, confirm)
+
+
+def _mains_at(change: LevelChange, signals: AnalysisSignals) -> Iterator[str]:
+    """Say that a multiple of the mains is where a shaft's line is, as far as the record and a wandering speed tell."""
+    hertz = change.where.frequency_hz
+    if hertz is None or signals.angle is None:
+        return
+    low_rpm, high_rpm = signals.angle.speed_range_rpm
+    wander = (high_rpm - low_rpm) / max(high_rpm + low_rpm, 1e-9)  # to either side
+    reach_hz = wander * hertz + 2 * signals.spectra[change.where.channels[0]].resolution
+    for mains_hz in MAINS_HZ:
+        place_hz = mains_hz * round(hertz / mains_hz)
+        if place_hz > 0 and abs(place_hz - hertz) <= reach_hz:
+            yield f"{place_hz:g} Hz of the mains is there, too, as far as this record tells: hum stays at standstill."
 
 
 def _told_apart(weights: Mapping[str, float], *, are_told: bool) -> list[list[str]]:

@@ -489,10 +489,24 @@ a tooth turns some mesh harmonics about as well."""
 
 
 def reversed_channels(now: ShaftLines, healthy: ShaftLines, *, whole_teeth: bool) -> tuple[str, ...]:
-    """Return the channels that read the other way round: a sensor mounted on the other side, or crossed wires.
+    r"""Return the channels that read the other way round: a sensor mounted on the other side, or crossed wires.
 
-    Of those Σ w Re(x r*) is as large with −r as it is small with r, at the shift that suits each best. Parameters as of
-    `difference_lines`.
+    .. math:: a_\pm = \max_s \sum_n \pm w_n \mathrm{Re}(x_n r_n^* e^{2 \pi i n s}) / \sum_n w_n |x_n r_n|
+
+    of each channel, each sign at the shift s that suits it best. Turned about is a channel with a₋ of `REVERSED` and
+    more, and a₊ of no more than `NOT_REVERSED` times that.
+
+    Parameters
+    ----------
+    now, healthy : ShaftLines
+        Of the same shaft and channels.
+    whole_teeth : bool
+        See `difference_lines`.
+
+    Returns
+    -------
+    tuple of str
+        Their names. A channel ruled by one harmonic, which a part of a tooth turns about as well, is not among them.
     """
     cross, marks = _cross_lines(now, healthy), _allowed_shifts(now, healthy, whole_teeth=whole_teeth)
     names = []
