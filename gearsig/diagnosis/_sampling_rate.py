@@ -527,7 +527,8 @@ def _preferred(sums: dict[float, float], usual: Sequence[float], of_one_part: Ca
     than all, whose places cover much of the range.
     """
     as_good = [f for f in sums if sums[f] <= AS_GOOD * min(sums.values())]
-    if slight := [f for f in as_good if abs(f - 1) <= SLIGHT]:
+    slight = [f for f in as_good if abs(f - 1) <= SLIGHT]
+    if slight and min(sums, key=lambda f: sums[f]) > 1:  # a slower shaft has the lines of one as stated, and more
         return min(slight, key=lambda f: sums[f])
     as_good = [f for f in as_good if f in usual] or as_good
     near = [f for f in as_good if f < FAR_APART * min(as_good)]
