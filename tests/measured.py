@@ -43,6 +43,9 @@ ROTOR = Rig(
     bearings=(Bearing("bearing", "rotor", bpfo_order=3.053, bpfi_order=4.947),),
     speed=ConstantSpeed(3600.0, "rotor"),
 )
+PARTS = ("bearing-outer-race", "bearing-inner-race", "bearing-rolling-element", "bearing-cage")
+"""Codes of what is said of a bearing's parts."""
+
 CWRU_RATES_HZ = {"OR007@6_0.mat": 12e3, "IR021_0.mat": 12e3, "B007_0.mat": 12e3, "normal_0.mat": 48e3}
 
 
@@ -110,6 +113,13 @@ def with_assumed_gears(recording: Recording) -> Recording:
     rig = replace(recording.rig, pairs=(pair,), operating_point=OperatingPoint("input", 2000.0, torque_nm=40.0))
     channels = tuple(replace(c, quantity="acceleration", unit="g") for c in recording.channels)
     return replace(recording, rig=rig, channels=channels)
+
+
+def at_speed(recording: Recording, factor: float) -> Recording:
+    """Return a recording whose speed is stated so many times too high."""
+    source = recording.speed_source
+    assert isinstance(source, ConstantSpeed)
+    return replace(recording, speed=replace(source, speed_rpm=factor * source.speed_rpm))
 
 
 def halves(recording: Recording) -> tuple[Recording, Recording]:

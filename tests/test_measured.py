@@ -20,16 +20,17 @@ from tests.measured import (
     CWRU_RATES_HZ,
     DATA,
     MOTOR,
+    PARTS,
     PINION,
     RECORDINGS,
     TWO_STAGES,
+    at_speed,
     halves,
     needs_data,
     with_assumed_gears,
 )
 
 pytestmark = needs_data
-RACES = {"bearing-outer-race", "bearing-inner-race", "bearing-rolling-element", "bearing-cage"}
 
 
 def found(analysis: Analysis, code: str) -> Finding:
@@ -149,17 +150,10 @@ def test_impacts_of_an_unknown_bearing_are_placed_at_the_drive_end(file: str) ->
 )
 def test_motor_bench_names_the_right_part_of_the_right_bearing_or_none(file: str, code: str) -> None:
     analysis = analyze(BY_NAME[f"bearing_cwru/{file}"].read())
-    likely = [(f.code, f.where.bearing) for f in analysis.findings if f.code in RACES and f.confidence > 0.5]
+    likely = [(f.code, f.where.bearing) for f in analysis.findings if f.code in PARTS and f.confidence > 0.5]
     assert likely == ([(code, "drive end")] if code else [])
     if file == "normal_0.mat":
         assert not claims(analysis)
-
-
-def motor_at(recording: Recording, factor: float) -> Recording:
-    """Return a recording whose speed is stated so many times too high."""
-    source = recording.speed_source
-    assert isinstance(source, ConstantSpeed)
-    return replace(recording, speed=replace(source, speed_rpm=factor * source.speed_rpm))
 
 
 @pytest.mark.parametrize(("file", "race"), [("OR007@6_0.mat", "outer-race"), ("IR021_0.mat", "inner-race")])
@@ -186,17 +180,17 @@ def test_a_race_that_nobody_described_makes_no_rate_doubtful() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("factor", [0.95, further(1.05)])
 def test_a_stated_speed_is_set_right_where_two_sensors_show_the_shaft(factor: float) -> None:
-    recording = motor_at(BY_NAME["bearing_cwru/IR021_0.mat"].read(), factor)
+    recording = at_speed(BY_NAME["bearing_cwru/IR021_0.mat"].read(), factor)
     assert refined_angle(recording, MOTOR).mean_speed_rpm == pytest.approx(1796.3, abs=0.5)
     assert found(analyze(recording), "bearing-inner-race").where.bearing == "drive end"
     # One sensor alone leaves it open, and names no part of another bearing.
     alone = analyze(recording.select(["X209_FE_time"]))
-    assert all(f.confidence <= 0.5 for f in alone.findings if f.code in RACES)
+    assert all(f.confidence <= 0.5 for f in alone.findings if f.code in PARTS)
 
 
 @pytest.mark.slow
 def test_a_wrong_stated_speed_is_told_as_exactly_as_the_shaft_s_lines() -> None:
-    recording = motor_at(BY_NAME["bearing_cwru/IR021_0.mat"].read().select(["X209_DE_time"]), 0.94)
+    recording = at_speed(BY_NAME["bearing_cwru/IR021_0.mat"].read().select(["X209_DE_time"]), 0.94)
     (speed_rpm,) = re.findall(r"([\d.]+) rpm instead", found(analyze(recording), "sampling-rate-doubtful").title)
     assert float(speed_rpm) == pytest.approx(1796.3, abs=2.0)
 
@@ -231,7 +225,7 @@ def test_a_rotor_with_more_unbalance_has_changed_first_of_all() -> None:
         assert [f.code for f in analysis.findings[:2]] == ["changed-since-reference", "unbalance"]
         once = next(c for c in analysis.level_changes if c.label == "1× rotor")
         assert once.change_db == pytest.approx(rise_db, abs=0.5)
-        assert all(f.confidence < 0.5 for f in analysis.findings if f.code in RACES)
+        assert all(f.confidence < 0.5 for f in analysis.findings if f.code in PARTS)
         assert analysis.shaft_angle.mean_speed_rpm == pytest.approx(speed_rpm, abs=1.5)  # type: ignore[union-attr]
 
 

@@ -410,15 +410,19 @@ def expected_parts(signals: AnalysisSignals) -> list[tuple[Bearing, str, float]]
     ]
 
 
-def best_unnamed(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Candidate | None:
-    """Return the clearest family that is no shaft's. Impacts of bearings come about 1.5 to 14 times per revolution.
+def _rates_of_bearings(signals: AnalysisSignals) -> tuple[float, float]:
+    """Return between which orders impacts of bearings come: about 1.5 to 14 times per revolution."""
+    turns = signals.known_shaft_orders.values()
+    return 1.5 * min(turns, default=1.0), 14.0 * max(turns, default=1.0)
 
-    Slower trains show by their multiples in that range. It carries a bearing's name if its fundamental is a low
-    harmonic of a known part: paths may hide the first.
+
+def best_unnamed(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Candidate | None:
+    """Return the clearest family that is no shaft's.
+
+    Slower trains show by their multiples among a bearing's rates. It carries a bearing's name if its fundamental is a
+    low harmonic of a known part: paths may hide the first.
     """
-    slowest = min(signals.known_shaft_orders.values(), default=1.0)
-    fastest = max(signals.known_shaft_orders.values(), default=1.0)
-    best = clearest_family(envelopes, 1.5 * slowest, 14.0 * fastest)
+    best = clearest_family(envelopes, *_rates_of_bearings(signals))
     if best is None or best.p_value > signals.settings.false_alarm_probability:
         return None
     train = underlying_impulse_train(best.envelope.excess, best.comb, tuple(signals.known_shaft_orders.values()))
@@ -436,8 +440,7 @@ def _strongest_family(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -
 
     Where the speed is wrong a damaged race is no part's, and its by-products are near one or another.
     """
-    shafts = signals.known_shaft_orders.values()
-    families = _families(envelopes, 1.5 * min(shafts, default=1.0), 14.0 * max(shafts, default=1.0))
+    families = _families(envelopes, *_rates_of_bearings(signals))
     allowed = signals.settings.false_alarm_probability
     return max((c.strength_db for c in families if c.p_value <= allowed), default=0.0)
 

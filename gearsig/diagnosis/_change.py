@@ -407,8 +407,7 @@ def _mains_in_line(
     """
     spectrum, hertz = signals.spectra[channel], order * signals.frequency_per_order_hz
     reach_hz = (slip * order + 2 * segments.resolution) * signals.frequency_per_order_hz
-    low_rpm, high_rpm = signals.angle.speed_range_rpm if signals.angle is not None else (0.0, 0.0)
-    spread_hz = order * (high_rpm - low_rpm) / 60
+    spread_hz = _spread_hz(signals, order)
     # Spread over so many lines, a shaft's leaves none of them half of the power; over fewer, it may be any of them.
     own_hz = 0.0 if spread_hz > SPREAD_LINES * spectrum.resolution else spread_hz / 2 + 2 * spectrum.resolution
     for mains_hz in MAINS_HZ:
@@ -419,6 +418,12 @@ def _mains_in_line(
             if amplitude**2 >= float(level.power.mean()):  # its mean square is half of that
                 return place_hz
     return 0.0
+
+
+def _spread_hz(signals: AnalysisSignals, order: float) -> float:
+    """Return over how many hertz a wandering speed spreads a line of an order."""
+    low_rpm, high_rpm = signals.angle.speed_range_rpm if signals.angle is not None else (0.0, 0.0)
+    return order * (high_rpm - low_rpm) / 60
 
 
 Family = tuple[str, str, float, Where, list[float]]
@@ -860,11 +865,10 @@ def _of_shaft(
 def _mains_at(change: LevelChange, signals: AnalysisSignals) -> Iterator[str]:
     """Say that a multiple of the mains is where a shaft's line is, as far as the record and a wandering speed tell."""
     hertz = change.where.frequency_hz
-    if hertz is None or signals.angle is None:
+    if hertz is None:
         return
-    low_rpm, high_rpm = signals.angle.speed_range_rpm
-    wander = (high_rpm - low_rpm) / max(high_rpm + low_rpm, 1e-9)  # to either side
-    reach_hz = wander * hertz + 2 * signals.spectra[change.where.channels[0]].resolution
+    spread_hz = _spread_hz(signals, hertz / signals.frequency_per_order_hz)
+    reach_hz = spread_hz / 2 + 2 * signals.spectra[change.where.channels[0]].resolution
     for mains_hz in MAINS_HZ:
         place_hz = mains_hz * round(hertz / mains_hz)
         if place_hz > 0 and abs(place_hz - hertz) <= reach_hz:

@@ -17,6 +17,7 @@ from gearsig.prepared._lines import (
     CLEAR_LINE_DB,
     FOOT_LINES,
     LOG_RATIO_LIMIT,
+    Comb,
     LinesOverFloor,
     best_comb,
     lines_over_noise_floor,
@@ -167,21 +168,23 @@ def _from_shaft_harmonics(recording: Recording, stated: ShaftAngle) -> ShaftAngl
     spectra = list(_spectra_of_shaft(recording))
     channels = spectra[: len(recording.vibration_names())]
     lines = _common_lines(spectra, len(channels))
-    near = _shaft_near(channels, lines, stated, STATED_SPEED_TOLERANCE)
+    nearby = _comb_of_shaft(channels, lines, stated, STATED_SPEED_TOLERANCE)
+    near = _from_first_harmonic(channels, stated) if nearby is None else _by_comb(channels, lines, stated, *nearby)
     if near is not None:
         return near
-    further = _shaft_near(channels, lines, stated, ROTOR_SPEED_TOLERANCE)
+    far = _comb_of_shaft(channels, lines, stated, ROTOR_SPEED_TOLERANCE)
+    further = None if far is None else _by_comb(channels, lines, stated, *far)
     if further is None:
         return None
     first_db = [_line_db(excess, further.mean_speed_rpm / 60) for excess in channels]
     return further if sum(db > CLEAR_LINE_DB for db in first_db) >= 2 else None
 
 
-def _shaft_near(
+def _comb_of_shaft(
     channels: list[LinesOverFloor], lines: LinesOverFloor, stated: ShaftAngle, tolerance: float
-) -> ShaftAngle | None:
-    """Find the shaft's harmonics among the common lines within a tolerance of the stated speed."""
-    hertz, resolution = stated.mean_speed_rpm / 60, lines.spectrum.resolution
+) -> tuple[Comb, int] | None:
+    """Return the harmonics of a shaft among the common lines, and of how many; None where chance explains them."""
+    hertz = stated.mean_speed_rpm / 60
     low, high = hertz * (1 - tolerance), hertz * (1 + tolerance)
     harmonics = np.arange(1, N_SHAFT_HARMONICS + 1)
     comb = best_comb(lines, low, high, harmonics)
@@ -193,14 +196,20 @@ def _shaft_near(
     if comb is not None and n_harmonics is not None:
         nearer, harmonics = abs(comb.fundamental - hertz) / 2, harmonics[:n_harmonics]
         comb = best_comb(lines, hertz - nearer, hertz + nearer, harmonics)
-    if comb is None or comb.p_value > 1e-3:
-        return _from_first_harmonic(channels, stated) if tolerance == STATED_SPEED_TOLERANCE else None
+    return None if comb is None or comb.p_value > 1e-3 else (comb, len(harmonics))
+
+
+def _by_comb(
+    channels: list[LinesOverFloor], lines: LinesOverFloor, stated: ShaftAngle, comb: Comb, n_harmonics: int
+) -> ShaftAngle | None:
+    """Return the angle at the speed of a shaft's harmonics; None where another speed's first one is not the clearer."""
+    hertz, resolution = stated.mean_speed_rpm / 60, lines.spectrum.resolution
     fundamental_hz = _by_peaks(channels, comb.fundamental)
     if abs(fundamental_hz - hertz) > resolution:
         first_db, stated_db = (max(_line_db(excess, place) for excess in channels) for place in (fundamental_hz, hertz))
         if _line_db(lines, fundamental_hz) <= CLEAR_LINE_DB or first_db < stated_db:
             return None
-    return _at(stated, fundamental_hz, resolution / (3 * len(harmonics)), min(0.95, 1 - comb.p_value))
+    return _at(stated, fundamental_hz, resolution / (3 * n_harmonics), min(0.95, 1 - comb.p_value))
 
 
 def magnetic_pull_near(hertz: float) -> tuple[float, float] | None:

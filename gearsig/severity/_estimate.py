@@ -554,8 +554,7 @@ def estimate_crack(
         healthy = pair_lines(before, None, facts.pair, names)
         check_same_level(now, healthy)
         turned = reversed_channels(now[0], healthy[0], whole_teeth=_is_marked(now, healthy))
-        signs = np.where(np.isin(now[0].channels, turned), -1.0, 1.0)[:, None]
-        healthy = tuple(replace(shaft, lines=signs * shaft.lines) for shaft in healthy)
+        healthy = tuple(shaft.turned_about(turned) for shaft in healthy) if turned else healthy
     evidence = gear_evidence(now, healthy, facts.module_mm, facts.load_mpa, tip_relief_um)
     way = ALONE if reference is None else WITH_REFERENCE
     answer = judge(evidence, used.models[way + ("" if tip_relief_um is None else RELIEF_KNOWN)], used, facts)

@@ -50,6 +50,10 @@ class ShaftLines:
     channels: tuple[str, ...]
     has_mark: bool = False
 
+    def turned_about(self, names: Sequence[str]) -> ShaftLines:
+        """Return the lines with those of some channels times −1."""
+        return replace(self, lines=np.where(np.isin(self.channels, names)[:, None], -self.lines, self.lines))
+
 
 def shaft_lines(prepared: PreparedRecording, pair: GearPair, shaft: str, channels: Sequence[str]) -> ShaftLines:
     """Return the lines of the shaft's average for each channel.

@@ -19,8 +19,7 @@ from scipy import signal
 
 from gearsig.diagnosis import Analysis, Kind, analyze
 from gearsig.recording import Recording
-from gearsig.rig import ConstantSpeed
-from tests.measured import BY_NAME, MOTOR
+from tests.measured import BY_NAME, MOTOR, PARTS, at_speed
 
 DAMAGED = {
     "bearing_cwru/OR007@6_0.mat": ("bearing-outer-race", "drive end"),
@@ -30,18 +29,11 @@ DAMAGED = {
     "bearing_races/OuterRaceFault_vload_4.mat": ("bearing-outer-race", "test bearing"),
 }
 HEALTHY = ("bearing_cwru/normal_0.mat", "unbalance_rotor/unbalance.mat#1", "unbalance_rotor/unbalance.mat#3")
-PARTS = ("bearing-outer-race", "bearing-inner-race", "bearing-rolling-element", "bearing-cage")
 LIKELY = 0.5
 
 
 def with_samples(recording: Recording, samples: np.ndarray, rate: float = 1.0) -> Recording:
     return replace(recording, samples=samples, sampling_rate_hz=rate * recording.sampling_rate_hz)
-
-
-def at_speed(recording: Recording, factor: float) -> Recording:
-    source = recording.speed_source
-    assert isinstance(source, ConstantSpeed)
-    return replace(recording, speed=replace(source, speed_rpm=factor * source.speed_rpm))
 
 
 def variants(recording: Recording) -> Iterator[tuple[str, Recording]]:

@@ -72,14 +72,13 @@ def test_a_wrong_speed_is_as_likely_as_a_wrong_rate_but_for_the_mains() -> None:
     t = np.arange(recording.n_samples) / recording.sampling_rate_hz
     hum = sum(0.5 * np.cos(2 * np.pi * k * 50.0 * t) for k in (1, 2, 3))
     turns_rpm, rate_hz = 1.1 * 60.0 * MOTOR_HZ, recording.sampling_rate_hz
-    rate = f"{rate_hz:g} Hz"
+    rate, speed = f"{rate_hz:g} Hz", f"{int(turns_rpm)}"
     for x in (0.0, hum):
         recording = replace(recording, samples=recording.samples + x, speed=ConstantSpeed(turns_rpm, "motor"))
         slow = finding(analyze(replace(recording, sampling_rate_hz=rate_hz / 4)), CODE).title
         fast = finding(analyze(replace(recording, speed=ConstantSpeed(4 * turns_rpm, "motor"))), CODE).title
         assert rate in slow
-        (speed_rpm,) = re.findall(r"([\d.]+) rpm instead", fast)
-        assert float(speed_rpm) == pytest.approx(turns_rpm, abs=1.0)
+        assert speed in fast
         assert ("rpm" in slow, " Hz" in fast) == ((True, True) if x is not hum else (False, False))
 
 
