@@ -16,8 +16,10 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import counted
 from gearsig.recording import Recording, check_recording
 from gearsig.rig import (
+    STATED_SPEED_TOLERANCE_PERCENT,
     ConstantSpeed,
     EncoderChannel,
+    OperatingPoint,
     PulseTimes,
     Rig,
     SpeedChannel,
@@ -30,8 +32,8 @@ from gearsig.rig import (
 def find_shaft_angle(recording: Recording, rig: Rig | None = None) -> ShaftAngle:
     """Return the angle of the reference shaft.
 
-    From the recording's speed source, else the rig's, else from the vibration itself. A source on another shaft is
-    converted by the teeth between them.
+    From the recording's speed source, else the rig's, else from the vibration itself, or of a machine without gears by
+    its nominal speed. A source on another shaft is converted by the teeth between them.
 
     Parameters
     ----------
@@ -54,18 +56,21 @@ def find_shaft_angle(recording: Recording, rig: Rig | None = None) -> ShaftAngle
     check_recording(recording)
     check_rig(rig)
     rig = rig if rig is not None else recording.rig
-    source = recording.speed if recording.speed is not None else (rig.speed if rig is not None else None)
+    source = recording.speed if recording.speed is not None else (rig.speed_source if rig is not None else None)
     if source is not None:
         angle = _from_source(recording, source)
         if angle.n_revolutions <= 0.0:
             raise RefusalError("the machine is at rest: the shaft angle does not move", remedy="record while it turns")
+        if recording.speed is None and rig is not None and rig.speed is None:
+            angle = replace(angle, notes=("no speed source is given: the nominal speed is taken",))
         return _to_reference_shaft(angle, source.shaft, rig)
     if rig is None or not rig.pairs:
-        nominal_rpm = rig.nominal_speed_rpm() if rig is not None else None
-        as_stated = f" (--speed-rpm {nominal_rpm:g}, the nominal one, if it is right within 3 %)" if nominal_rpm else ""
+        point = rig.operating_point if rig is not None else OperatingPoint()
+        off = f"; the nominal speed may be {point.speed_tolerance_percent:g} % off" if point.speed_rpm else ""
         raise RefusalError(
-            "there is no speed source, and no gear is described whose mesh lines would tell the speed",
-            remedy=f"give a tachometer, a speed channel or a constant speed{as_stated}, or the teeth in a rig file",
+            f"there is no speed source, and no gear is described whose mesh lines would tell the speed{off}",
+            remedy="give a tachometer, a speed channel, a speed that is known to "
+            f"{STATED_SPEED_TOLERANCE_PERCENT:g} %, or the teeth in a rig file",
         )
     return estimate_shaft_angle(recording, rig)
 

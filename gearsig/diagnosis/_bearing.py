@@ -63,6 +63,8 @@ whole multiple of it as well, and it is the part's only if the stated speed is r
 WORTH_A_SUSPICION = 0.3
 """Below this confidence a family at a part's order is worth a notice: other causes are more likely together."""
 
+OTHER_MAKE = 0.04
+"""How far the orders of two makes of a bearing of one designation may be apart."""
 
 SLIPS = (-0.45, -0.3, -0.18, -0.09, 0.0, 0.09, 0.18, 0.3, 0.45)
 """Nine likely slips, over the range that is searched: tenths of their distribution, the range being 2.8 deviations."""
@@ -215,6 +217,7 @@ def _unnamed_finding(signals: AnalysisSignals, candidate: Candidate) -> Finding:
         for name, shaft in signals.known_shaft_orders.items()
         if abs(order / shaft - 1) <= 0.03
     ]
+    near += _race_beyond_slip(signals, candidate)
     mains = mains_beside(signals, candidate)
     multiple, shaft = _shaft_as_stated(signals, candidate)
     # A shaft may well turn there; that it is struck every other turn is no better than an unknown part.
@@ -253,6 +256,19 @@ def _unnamed_finding(signals: AnalysisSignals, candidate: Candidate) -> Finding:
         (f"{_family_text(candidate)}.", _modulation_text(candidate), *near, *causes),
         "" if signals.rig.bearings and not shaft else surer,
     )
+
+
+def _race_beyond_slip(signals: AnalysisSignals, candidate: Candidate) -> Iterator[str]:
+    """Say which race's order is the nearest, where that is a little further away than slip makes it."""
+    order = candidate.comb.fundamental
+    races = [(part, name, bearing.name) for bearing, name, part in expected_parts(signals) if name in RACES]
+    part, name, bearing = min(races, key=lambda race: abs(order / race[0] - 1), default=(inf, "", ""))
+    if slip_of(signals) < abs(order / part - 1) <= OTHER_MAKE:
+        further = signed(100 * (part / order - 1), 1)
+        yield (
+            f"The {part_text(name, bearing)} would strike at order {part:.4f}, {further} %: more than slip, but a "
+            "bearing of another make or contact angle may differ so much."
+        )
 
 
 def _shaft_as_stated(signals: AnalysisSignals, candidate: Candidate) -> tuple[float, str]:

@@ -170,7 +170,18 @@ def family_change(
     if now is None or then is None:
         return None
     quantity = _Quantity(finding.code, "bearing", finding.where, 0.0, "", now, then)
-    return _compared(quantity, 1, signals.settings.false_alarm_probability)
+    change = _compared(quantity, 1, signals.settings.false_alarm_probability)
+    return replace(change, is_change=change.is_change or (change.change_db > 0 and _is_new(*best, order)))
+
+
+def _is_new(now: BandEnvelope, then: BandEnvelope, order: float) -> bool:
+    """Whether the lines of a family give less than half the reason in the reference: of chance, in its logarithm.
+
+    Segments have a coarser resolution than the whole record, by which weak lines drown in their noise.
+    """
+    combs = [best_comb(e.excess, order * (1 - SAME_FAMILY), order * (1 + SAME_FAMILY)) for e in (now, then)]
+    chance, chance_then = (1.0 if comb is None else comb.p_value for comb in combs)
+    return chance_then > sqrt(chance)
 
 
 def with_clearest_band(
@@ -622,7 +633,9 @@ def change_findings(
     headline = _changed(_largest(changed), off)
     if (apart := _speeds_apart(signals, reference)) > OTHER_SPEED:
         beyond_db = MIN_CHANGE_DB + _by_speed_alone_db(apart)
-        beyond_speed = [c for c in risen if c.change_db >= beyond_db]
+        multiples = [c for c in risen if c.kind == "shaft" and c.harmonic >= 3 and c.change_db >= TOGETHER_DB]
+        together = multiples if len(multiples) >= N_TOGETHER else []
+        beyond_speed = [c for c in risen if c.change_db >= beyond_db or c in together]
         if not beyond_speed:
             return [*findings, replace(headline, kind=Kind.NOTICE), *([_left_open(apart)] if risen else [])]
         risen = beyond_speed
@@ -645,6 +658,10 @@ def _left_open(apart: float) -> Finding:
     )
     return cannot_tell("change-at-another-speed", title, surer="A recording at the reference's speed.")
 
+
+TOGETHER_DB, N_TOGETHER = 10.0, 4
+"""Rise of a shaft's higher multiples, and of how many, for which another speed is no reason: it brings one or two of
+them nearer to resonances, not all."""
 
 DEEPEST_DB = 40.0
 """Below a channel's strongest line in the reference, a line that has risen is no reason to worry yet."""
@@ -753,6 +770,13 @@ BENT_SHAFT, NOT_OF_UNBALANCE = 0.3, 0.3
 """How likely a bent shaft is beside an unbalance, where nothing tells; and how likely each sign is of an unbalance that
 a linear machine would not make of it."""
 
+DOUBLE_OF_SINGLE = 0.1
+"""Share of 2× in what is added, in amplitude, from which it is a sign of its own: every rotor has some."""
+
+AXIAL_OF_RADIAL = 0.5
+"""Of what is added at 1× in radial direction, in amplitude, from which a shaft shakes in axial direction: an unbalance
+does so as well, by the tilt of its supports, but less."""
+
 OTHER_CAUSES = 0.3
 """Weight of all that no textbook's pattern covers, beside those it does."""
 
@@ -835,12 +859,16 @@ def _of_shaft(
     whirl = added.get(sum(WHIRL_ORDERS) / 2, 0.0) / total
     noise = any(c.kind == "noise" for c in risen)
     loose = min(1.0, many + 0.25 * fractions)  # with many harmonics, the first two say nothing by themselves
-    axial = [c for c in changes if c.where.shaft == shaft and c.harmonic == 1.0 and _is_axial(c, signals)]
-    shakes_axially = any(c.is_change and c.change_db > 0 for c in axial)
+    of_one_turn = [c for c in changes if c.where.shaft == shaft and c.kind == "shaft" and c.harmonic == 1.0]
+    axial = [c for c in of_one_turn if _is_axial(c, signals)]
+    radial = max((_velocity(c, signals, since=True) for c in of_one_turn if c not in axial), default=0.0)
+    moved = max((_velocity(c, signals, since=True) for c in axial if c.is_change), default=0.0)
+    shakes_axially = bool(axial) and moved > AXIAL_OF_RADIAL**2 * radial
+    bends = second >= DOUBLE_OF_SINGLE**2
     bend = BENT_SHAFT if not axial else 1.0 if shakes_axially else BENT_SHAFT**2
     weights = {
-        "unbalance": first**2 * (1.0 - loose) * NOT_OF_UNBALANCE ** (shakes_axially + (second > 0)),
-        "bent-shaft": bend * first * (1.0 + (second > 0)) * (1.0 - loose),
+        "unbalance": first**2 * (1.0 - loose) * NOT_OF_UNBALANCE ** (shakes_axially + bends),
+        "bent-shaft": bend * first * (1.0 + bends) * (1.0 - loose),
         "misalignment": min(1.0, second / 0.2) * min(1.0, doubled / 0.5) * (1.0 - loose),
         "looseness": loose,
         "rub": min(1.0, 0.2 * fractions * (1 + noise)),

@@ -1,4 +1,4 @@
-"""Lines between the multiples of a rotor's speed: half orders of loose or rubbing parts, and whirling oil."""
+"""Lines between the multiples of a rotor's speed: halves and thirds of loose or rubbing parts, and whirling oil."""
 
 from __future__ import annotations
 
@@ -28,8 +28,11 @@ CONFIRMS_WHIRL = (
 CLEAR_DB = 12.0
 """A line that noise alone exceeds once in 10⁷."""
 
-N_HALVES, MINIMUM_HALVES = 8, 3
-"""Half orders that are looked at, from 0.5 on, and how many are a family."""
+N_FRACTIONS, MINIMUM_FRACTIONS = 8, 3
+"""Halves or thirds of the order that are looked at, from the first on, and how many are a family."""
+
+FRACTIONS = {2: "halves", 3: "thirds"}
+"""Parts of a shaft's order at which loose and rubbing parts strike: every other turn, or every third."""
 
 N_OF_A_PART = 3
 """Multiples of a bearing part's order that its lines reach to."""
@@ -46,6 +49,7 @@ class _Between:
     """Lines between a shaft's multiples in one channel, their size beside the largest multiple, and their chance."""
 
     channel: str
+    kind: str
     places: tuple[float, ...]
     largest: PlacedLine
     size: float
@@ -53,7 +57,7 @@ class _Between:
 
 
 def detect_between_orders(signals: AnalysisSignals) -> Iterator[Finding]:
-    """Yield what stands at halves of a shaft's order, or a little below one half, of machines without gears.
+    """Yield what stands at halves or thirds of a shaft's order, or a little below one half, of machines without gears.
 
     Healthy rotors have neither. A gear train has shafts at all ratios, and a run-up's lines pass resonances.
     """
@@ -61,10 +65,10 @@ def detect_between_orders(signals: AnalysisSignals) -> Iterator[Finding]:
     if signals.rig.pairs or not signals.order_excess or angle is None or not angle.is_steady(UNSTEADY):
         return
     for shaft, order in signals.known_shaft_orders.items():
-        seen = [_at_halves(signals, channel, order) for channel in signals.order_excess]
-        halves = max((one for one in seen if one is not None), key=lambda one: one.size, default=None)
-        if halves is not None:
-            yield _half_orders(signals, shaft, halves)
+        seen = [_at_fractions(signals, channel, order, of) for of in FRACTIONS for channel in signals.order_excess]
+        fractions = max((one for one in seen if one is not None), key=lambda one: one.size, default=None)
+        if fractions is not None:
+            yield _fractions(signals, shaft, fractions)
     for shaft, order in shafts_of_whirl(signals).items():
         whirls = [_whirl(signals, channel, order) for channel in signals.order_excess]
         whirl = max((one for one in whirls if one is not None), key=lambda one: one.size, default=None)
@@ -80,29 +84,33 @@ def shafts_of_whirl(signals: AnalysisSignals) -> dict[str, float]:
     return {name: orders[name] for name in described if name in orders and name not in rolling}
 
 
-def _at_halves(signals: AnalysisSignals, channel: str, order: float) -> _Between | None:
-    """Return the half orders that stand out of a channel's spectrum, if chance or a slower train do not explain them.
+def _at_fractions(signals: AnalysisSignals, channel: str, order: float, of: int) -> _Between | None:
+    """Return the halves or thirds that stand out of a channel's spectrum, if neither chance nor a train explains them.
 
     By chance a place meets one of the spectrum's lines with the share of the axis that lines take; so many of the
-    places do with a binomial probability. A slower train has lines at the quarters as well.
+    places do with a binomial probability. A slower train has lines midway between these places as well, or at both
+    halves and thirds.
     """
     from scipy.stats import binom
 
     excess = signals.order_excess[channel]
-    places = [place for k in range(N_HALVES) if _is_free(signals, excess, place := (k + 0.5) * order)]
+    numbers = [k for k in range(1, of * N_FRACTIONS) if k % of][:N_FRACTIONS]
+    places = [place for k in numbers if _is_free(signals, excess, place := k / of * order)]
     lines = [(place, line) for place in places if (line := _clear(excess, place)) is not None]
-    if len(lines) < MINIMUM_HALVES:
+    if len(lines) < MINIMUM_FRACTIONS:
         return None
-    quarters = sum(_clear(excess, (k / 2 + 0.25) * order) is not None for k in range(2 * N_HALVES))
-    if quarters >= len(lines):
+    highest = (numbers[-1] + 1) / of * order
+    midway = [(k + 0.5) / of * order for k in range(numbers[-1] + 1)]
+    others = [k / other * order for other in FRACTIONS if other != of for k in range(1, round(highest)) if k % other]
+    if any(sum(_clear(excess, place) is not None for place in train) >= len(lines) for train in (midway, others)):
         return None
-    chance = float(binom.sf(len(lines) - 1, len(places), _share_of_lines(excess, N_HALVES * order)))
-    p_value = min(1.0, chance * len(signals.order_excess) * len(signals.known_shaft_orders))
+    chance = float(binom.sf(len(lines) - 1, len(places), _share_of_lines(excess, highest)))
+    p_value = min(1.0, chance * len(FRACTIONS) * len(signals.order_excess) * len(signals.known_shaft_orders))
     if p_value > signals.settings.false_alarm_probability:
         return None
     top_place, top = max(lines, key=lambda line: _as_velocity(signals, channel, line[0], line[1].amplitude))
     size = _as_velocity(signals, channel, top_place, top.amplitude) / _largest_multiple(signals, channel, order)
-    return _Between(channel, tuple(place for place, _ in lines), top, size, p_value)
+    return _Between(channel, FRACTIONS[of], tuple(place for place, _ in lines), top, size, p_value)
 
 
 def _whirl(signals: AnalysisSignals, channel: str, order: float) -> _Between | None:
@@ -114,7 +122,7 @@ def _whirl(signals: AnalysisSignals, channel: str, order: float) -> _Between | N
     if line is None or _clear(excess, 2 * line.position) is not None:
         return None
     size = _as_velocity(signals, channel, place, line.amplitude) / _largest_multiple(signals, channel, order)
-    return _Between(channel, (place,), line, size, 0.0)
+    return _Between(channel, "below half", (place,), line, size, 0.0)
 
 
 def _clear(excess: LinesOverFloor, place: float) -> PlacedLine | None:
@@ -151,7 +159,7 @@ def _share_of_lines(excess: LinesOverFloor, highest: float) -> float:
 def _largest_multiple(signals: AnalysisSignals, channel: str, order: float) -> float:
     """Return the largest of a shaft's first multiples, as velocity."""
     excess = signals.order_excess[channel]
-    lines = ((k * order, line_at(excess, k * order)) for k in range(1, N_HALVES + 1))
+    lines = ((k * order, line_at(excess, k * order)) for k in range(1, N_FRACTIONS + 1))
     sizes = [_as_velocity(signals, channel, place, line.amplitude) for place, line in lines if line is not None]
     return max(sizes, default=1e-300)
 
@@ -170,22 +178,25 @@ def derivatives_of_velocity(signals: AnalysisSignals, channel: str) -> int:
 _BASIS = "how well the textbook's signs fit, one recording alone; not calibrated"
 
 
-def _half_orders(signals: AnalysisSignals, shaft: str, halves: _Between) -> Finding:
-    count, name = len(halves.places), named("shaft", shaft) if shaft else "the shaft"
-    orders = ", ".join(f"{place:g}" for place in halves.places)
-    chance = f"chance of so many {p_text(halves.p_value)}"
+def _fractions(signals: AnalysisSignals, shaft: str, fractions: _Between) -> Finding:
+    count, name = len(fractions.places), named("shaft", shaft) if shaft else "the shaft"
+    orders = ", ".join(f"{place:.4g}" for place in fractions.places)
+    chance = f"chance of so many {p_text(fractions.p_value)}"
+    other = "A shaft at exactly a third of the speed"
+    if fractions.kind == FRACTIONS[2]:
+        other = "A four-stroke engine, or a shaft at exactly half the speed,"
     return Finding(
         HALF_ORDERS,
-        Kind.SUSPICION if halves.size >= OF_SOME_SIZE else Kind.NOTICE,
-        f"Perhaps looseness or a rub of {name}: lines stand at halves of its order.",
-        signals.where(halves.largest.position, halves.channel, shaft=shaft),
-        halves.largest.strength("noise floor"),
+        Kind.SUSPICION if fractions.size >= OF_SOME_SIZE else Kind.NOTICE,
+        f"Perhaps looseness or a rub of {name}: lines stand at {fractions.kind} of its order.",
+        signals.where(fractions.largest.position, fractions.channel, shaft=shaft),
+        fractions.largest.strength("noise floor"),
         0.5,
         _BASIS,
         (
-            f"{count} of the first {N_HALVES} stand out in {halves.channel}: orders {orders}; {chance}.",
-            f"The largest has {percent(halves.size)} of the velocity of the shaft's largest multiple.",
-            "A four-stroke engine, or a shaft at exactly half the speed, would show the same.",
+            f"{count} of the first {N_FRACTIONS} stand out in {fractions.channel}: orders {orders}; {chance}.",
+            f"The largest has {percent(fractions.size)} of the velocity of the shaft's largest multiple.",
+            f"{other} would show the same.",
         ),
         "Bolts, feet and fits of the bearings; seals for marks; an earlier recording of the machine.",
     )

@@ -433,47 +433,81 @@ _NEIGHBOURHOOD_HZ = 8.0
 _N_SHAFT_HARMONICS = 8
 _APART = 20.0
 """Widths between a shaft's orders from which they can be told from the supply in four places of five."""
+_N_STRONG_MULTIPLES = 3
+"""Of a shaft, which unbalance, misalignment and their like raise by themselves, and their harmonics with them."""
+_N_BESIDE = 3
+_AMONG_MULTIPLES_DB = 10.0
 
 
 def mains_lines(recording: Recording, names: Sequence[str], speed_hz: float, frame: GearFrame) -> tuple[float, ...]:
-    """Return, for each supply, the mean excess in dB of its harmonics over the neighbourhood, on the best channel.
+    """Return, for each supply, the mean excess in dB of its harmonics over what is there anyway, on the best channel.
 
-    Harmonics that fall on a line of the gears are left out; 0 where none is left.
+    That is the neighbourhood, or, of a harmonic that falls on a higher multiple of a shaft, the multiples beside that
+    one: see `_excess`. Harmonics that fall on mesh lines and on a shaft's first orders are left out; 0 where none is
+    left.
     """
     return tuple(
-        max(_excess(recording.values(name), recording, supply, speed_hz, frame) for name in names)
+        max(_mean_excess(recording.values(name), recording, supply, speed_hz, frame) for name in names)
         for supply in MAINS_HZ
     )
 
 
-def _excess(values: FloatArray, recording: Recording, supply_hz: float, speed_hz: float, frame: GearFrame) -> float:
+def _mean_excess(
+    values: FloatArray, recording: Recording, supply_hz: float, speed_hz: float, frame: GearFrame
+) -> float:
     n = len(values)
     x = np.asarray(values, dtype=np.float64)
     power = np.abs(np.fft.rfft((x - x.mean()) * np.hanning(n))) ** 2
     step = recording.sampling_rate_hz / n
-    excesses_db = []
-    for k in range(1, N_MAINS_HARMONICS + 1):
-        frequency = k * supply_hz
-        width = max(2.0 * step, MAINS_TOLERANCE * frequency)
-        if frequency + _NEIGHBOURHOOD_HZ > recording.sampling_rate_hz / 2 or _on_a_gear_line(
-            frequency, width, speed_hz, frame
-        ):
-            continue
-        positions = np.arange(len(power)) * step
-        line = np.abs(positions - frequency) <= width
-        around = (np.abs(positions - frequency) <= _NEIGHBOURHOOD_HZ) & (np.abs(positions - frequency) > 2.0 * width)
-        excesses_db.append(10.0 * np.log10(power[line].max() / max(float(np.median(power[around])), 1e-300)))
-    return float(np.mean(excesses_db)) if excesses_db else 0.0
+    excesses_db = [
+        _excess(power, step, supply_hz, k, speed_hz, frame)
+        for k in range(1, N_MAINS_HARMONICS + 1)
+        if k * supply_hz + _NEIGHBOURHOOD_HZ <= recording.sampling_rate_hz / 2
+    ]
+    known_db = [excess_db for excess_db in excesses_db if excess_db is not None]
+    return float(np.mean(known_db)) if known_db else 0.0
 
 
-def _on_a_gear_line(frequency_hz: float, width_hz: float, speed_hz: float, frame: GearFrame) -> bool:
-    """Whether a frequency falls on a mesh harmonic or a shaft's order.
+def _excess(
+    power: FloatArray, step_hz: float, supply_hz: float, harmonic: int, speed_hz: float, frame: GearFrame
+) -> float | None:
+    """Return by how much a harmonic stands out in dB; None where the gears' own lines fall on it.
 
-    Of a slow shaft only the first orders count, which are strong: all of them lie everywhere.
+    On a shaft's higher multiple it has to stand out by `_AMONG_MULTIPLES_DB` over the strongest of the multiples beside
+    it: a shaft does not raise one of them alone, hum does. Of a slow shaft all multiples lie everywhere: only the first
+    count, which are strong.
     """
-    shafts_hz = [order * speed_hz for order in frame.shaft_orders]
-    counted_hz = [hz for hz in shafts_hz if hz >= _APART * width_hz or round(frequency_hz / hz) <= _N_SHAFT_HARMONICS]
-    return any(_to_a_multiple(frequency_hz, hz) < 2.0 * width_hz for hz in (frame.teeth[0] * speed_hz, *counted_hz))
+    frequency_hz = harmonic * supply_hz
+    width = max(2.0 * step_hz, MAINS_TOLERANCE * frequency_hz)
+    mesh_hz = frame.teeth[0] * speed_hz
+    if _to_a_multiple(frequency_hz, mesh_hz) < 2.0 * width:
+        return None
+    line = _strongest(power, step_hz, frequency_hz, width)
+    beside: list[float] = []
+    for shaft_hz in (order * speed_hz for order in frame.shaft_orders):
+        multiple = round(frequency_hz / shaft_hz)
+        counts = shaft_hz >= _APART * width or multiple <= _N_SHAFT_HARMONICS
+        if not counts or _to_a_multiple(frequency_hz, shaft_hz) >= 2.0 * width:
+            continue
+        if multiple <= _N_STRONG_MULTIPLES * harmonic or shaft_hz < 4.0 * width:
+            return None
+        beside += [
+            _strongest(power, step_hz, other * shaft_hz, width)
+            for other in range(multiple - _N_BESIDE, multiple + _N_BESIDE + 1)
+            if other != multiple
+            and other * shaft_hz + width < step_hz * (len(power) - 1)
+            and _to_a_multiple(other * shaft_hz, mesh_hz) >= 2.0 * width
+        ]
+    if beside:
+        return max(0.0, 10.0 * float(np.log10(line / max(*beside, 1e-300))) - _AMONG_MULTIPLES_DB)
+    away = np.abs(np.arange(len(power)) * step_hz - frequency_hz)
+    around = power[(away <= _NEIGHBOURHOOD_HZ) & (away > 2.0 * width)]
+    return 10.0 * float(np.log10(line / max(float(np.median(around)), 1e-300)))
+
+
+def _strongest(power: FloatArray, step_hz: float, frequency_hz: float, width_hz: float) -> float:
+    first, last = (round((frequency_hz + side * width_hz) / step_hz) for side in (-1.0, 1.0))
+    return float(power[first : last + 1].max())
 
 
 def _to_a_multiple(frequency_hz: float, of_hz: float) -> float:
@@ -767,12 +801,15 @@ def _envelopes(
     from scipy.fft import irfft, next_fast_len, rfft
 
     n = len(residual)
-    lines = rfft(residual)
+    beyond = min(BEYOND_THE_ENDS, n - 1)
+    long = _continued(residual, beyond)
+    lines = rfft(long)
     m = 2 * next_fast_len(int(highest_cycle * n / n_per_rev) + 1)
     powers, moments, step = [], [], 0.0
     for low, high in bands:
-        first, last = (int(f / speed_hz * n / n_per_rev) for f in (low, high))
-        square = _squared_envelope(lines[first : min(last, len(lines) - 1)], n)
+        first, last = (int(f / speed_hz * len(long) / n_per_rev) for f in (low, high))
+        square = _squared_envelope(lines[first : min(last, len(lines) - 1)], len(long))
+        square = square[round(len(square) * beyond / len(long)) :][: round(len(square) * n / len(long))]
         # |z|² is low-passed to the modulation orders of interest by keeping its first lines.
         slow_lines = np.zeros(m // 2 + 1, dtype=np.complex128)
         kept = rfft(square)[: m // 2 + 1] * (m / len(square))
@@ -784,6 +821,22 @@ def _envelopes(
         # With z the analytic signal: E x² = E|z|²/2, E x⁴ = 3/8 E|z|⁴.
         moments.append([[square[i:j].mean() / 2.0, 0.375 * (square[i:j] ** 2).mean()] for i, j in pairwise(edges)])
     return np.stack(powers, axis=1), np.asarray(moments).transpose(1, 0, 2), step
+
+
+BEYOND_THE_ENDS = 2048
+"""Samples by which a record is continued before it is cut into bands."""
+
+
+def _continued(values: FloatArray, by: int) -> FloatArray:
+    """Return a record continued beyond both ends by its reflections in them, without a step in value or slope.
+
+    The spectrum of a record takes its end for what comes before its beginning. Where a strong slow line, such as hum,
+    differs in the two, that step is a click in every band: it would be impulsive noise that nobody recorded.
+    """
+    rise = np.sin(0.5 * np.pi * np.arange(1, by + 1) / (by + 1)) ** 2
+    before = (2.0 * values[0] - values[by:0:-1]) * rise
+    after = (2.0 * values[-1] - values[-2 : -by - 2 : -1]) * rise[::-1]
+    return np.concatenate([before, values, after])
 
 
 def _squared_envelope(band: NDArray[np.complex128], n: int) -> FloatArray:

@@ -25,14 +25,14 @@ from gearsig.prepared._lines import (
     peak_position,
 )
 from gearsig.recording import MAINS_HZ, Recording
-from gearsig.rig import ConstantSpeed, Rig, SpeedChannel
+from gearsig.rig import STATED_SPEED_TOLERANCE_PERCENT, ConstantSpeed, Rig, SpeedChannel
 
 STATED_SPEED_TOLERANCE = 0.03
 """How far the true speed may be from a stated one: the slip of an induction motor from no load to full load."""
 
-ROTOR_SPEED_TOLERANCE = 0.06
+ROTOR_SPEED_TOLERANCE = STATED_SPEED_TOLERANCE_PERCENT / 100
 """The same without gears, whose sidebands would be taken for mesh lines so far away, and where two channels show the
-shaft: a small motor slips by as much, where the speed stated is that of its field."""
+shaft."""
 
 LARGEST_DRIFT_REV = 0.01
 """Drift of the angle over the record that averages bear: a third of a tooth's pitch of thirty teeth."""

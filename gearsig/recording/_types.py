@@ -422,10 +422,10 @@ class Recording:
 
     @property
     def speed_source(self) -> SpeedSource | None:
-        """The recording's own speed source, or the rig's."""
+        """The recording's own speed source, or the rig's, see `Rig.speed_source`."""
         if self.speed is not None:
             return self.speed
-        return self.rig.speed if self.rig is not None else None
+        return self.rig.speed_source if self.rig is not None else None
 
     def time_s(self) -> FloatArray:
         """Sample times from zero, (n_samples,)."""

@@ -25,6 +25,7 @@ from gearsig.rig._toml import (
 from gearsig.rig._types import (
     QUANTITIES,
     SIDES,
+    STATED_SPEED_TOLERANCE_PERCENT,
     ConstantSpeed,
     EncoderChannel,
     GearPair,
@@ -49,6 +50,7 @@ __all__ = [
     "DAMPING_LAWS",
     "QUANTITIES",
     "SIDES",
+    "STATED_SPEED_TOLERANCE_PERCENT",
     "Bearing",
     "CatalogueBearing",
     "ConstantSpeed",

@@ -202,7 +202,7 @@ def _missing(rig: Rig) -> list[str]:
         texts.append("some tooth counts: shafts behind them have no known order")
     if not rig.bearings:
         texts.append("bearings: a bearing can only be suspected, not named by race")
-    if rig.speed is None and not rig.pairs:
+    if rig.speed_source is None and not rig.pairs:
         texts.append("a speed source, [speed]: without gears nothing tells the speed, and there are no orders")
     elif rig.operating_point.speed_rpm is None and rig.speed is None:
         texts.append("a nominal speed or a speed source: the speed must be found from the mesh lines alone")

@@ -391,9 +391,16 @@ class MachineSize:
         return None
 
 
+STATED_SPEED_TOLERANCE_PERCENT = 6.0
+"""How far a stated speed may be off for the lines of a shaft to tell the true one: a small motor slips by as much."""
+
+
 @dataclass(frozen=True)
 class OperatingPoint:
-    """The nominal running condition; its speed guides the search for the true one and is not taken as measured."""
+    """The nominal running condition; its speed guides the search for the true one and is not taken as measured.
+
+    Without gears, whose meshes would tell the speed, it stands for a stated one: see `Rig.speed_source`.
+    """
 
     shaft: str = ""
     speed_rpm: float | None = None
@@ -527,6 +534,18 @@ class Rig:
         if shaft == (to or self.reference_shaft):
             return 1.0
         return None if from_ratio is None or to_ratio is None else from_ratio / to_ratio
+
+    @property
+    def speed_source(self) -> SpeedSource | None:
+        """How recordings tell the speed; where neither a source nor a mesh does, the nominal speed as a constant one.
+
+        Only one that is good to `STATED_SPEED_TOLERANCE_PERCENT`.
+        """
+        nominal_rpm = self.nominal_speed_rpm()
+        is_good = self.operating_point.speed_tolerance_percent <= STATED_SPEED_TOLERANCE_PERCENT
+        if self.speed is not None or self.pairs or not nominal_rpm or not is_good:
+            return self.speed
+        return ConstantSpeed(nominal_rpm, self.reference_shaft)
 
     def nominal_speed_rpm(self, shaft: str = "") -> float | None:
         """Nominal speed of `shaft` (default: the reference shaft), None if not known."""

@@ -59,12 +59,37 @@ def test_an_axial_sensor_tells_a_bent_shaft_from_an_unbalance() -> None:
     of_radial = beside_healthy(HEALTHY | {1.0: 0.5})
     assert finding(of_radial, "unbalance").title == "Perhaps unbalance or a bent shaft of rotor."
     axial = Channel("a2", "acceleration", "m/s^2", "front bearing, axial")
-    now, healthy = rotor(HEALTHY | {1.0: 0.5}, seed=1), rotor(HEALTHY, seed=2)
-    now, healthy = (
-        replace(one, samples=np.vstack([one.samples, one.samples]), channels=(*one.channels, axial))
-        for one in (now, healthy)
+    for share, cause in ((1.0, "bent-shaft"), (0.2, "unbalance")):
+        now, healthy = (
+            replace(one, samples=np.vstack([one.samples, share * one.samples]), channels=(*one.channels, axial))
+            for one in (rotor(HEALTHY | {1.0: 0.5}, seed=1), rotor(HEALTHY, seed=2))
+        )
+        assert codes(analyze(now, reference=healthy), Kind.SUSPICION) == ["changed-since-reference", cause]
+
+
+def test_multiples_that_rise_together_are_no_matter_of_another_speed() -> None:
+    """By 1.3 % of speed one of them may meet a resonance. It takes eight to say that something is loose."""
+    healthy = rotor(HEALTHY | dict.fromkeys(range(4, 11), 0.01), seed=2, speed_rpm=1520.0)
+    for n_risen, is_said in ((1, False), (8, True)):
+        lines = HEALTHY | dict.fromkeys(range(4, 11), 0.01) | dict.fromkeys(range(3, 3 + n_risen), 0.05)
+        analysis = analyze(rotor(lines, seed=1), reference=healthy)
+        assert ("looseness" in codes(analysis, Kind.SUSPICION)) is is_said
+
+
+def test_a_weak_family_of_a_bearing_is_new_where_the_reference_has_none() -> None:
+    """Lines that the segments of a comparison are too short to show."""
+    rng = np.random.default_rng(5)
+    order = ROTOR.bearings[0].orders()["BPFO"]
+    turns = 25.0 * np.arange(20 * 8192) / 8192.0
+    noise, healthy, other = rng.standard_normal((3, len(turns)))
+    depth = 1.0 + sum(0.05 * np.cos(2 * np.pi * k * order * turns) for k in (1, 2, 3))
+    rig = replace(ROTOR, speed=PulseTimes(np.arange(1, 500) / 25.0, 1, "rotor"))
+    now, healthy, as_now = (
+        Recording(x[None, :], 8192.0, (Channel("a1", "acceleration", "m/s^2"),), rig=rig)
+        for x in (depth * noise, healthy, depth * other)
     )
-    assert finding(analyze(now, reference=healthy), "bent-shaft").title == "Perhaps a bent shaft of rotor."
+    assert codes(analyze(now, reference=healthy), Kind.SUSPICION) == ["bearing-outer-race"]
+    assert not codes(analyze(now, reference=as_now), Kind.FAULT, Kind.SUSPICION)
 
 
 def test_what_rests_on_a_line_that_the_mains_make_as_well_is_half_as_sure() -> None:

@@ -1,4 +1,4 @@
-"""Rotors without gears: half orders, whirling oil, and what a stated speed that wanders makes of the shaft's lines."""
+"""Rotors without gears: halves and thirds of orders, oil whirl, and what a speed that wanders makes of the lines."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -8,7 +8,7 @@ import pytest
 
 from gearsig.diagnosis import Kind, Outcome, analyze
 from gearsig.recording import Channel, Recording
-from gearsig.rig import Bearing, ConstantSpeed, PulseTimes, Rig, Shaft
+from gearsig.rig import Bearing, ConstantSpeed, OperatingPoint, PulseTimes, Rig, Shaft
 from tests.diagnosis.machines import codes, finding
 
 PLAIN = Rig(shafts=(Shaft("rotor"),))
@@ -41,6 +41,8 @@ def record(
         (HEALTHY, ROLLING, []),
         (HEALTHY | HALVES, ROLLING, ["half-orders"]),
         (HEALTHY | HALVES, PLAIN, ["half-orders"]),
+        (HEALTHY | {k / 3: 0.03 for k in range(1, 20) if k % 3}, ROLLING, ["half-orders"]),
+        (HEALTHY | {k / 6: 0.03 for k in range(1, 40)}, ROLLING, []),  # a shaft at a sixth of the speed
         (HEALTHY | {0.28 * k: 0.03 for k in range(1, 20)}, PLAIN, []),  # a belt
         (HEALTHY | HALVES | {k / 4: 0.03 for k in range(1, 24)}, PLAIN, []),  # a shaft at a quarter of the speed
         (HEALTHY | {0.44: 0.05}, PLAIN, ["oil-whirl"]),
@@ -49,10 +51,23 @@ def record(
         (HEALTHY | {0.44: 0.05}, Rig(), []),  # a machine of which nothing is known
     ],
 )
-def test_half_orders_and_oil_whirl_are_suspected_and_belts_are_not(
+def test_parts_of_orders_and_oil_whirl_are_suspected_and_belts_are_not(
     lines: Mapping[float, float], rig: Rig, claims: list[str]
 ) -> None:
     assert codes(analyze(record(lines, rig)), *CLAIMS) == claims
+
+
+@pytest.mark.parametrize(("tolerance_percent", "is_known"), [(2.0, True), (20.0, False)])
+def test_a_good_nominal_speed_stands_for_a_stated_one(tolerance_percent: float, *, is_known: bool) -> None:
+    """No source and no gear tells the speed. The lines say that it is 1 % more."""
+    point = OperatingPoint("rotor", 60 * TURNS_HZ / 1.01, tolerance_percent)
+    recording = replace(record(HEALTHY, replace(ROLLING, operating_point=point)), speed=None)
+    analysis = analyze(recording)
+    if is_known:
+        assert "1662.18 ± 2.5 rpm" in finding(analysis, "speed").title
+        assert "the nominal speed is taken" in finding(analysis, "speed").evidence[0]
+    else:
+        assert "the nominal speed may be 20 % off" in finding(analysis, "speed-unknown").evidence[0]
 
 
 def test_lines_of_the_mains_are_no_half_orders() -> None:

@@ -156,6 +156,28 @@ def test_a_line_of_the_gears_at_the_supply_s_frequency_is_no_hum(speed_hz: float
     assert is_left_out or excess > 30.0
 
 
+@pytest.mark.parametrize(("alone", "is_hum"), [(True, True), (False, False)])
+def test_hum_on_a_higher_multiple_stands_out_over_its_neighbours(*, alone: bool, is_hum: bool) -> None:
+    """The sixth multiple raised alone is hum; a shaft that raises all of its multiples is none."""
+    rng = np.random.default_rng(1)
+    speed_hz, time = 50.0 / 6, np.arange(round(RATE_HZ * 6.0)) / RATE_HZ
+    weak = 0.01 if alone else 0.7
+    lines = sum((1.0 if k == 6 else weak) * np.sin(2 * np.pi * k * speed_hz * time + k) for k in range(1, 21))
+    values = lines + 0.01 * rng.standard_normal(len(time))
+    recording = Recording(values[None], RATE_HZ, (Channel("a1", "acceleration", "m/s^2"),))
+    excess = mains_lines(recording, ["a1"], speed_hz, gear_frame(RIG))[0]
+    assert (excess > 5.0) is is_hum
+    assert is_hum or excess == 0.0
+
+
+def test_a_strong_slow_line_makes_no_impulses_in_the_bands(healthy: ReducedRecording) -> None:
+    """Hum between the lines of the gears, which ends elsewhere than it began, leaves the bands above it as they are."""
+    with_hum = reduced(lambda time, _: 10.0 * np.sin(2 * np.pi * 50.0 * time))
+    quiet, found = as_dict(features_of(healthy)), as_dict(features_of(with_hum))
+    for name in (f"floor.kurtosis.{i}" for i in range(2, 5)):
+        assert found[name] == pytest.approx(quiet[name], abs=1.0)
+
+
 def test_a_mesh_above_what_is_sampled_is_refused() -> None:
     whole = record()
     slow = replace(whole, samples=whole.samples[:, ::12], sampling_rate_hz=RATE_HZ / 12)
