@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from math import pi
 from os import PathLike
@@ -12,7 +12,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gearsig.checks import FloatArray, frozen_array, instance_of, known_name, listed, number, one_of, positive, within
+from gearsig.checks import (
+    FloatArray,
+    frozen_array,
+    instance_of,
+    known_name,
+    listed,
+    number,
+    one_of,
+    positive,
+    short,
+    within,
+)
 from gearsig.errors import InputError
 from gearsig.formatting import counted
 from gearsig.results import verdict_html
@@ -501,7 +512,21 @@ class Recording:
             channels[i] = Channel(
                 old.name, sensor.quantity or old.quantity, sensor.unit or old.unit, sensor.position or old.position
             )
+        warnings += self._unmatched_sensors(rig)
         return replace(self, samples=samples, channels=tuple(channels), rig=rig, warnings=tuple(warnings))
+
+    def _unmatched_sensors(self, rig: Rig) -> Iterator[str]:
+        """Say so where the rig describes a channel that is not here, and one is here that it does not describe."""
+        described = [sensor.channel for sensor in rig.sensors]
+        missing = [name for name in described if name not in self.channel_names]
+        unknown = [name for name in self.channel_names if name not in (*described, getattr(rig.speed, "channel", ""))]
+        if missing and unknown:
+            here, there = (", ".join(map(short, names[:3])) + ", …" * (len(names) > 3) for names in (unknown, missing))
+            are = "is" if len(missing) == 1 else "are"
+            yield (
+                f"the rig file describes {counted(len(missing), 'channel')} that {are} not here ({there}) "
+                f"and nothing of {here}: compare the names"
+            )
 
     def between(self, start_s: float, end_s: float) -> Recording:
         """Return the part from `start_s` to `end_s`, whose time begins at 0 again; tachometer pulses go with it.

@@ -11,7 +11,7 @@ import pytest
 
 from gearsig.errors import InputError
 from gearsig.recording import SI_FACTORS, Channel, Recording, read_recording, si_factor
-from gearsig.rig import QUANTITIES, PulseTimes, Rig, Sensor
+from gearsig.rig import QUANTITIES, PulseTimes, Rig, Sensor, TachometerChannel
 
 
 def recording(unit: str) -> Recording:
@@ -31,6 +31,15 @@ def test_another_unit_without_a_scale_is_told() -> None:
 @pytest.mark.parametrize("unit", ["m/s^2", "m/s²", "m/s2", "m/s/s", "M/S**2", ""])
 def test_the_same_unit_or_none_is_no_contradiction(unit: str) -> None:
     assert recording(unit).with_rig(rig()).warnings == ()
+
+
+@pytest.mark.parametrize(("sensor", "is_said"), [("a1", False), ("a11", True), ("tacho", False)])
+def test_a_sensor_of_no_channel_beside_a_channel_of_no_sensor_is_told(sensor: str, *, is_said: bool) -> None:
+    """Of a1 and of the tachometer, which [speed] names, there is nothing to say; a11 is misspelt."""
+    described = Rig(sensors=(Sensor(sensor),), speed=TachometerChannel("tacho"))
+    whole = Recording(np.ones((2, 8)), 100.0, (Channel("a1"), Channel("tacho")))
+    warnings = whole.with_rig(described).warnings
+    assert [("'a11'" in text, "'a1'" in text) for text in warnings] == [(True, True)] * is_said
 
 
 def test_a_scale_converts_and_says_nothing() -> None:
