@@ -86,6 +86,7 @@ from gearsig.gap._places import (
     locate_mesh,
     locate_tail,
     ranked_places,
+    without_multiples,
     without_silent_races,
 )
 from gearsig.gap._population import (
@@ -422,6 +423,7 @@ __all__ = [
     "within_reach",
     "within_the_floor",
     "without_machines_of",
+    "without_multiples",
     "without_silent_races",
     "write_learned",
     "wrong_teeth",

@@ -22,7 +22,14 @@ from gearsig.gap._gearless import diagnose_gearless, place_of_unexpected, unexpe
 from gearsig.gap._inputs import is_gearless, twin_rig, with_stage
 from gearsig.gap._labelled import LabelledRecording, labelled_changes
 from gearsig.gap._next_recording import next_recordings, next_steps
-from gearsig.gap._places import compared_pair, counted_against, gap_places, ranked_places, without_silent_races
+from gearsig.gap._places import (
+    compared_pair,
+    counted_against,
+    gap_places,
+    ranked_places,
+    without_multiples,
+    without_silent_races,
+)
 from gearsig.gap._population import load_learned
 from gearsig.gap._reduction import ReducedRecording
 from gearsig.gap._report import (
@@ -513,9 +520,10 @@ def _posterior(
     known: Mapping[str, GapEffect],
     gap: Sequence[GapPlace],
 ) -> dict[str, float]:
-    """Return cause → probability, with what the whole gap, its places and the races' own lines say."""
+    """Return cause → probability, with what the whole gap, its places and the lines of shafts and races say."""
     posterior = within_the_floor(attribution.probabilities(), clearest.size.structural)
-    posterior = without_silent_races(posterior, [_beside_baseline(compared_pair, c) for c in conditions])
+    comparisons = [_beside_baseline(compared_pair, c) for c in conditions]
+    posterior = without_multiples(without_silent_races(posterior, comparisons), known, comparisons)
     return counted_against(posterior, known, gap, clearest.now.frame)
 
 

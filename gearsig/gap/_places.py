@@ -161,6 +161,45 @@ def without_silent_races(probabilities: Mapping[str, float], comparisons: Sequen
     return likeliest_first({name: p / total for name, p in weighted.items()})
 
 
+MULTIPLES_OF_ONE = 0.2
+"""Probability that multiples of a shaft's order come with a force that turns with it: its supports bend unevenly."""
+
+CLEAR_MULTIPLE = 2.0
+"""Floors by which a multiple rises clearly."""
+
+
+def without_multiples(
+    probabilities: Mapping[str, float], effects: Mapping[str, GapEffect], comparisons: Sequence[ComparedPair]
+) -> dict[str, float]:
+    """Return the probabilities with those of forces that turn with a shaft lowered where its multiples rose as well.
+
+    An unbalance makes the first order alone. Where the second or third of the same shaft rose clearly, and by half as
+    much at least, over the floors, it is multiplied by `MULTIPLES_OF_ONE`; then all are scaled to 1.
+
+    Parameters
+    ----------
+    probabilities : mapping
+        Cause → probability.
+    effects : mapping
+        Effect → whether it is such a force.
+    comparisons : sequence of ComparedPair
+        One per recording, of one rig.
+    """
+    if not any(_multiples_rose(comparison) for comparison in comparisons):
+        return dict(probabilities)
+    turning = {name for name, effect in effects.items() if effect.turns_with_shaft}
+    weighted = {name: p * (MULTIPLES_OF_ONE if name in turning else 1.0) for name, p in probabilities.items()}
+    total = sum(weighted.values())
+    return likeliest_first({name: p / total for name, p in weighted.items()})
+
+
+def _multiples_rose(comparison: ComparedPair) -> bool:
+    first = {side: comparison.size[f"shaft.{side}.1"] for side in SIDES}
+    side = max(first, key=lambda shaft: first[shaft])
+    multiple = max(comparison.size[f"shaft.{side}.{k}"] for k in (2, 3))
+    return multiple >= max(CLEAR_MULTIPLE, first[side] / 2)
+
+
 def _silent_races(comparison: ComparedPair) -> set[str]:
     """Return the effects whose race has no lines that rose, and more than the shafts' own in the envelope did.
 

@@ -35,6 +35,8 @@ class GapEffect:
     profile_varies_with : str
         Name of its severity or of an option with which the course of its change over a tooth's engagement varies
         steadily, so that it can be interpolated; empty: it varies with nothing.
+    turns_with_shaft : bool
+        Whether it is a force that turns with a shaft, which of a linear machine makes the first order alone.
     """
 
     name: str
@@ -49,6 +51,7 @@ class GapEffect:
     moves_pitches: float = 0.0
     is_on_every_tooth: bool = False
     profile_varies_with: str = ""
+    turns_with_shaft: bool = False
 
 
 @dataclass(frozen=True)

@@ -183,6 +183,7 @@ def as_gap_effect(shown: Effect) -> GapEffect:
         shown.moves_pitches,
         shown.is_on_every_tooth,
         shown.profile_varies_with,
+        shown.turns_with_shaft,
     )
 
 

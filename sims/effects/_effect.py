@@ -250,6 +250,8 @@ class Effect:
     profile_varies_with : str
         Name of its severity or of an option with which the profile of its change over a tooth's engagement varies
         steadily; empty: it varies with nothing.
+    turns_with_shaft : bool
+        Whether it is a force that turns with a shaft: of a linear machine it makes the first order and no multiple.
     """
 
     name: str
@@ -267,6 +269,7 @@ class Effect:
     moves_pitches: float = 0.0
     is_on_every_tooth: bool = False
     profile_varies_with: str = ""
+    turns_with_shaft: bool = False
 
     def __post_init__(self) -> None:
         if not self.name.isidentifier():  # it stands in --effect NAME=SEVERITY, in addresses and in tables

@@ -80,4 +80,5 @@ EFFECT = Effect(
         "the shaft's first order",
         textbook_signature,
     ),
+    turns_with_shaft=True,
 )

@@ -24,8 +24,10 @@ from gearsig.gap import (
     locate_all_round,
     locate_mesh,
     reduce_recording,
+    without_multiples,
     without_silent_races,
 )
+from sims.effects import as_gap_effect, effect
 from tests.gap.synthetic import RIG, SPEED_HZ, TEETH, record, ringing
 
 Added = Callable[[FloatArray, FloatArray], FloatArray]
@@ -71,6 +73,16 @@ def test_only_a_race_with_lines_of_its_own_is_not_counted_against() -> None:
     found = {"bearing_outer_race": 0.5, "root_crack": 0.3, "none": 0.2}
     assert without_silent_races(found, [rolling]) == without_silent_races(found, [striking, rolling]) == found
     assert without_silent_races(found, [striking])["bearing_outer_race"] == pytest.approx(0.1 / 0.6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("multiples", "expected"), [((1.0,), 0.5), ((1.0, 3.0), 0.1 / 0.6)])
+def test_a_force_that_turns_makes_no_multiples(multiples: tuple[float, ...], expected: float) -> None:
+    now = reduce_recording(record(lambda _, r: sum(2.0 * np.cos(2 * np.pi * k * r) for k in multiples), seed=1), RIG)
+    compared = compared_pair(now, healthy(), floor(True), change_features(now, healthy()), is_reference=True)
+    found, known = {"unbalance": 0.5, "misalignment": 0.3, "unknown": 0.2}, {"unbalance", "misalignment"}
+    lowered = without_multiples(found, {name: as_gap_effect(effect(name)) for name in known}, [compared])
+    assert lowered["unbalance"] == pytest.approx(expected)
 
 
 def test_a_mesh_that_swells_and_fades_is_no_line_that_belongs_to_no_shaft() -> None:
