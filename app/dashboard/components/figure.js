@@ -60,12 +60,11 @@ class Figure {
   // ---------- what is looked at
 
   look(range, across = this.across) {
-    const least = (this.whole[1] - this.whole[0]) * 1e-6;
+    const widest = this.whole[1] - this.whole[0];
     let [low, high] = range;
-    if (high - low < least) high = low + least;
-    const span = Math.min(high - low, this.whole[1] - this.whole[0]);
+    const span = Math.max(high - low, widest * 1e-6);
     low = Math.max(this.whole[0], Math.min(low, this.whole[1] - span));
-    this.view = [low, low + span];
+    this.view = span < widest ? [low, low + span] : [...this.whole]; // low + span may round to less than all of it
     this.across = across; // of a plane: the values shown
     const asked = (this.asked = [...this.view, ...(across ?? [])]);
     this.draw();
