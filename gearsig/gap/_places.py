@@ -37,7 +37,7 @@ from gearsig.gap._floors import (
     kinds_of,
 )
 from gearsig.gap._reduction import DRIVER, N_MAINS_HARMONICS, N_MESH_HARMONICS, GearFrame, ReducedRecording, shaft_words
-from gearsig.gap._report import UNKNOWN, GapPlace, PlaceKind, likeliest_first
+from gearsig.gap._report import NONE, UNKNOWN, GapPlace, PlaceKind, likeliest_first
 from gearsig.gap._simulator import GapEffect
 from gearsig.prepared import MAINS_TOLERANCE
 from gearsig.recording import MAINS_HZ
@@ -103,6 +103,9 @@ def _joined(unexpected: GapPlace, same: Sequence[GapPlace]) -> GapPlace:
 MAX_SHARE_OF_REST = 0.5
 """Share of the gap from which one order is more of it than all else."""
 
+NOT_OF_HEALTHY = 3.0
+"""Structural floors of an order from which it is no matter of healthy machines' differences."""
+
 
 def counted_against(
     probabilities: Mapping[str, float], effects: Mapping[str, GapEffect], places: Sequence[GapPlace], frame: GearFrame
@@ -111,7 +114,8 @@ def counted_against(
 
     A cause of 2 % of a gap is hardly its cause: p → 2 (1 − s) p for a share s of more than a half; unknown gets the
     rest. Only orders count against an effect, lines at their place in the spectrum: noise, tails and envelopes at a
-    shaft's multiples follow from much that theory does not list.
+    shaft's multiples follow from much that theory does not list. They count against no gap as well, where healthy
+    machines are far from them.
 
     Parameters
     ----------
@@ -130,6 +134,8 @@ def counted_against(
         for name in probabilities.keys() & effects.keys():
             if not _can_make(effects[name].shows_in, place):
                 lowered[name] *= 2.0 * (1.0 - place.share)
+        if place.structural >= NOT_OF_HEALTHY:
+            lowered[NONE] *= 2.0 * (1.0 - place.share)
     lowered[UNKNOWN] += 1.0 - sum(lowered.values())
     return likeliest_first(lowered)
 

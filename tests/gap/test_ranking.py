@@ -15,7 +15,7 @@ NAN = float("nan")
 def place(kind: PlaceKind, share: float, order: float = 0.0, *, follows: bool = False) -> GapPlace:
     orders = (order,) if order else ()
     return GapPlace(
-        kind, f"{kind.value} {share}", 10.0, 9.0, 3.0, NAN if follows else share, orders=orders, follows=follows
+        kind, f"{kind.value} {share}", 10.0, 9.0, 2.0, NAN if follows else share, orders=orders, follows=follows
     )
 
 
@@ -57,6 +57,8 @@ def test_an_order_that_is_most_of_the_gap_counts_against_what_cannot_make_it() -
     assert strange["misalignment"] == pytest.approx(0.04 * 0.8)
     assert strange[UNKNOWN] == pytest.approx(0.05 + 0.96 * 0.8)
     assert [strange[name] for name in ("bearing", "of my own", "none")] == [0.05, 0.05, 0.05]
+    far = replace(place(PlaceKind.LINE, 0.98, 3.35), structural=4.0)
+    assert against(far)["none"] == pytest.approx(0.04 * 0.05)  # healthy machines do not have it either
     assert against(place(PlaceKind.SHAFT, 0.98, 2.0))["misalignment"] == 0.8
     assert against(place(PlaceKind.SHAFT, 0.98, 2.0))["bearing"] < 0.01
 
