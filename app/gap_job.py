@@ -159,7 +159,7 @@ class JobFailedError(GearsigError):
 
 @dataclass(frozen=True)
 class _JobRequest:
-    asked: GapRequest
+    gap: GapRequest
     model: str
     cache: Path | None
     command: str
@@ -172,7 +172,7 @@ class Job:
     ----------
     folder : Path
         From `private_folder`; holds the uploads, too. The job owns it.
-    asked, model, cache, command
+    request, model, cache, command
         See `run_gap` and the page's command.
     """
 
@@ -301,7 +301,7 @@ def main(folder: Path) -> int:
     )
     try:
         with one_pool(PROCESSES):
-            report = run_gap(request.asked, request.model, cache=request.cache, on_stage=_Progress(folder / PROGRESS))
+            report = run_gap(request.gap, request.model, cache=request.cache, on_stage=_Progress(folder / PROGRESS))
             write_results(report, folder / RESULTS, command=request.command)
     except GearsigError as error:
         write_text(folder / ERROR, error_to_json(error))

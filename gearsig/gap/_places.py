@@ -103,19 +103,22 @@ def _joined(unexpected: GapPlace, same: Sequence[GapPlace]) -> GapPlace:
 MAX_SHARE_OF_REST = 0.5
 """Share of the gap from which one order is more of it than all else."""
 
-NOT_OF_HEALTHY = 3.0
+FAR_FROM_HEALTHY = 3.0
 """Structural floors of an order from which it is no matter of healthy machines' differences."""
+
+N_FIRST_ORDERS = 3
+"""Multiples of a shaft that faults of it raise, and hardly anything beside the machine: it would have to turn along."""
 
 
 def counted_against(
     probabilities: Mapping[str, float], effects: Mapping[str, GapEffect], places: Sequence[GapPlace], frame: GearFrame
 ) -> dict[str, float]:
-    """Return the probabilities with those of effects lowered that cannot make the order that is most of the gap.
+    """Return the probabilities with those of causes lowered that cannot make the order that is most of the gap.
 
     A cause of 2 % of a gap is hardly its cause: p → 2 (1 − s) p for a share s of more than a half; unknown gets the
     rest. Only orders count against an effect, lines at their place in the spectrum: noise, tails and envelopes at a
-    shaft's multiples follow from much that theory does not list. They count against no gap as well, where healthy
-    machines are far from them.
+    shaft's multiples follow from much that theory does not list. Where healthy machines are far from them they count
+    against no gap as well, and the first orders of a shaft against unknown; the others share that.
 
     Parameters
     ----------
@@ -128,16 +131,25 @@ def counted_against(
     frame : GearFrame
     """
     lowered = dict(probabilities)
-    for place in (
-        candidate for candidate in places if candidate.share > MAX_SHARE_OF_REST and _is_an_order(candidate, frame)
-    ):
+    largest = [place for place in places if place.share > MAX_SHARE_OF_REST and _is_an_order(place, frame)]
+    for place in largest:
         for name in probabilities.keys() & effects.keys():
             if not _can_make(effects[name].shows_in, place):
                 lowered[name] *= 2.0 * (1.0 - place.share)
-        if place.structural >= NOT_OF_HEALTHY:
-            lowered[NONE] *= 2.0 * (1.0 - place.share)
     lowered[UNKNOWN] += 1.0 - sum(lowered.values())
-    return likeliest_first(lowered)
+    for place in largest:
+        if place.structural >= FAR_FROM_HEALTHY:
+            for name in (NONE, *([UNKNOWN] if _is_first_of_a_shaft(place, frame) else [])):
+                lowered[name] *= 2.0 * (1.0 - place.share)
+    total = sum(lowered.values())
+    return likeliest_first({name: p / total for name, p in lowered.items()})
+
+
+def _is_first_of_a_shaft(place: GapPlace, frame: GearFrame) -> bool:
+    turns = np.divide(place.orders[0], frame.shaft_orders) if place.orders else np.zeros(1)
+    near = np.round(turns)
+    is_multiple = (near >= 1) & (near <= N_FIRST_ORDERS) & (np.abs(turns - near) <= SAME_ORDER * near)
+    return place.kind is PlaceKind.SHAFT and bool(is_multiple.any())
 
 
 RACES = {"bearing_outer_race": "outer", "bearing_inner_race": "inner"}

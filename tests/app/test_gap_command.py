@@ -210,13 +210,13 @@ def rig_with(**changes: object) -> dict[str, object]:
 )
 def test_recordings_of_different_rigs_are_refused(tmp_path, changes, what) -> None:
     other = copied(tmp_path, "other", **changes)
-    for asked in (
+    for request in (
         GapRequest((CRACKED, other), rig=RIG),
         GapRequest((CRACKED, other)),
         GapRequest((CRACKED,), (other,)),
     ):
         with pytest.raises(InputError) as refused:
-            read_gap_inputs(asked)
+            read_gap_inputs(request)
         assert what in str(refused.value)
         assert "other.h5" in str(refused.value)
 

@@ -77,13 +77,13 @@ def test_uploads_become_files_with_their_own_rigs(tmp_path) -> None:
         reference_rate_hz=51200.0,
         run_up=upload("rising.h5", HEALTHY.with_name("root_crack_2mm.h5").read_bytes()),
     )
-    asked = files_of(choice, tmp_path)
-    assert all(tmp_path in path.parents for path in (*asked.recordings, *asked.references, asked.run_up))
-    assert asked.names == ("../a run.h5", "b.h5")
-    inputs = read_gap_inputs(asked)
+    request = files_of(choice, tmp_path)
+    assert all(tmp_path in path.parents for path in (*request.recordings, *request.references, request.run_up))
+    assert request.names == ("../a run.h5", "b.h5")
+    inputs = read_gap_inputs(request)
     torques = [r.rig.operating_point.torque_nm for r in (*inputs.recordings, *inputs.references, inputs.run_up)]
     assert torques == [110.0, 55.0, 55.0, 110.0]
-    assert asked.reference_rate_hz == 51200.0
+    assert request.reference_rate_hz == 51200.0
     assert "--reference-fs 51200" in choice.command
     assert "--rig gearbox.toml" in choice.command
     assert "--run-up rising.h5" in choice.command

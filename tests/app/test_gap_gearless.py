@@ -134,16 +134,18 @@ def test_a_reference_at_another_rate_is_read_at_its_own(tmp_path: Path) -> None:
     write_rig(RIG, tmp_path / "rig.toml")
     for name in ("now", "then"):
         np.savetxt(tmp_path / f"{name}.csv", np.random.default_rng(0).standard_normal(4000), header="a1", comments="")
-    asked = GapRequest((tmp_path / "now.csv",), (tmp_path / "then.csv",), tmp_path / "rig.toml", sampling_rate_hz=12e3)
+    request = GapRequest(
+        (tmp_path / "now.csv",), (tmp_path / "then.csv",), tmp_path / "rig.toml", sampling_rate_hz=12e3
+    )
 
     def rates(request: GapRequest) -> list[float]:
         inputs = read_gap_inputs(request)
         return [r.sampling_rate_hz for r in (*inputs.recordings, *inputs.references)]
 
-    assert rates(asked) == [12e3, 12e3]
-    assert rates(replace(asked, reference_rate_hz=48e3)) == [12e3, 48e3]
+    assert rates(request) == [12e3, 12e3]
+    assert rates(replace(request, reference_rate_hz=48e3)) == [12e3, 48e3]
     write_rig(replace(RIG, sampling_rate_hz=24e3), tmp_path / "then.toml")
-    assert rates(asked) == [12e3, 24e3]
+    assert rates(request) == [12e3, 24e3]
 
 
 @pytest.mark.slow

@@ -57,8 +57,13 @@ def test_an_order_that_is_most_of_the_gap_counts_against_what_cannot_make_it() -
     assert strange["misalignment"] == pytest.approx(0.04 * 0.8)
     assert strange[UNKNOWN] == pytest.approx(0.05 + 0.96 * 0.8)
     assert [strange[name] for name in ("bearing", "of my own", "none")] == [0.05, 0.05, 0.05]
-    far = replace(place(PlaceKind.LINE, 0.98, 3.35), structural=4.0)
-    assert against(far)["none"] == pytest.approx(0.04 * 0.05)  # healthy machines do not have it either
+    far = replace(place(PlaceKind.LINE, 0.98, 3.35), structural=4.0)  # healthy machines do not have it either
+    assert against(far)["none"] == pytest.approx(0.04 * 0.05 / (1.0 - 0.96 * 0.05))
+    second = against(replace(place(PlaceKind.SHAFT, 0.98, 2.0), structural=4.0))
+    assert second[UNKNOWN] < 0.01  # nothing beside the machine turns along
+    assert second["misalignment"] > 0.9
+    seventh = against(replace(place(PlaceKind.SHAFT, 0.98, 7.0), structural=4.0))
+    assert seventh[UNKNOWN] > 0.05
     assert against(place(PlaceKind.SHAFT, 0.98, 2.0))["misalignment"] == 0.8
     assert against(place(PlaceKind.SHAFT, 0.98, 2.0))["bearing"] < 0.01
 

@@ -113,7 +113,7 @@ class Finished:
 
 @dataclass
 class _Running:
-    """A job, and what it was asked."""
+    """A job, and what it diagnoses."""
 
     choice: Choice
     job: Job
