@@ -106,8 +106,8 @@ MAX_SHARE_OF_REST = 0.5
 FAR_FROM_HEALTHY = 3.0
 """Structural floors of an order from which it is no matter of healthy machines' differences."""
 
-N_FIRST_ORDERS = 3
-"""Multiples of a shaft that faults of it raise, and hardly anything beside the machine: it would have to turn along."""
+N_FIRST_ORDERS = 2
+"""Multiples of a shaft that hardly anything but its own faults raises alone: it would have to turn along."""
 
 
 def counted_against(
