@@ -182,8 +182,8 @@ def without_silent_races(probabilities: Mapping[str, float], comparisons: Sequen
 MULTIPLES_OF_ONE = 0.2
 """Probability that multiples of a shaft's order come with a force that turns with it: its supports bend unevenly."""
 
-CLEAR_MULTIPLE = 2.0
-"""Floors by which a multiple rises clearly."""
+CLEAR_MULTIPLE, STRONG_MULTIPLE = 2.0, 0.1
+"""Floors by which a multiple rises clearly, and its power beside the first order's from which it is no by-product."""
 
 
 def without_multiples(
@@ -191,8 +191,8 @@ def without_multiples(
 ) -> dict[str, float]:
     """Return the probabilities with those of forces that turn with a shaft lowered where its multiples rose as well.
 
-    An unbalance makes the first order alone. Where the second or third of the same shaft rose clearly, and by half as
-    much at least, over the floors, it is multiplied by `MULTIPLES_OF_ONE`; then all are scaled to 1.
+    An unbalance makes the first order alone. Where the second or third of the same shaft rose clearly, and are strong
+    beside it, it is multiplied by `MULTIPLES_OF_ONE`; then all are scaled to 1.
 
     Parameters
     ----------
@@ -212,10 +212,13 @@ def without_multiples(
 
 
 def _multiples_rose(comparison: ComparedPair) -> bool:
-    first = {side: comparison.size[f"shaft.{side}.1"] for side in SIDES}
-    side = max(first, key=lambda shaft: first[shaft])
-    multiple = max(comparison.size[f"shaft.{side}.{k}"] for k in (2, 3))
-    return multiple >= max(CLEAR_MULTIPLE, first[side] / 2)
+    side = max(SIDES, key=lambda side: comparison.size[f"shaft.{side}.1"])
+    averages = comparison.now.averages(SIDES.index(side))
+    power = np.mean([np.abs(average.lines[:4]) ** 2 for average in averages], axis=0)
+    return any(
+        comparison.size[f"shaft.{side}.{k}"] >= CLEAR_MULTIPLE and power[k] >= STRONG_MULTIPLE * power[1]
+        for k in (2, 3)
+    )
 
 
 def _silent_races(comparison: ComparedPair) -> set[str]:

@@ -22,6 +22,7 @@ from gearsig.prepared._lines import (
     best_comb,
     lines_over_noise_floor,
     over_floor_db,
+    parabola_peak,
     peak_position,
 )
 from gearsig.recording import MAINS_HZ, Recording
@@ -114,9 +115,17 @@ def phase_followed_angle(recording: Recording, rig: Rig, estimated: ShaftAngle) 
 
 
 def _refined(recording: Recording, rig: Rig, stated: ShaftAngle) -> ShaftAngle:
-    """Return the speed that mesh lines or shaft harmonics show near the stated one, else the stated one."""
+    """Return the speed that mesh lines or shaft harmonics show near the stated one, else the stated one.
+
+    Raises
+    ------
+    RefusalError
+        If the strongest line near it wanders, so that there is no one speed.
+    """
     by_lines = _from_meshes(recording, rig, stated) if rig.pairs else _from_shaft_harmonics(recording, stated)
     if by_lines is None:
+        if not rig.pairs:
+            _refuse_a_wandering_speed(recording, stated)
         return replace(
             stated, quality=0.5, notes=(*stated.notes, "The stated speed could not be confirmed from the signal.")
         )
@@ -124,6 +133,46 @@ def _refined(recording: Recording, rig: Rig, stated: ShaftAngle) -> ShaftAngle:
     lines_say = f"the signal's own lines say {by_lines.mean_speed_rpm:.6g} rpm ({signed(difference, 2)} %)"
     note = f"Stated {stated.mean_speed_rpm:.6g} rpm; {lines_say}."
     return replace(by_lines, shaft=stated.shaft, notes=(*by_lines.notes, note))
+
+
+BLOCK_REV, MIN_BLOCKS, MAX_BLOCKS = 32, 8, 64
+"""Revolutions of a block in which a rotor's own line is sought, and how many blocks, at half overlap or wider apart."""
+
+NEAR, CLEAR_OF_BLOCK = 0.25, 6.0
+"""How far from the stated speed it is sought, relatively, and its height over the median there: of noise the largest of
+so many lines reaches twice that."""
+
+WANDERS = 0.02
+"""Relative range over the record from which a line has no one frequency; a motor's load moves it by less."""
+
+
+def _refuse_a_wandering_speed(recording: Recording, stated: ShaftAngle) -> None:
+    """Refuse a constant speed where a rotor's own line runs through a range of speeds, from block to block steadily.
+
+    Lines over the angle of a constant speed would be smeared, and what does not show in them would be called sound.
+    """
+    from scipy.fft import rfft
+
+    n = round(BLOCK_REV * recording.sampling_rate_hz * 60 / stated.mean_speed_rpm)
+    n_blocks = min(2 * recording.n_samples // n - 1, MAX_BLOCKS)
+    if n_blocks < MIN_BLOCKS:
+        return
+    starts = np.linspace(0, recording.n_samples - n, n_blocks).astype(np.intp)
+    first, last = (round(BLOCK_REV * (1.0 + side * NEAR)) for side in (-1, 1))
+    window, places = np.hanning(n).astype(np.float32), np.arange(first, last + 1) / BLOCK_REV
+    for name in recording.vibration_names():
+        values = recording.values(name)
+        spectra = np.stack([np.abs(rfft(values[i : i + n] * window)[first : last + 1]) for i in starts])
+        stands_out = spectra.max(axis=1) >= CLEAR_OF_BLOCK * np.median(spectra, axis=1)
+        orders = [parabola_peak(row, places, 1.0 / BLOCK_REV, row.argmax()) for row in spectra[stands_out]]
+        rpm = np.array(orders) * stated.mean_speed_rpm
+        low, high = np.quantile(rpm, [0.05, 0.95]) if stands_out.mean() >= 0.8 else (0.0, 0.0)
+        if high - low > WANDERS * stated.mean_speed_rpm and np.median(np.abs(np.diff(rpm))) < (high - low) / 5:
+            raise RefusalError(
+                f"the speed is stated as constant, {stated.mean_speed_rpm:.4g} rpm, and the strongest line of {name} "
+                f"near it runs from {low:.4g} to {high:.4g} rpm",
+                remedy="give a tachometer or a speed channel",
+            )
 
 
 def _rescaled(recording: Recording, rig: Rig, measured: ShaftAngle) -> ShaftAngle:

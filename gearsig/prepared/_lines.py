@@ -459,7 +459,7 @@ def _fit_to_peaks(values, at, resolution, floor, masked, origins, multiples, fun
             ratio_db = _over_floor_db(values[i], floor[i])
             if ratio_db < CLEAR_LINE_DB or masked[i]:
                 continue
-            peaks[n], positions[n], ratios_db[n] = i, _peak_position(values, at, resolution, i), ratio_db
+            peaks[n], positions[n], ratios_db[n] = i, parabola_peak(values, at, resolution, i), ratio_db
             clearness = 10.0 ** (min(ratio_db, 30.0) / 10.0)
             weights += clearness * multiples[k] ** 2
             products += clearness * multiples[k] * (positions[n] - origins[k])
@@ -471,7 +471,7 @@ def _fit_to_peaks(values, at, resolution, floor, masked, origins, multiples, fun
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _peak_position(values, at, resolution, i):  # type: ignore[no-untyped-def]
+def parabola_peak(values, at, resolution, i):  # type: ignore[no-untyped-def]
     if not 0 < i < len(values) - 1:
         return at[i]
     before, middle, after = np.log(np.maximum(values[i - 1 : i + 2], 1e-300))
@@ -487,7 +487,7 @@ def peak_position(spectrum: Spectrum, i: int) -> float:
     i : int
         Number of the line. The first and the last have one neighbour only, and stay where they are.
     """
-    return float(_peak_position(spectrum.values, spectrum.positions, spectrum.resolution, i))
+    return float(parabola_peak(spectrum.values, spectrum.positions, spectrum.resolution, i))
 
 
 # --------------------

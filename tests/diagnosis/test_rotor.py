@@ -70,6 +70,24 @@ def test_a_good_nominal_speed_stands_for_a_stated_one(tolerance_percent: float, 
         assert "the nominal speed may be 20 % off" in finding(analysis, "speed-unknown").evidence[0]
 
 
+@pytest.mark.parametrize("drift", [0.0, 0.04])
+def test_a_constant_speed_is_refused_where_the_shaft_s_line_runs_through_a_range(drift: float) -> None:
+    """Smeared lines of a damaged race show nothing, which is not said of a sound bearing."""
+    rng, seconds, rate_hz = np.random.default_rng(3), 20.0, 4096.0
+    time_s = np.arange(int(seconds * rate_hz)) / rate_hz
+    turns = 25.0 * (time_s + drift * (time_s**2 / seconds - time_s))
+    depth = 1.0 + sum(0.3 * np.cos(2 * np.pi * k * 3.58 * turns) for k in (1, 2, 3))
+    x = 0.5 * np.cos(2 * np.pi * turns) + depth * rng.standard_normal(len(turns))
+    recording = Recording(
+        x[None], rate_hz, (Channel("a1", "acceleration", "m/s^2"),), ConstantSpeed(1500.0, "rotor"), ROLLING
+    )
+    analysis = analyze(recording)
+    if drift:
+        assert "runs from 14" in finding(analysis, "speed-unknown").evidence[0]
+    else:
+        assert codes(analysis, *CLAIMS) == ["bearing-outer-race"]
+
+
 def test_lines_of_the_mains_are_no_half_orders() -> None:
     """Of a shaft at a third of 100 Hz, 1.5, 4.5 and 7.5 times its speed are multiples of 50 Hz."""
     hum = record(HEALTHY | {k + 0.5: 0.03 for k in (1, 4, 7)})
