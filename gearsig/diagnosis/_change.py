@@ -33,6 +33,7 @@ from gearsig.diagnosis._rotor import (
 from gearsig.diagnosis._signals import AnalysisSignals, BandEnvelope, is_of_tones, without_shafts
 from gearsig.diagnosis._types import (
     CHANGED,
+    LEVELS_MATCH,
     MIN_CHANGE_DB,
     UNCHANGED,
     WITH_ASSUMED_DATA,
@@ -721,7 +722,7 @@ def _unchanged(changes: Sequence[LevelChange]) -> Finding:
     return Finding(
         UNCHANGED,
         Kind.INFORMATION,
-        f"Levels are those of the reference: none has changed by {MIN_CHANGE_DB:.0f} dB and beyond its scatter.",
+        f"{LEVELS_MATCH}: none has changed by {MIN_CHANGE_DB:.0f} dB or more, beyond its scatter.",
         confidence=0.9,
         confidence_basis=f"{len(changes)} levels: shafts, meshes, sidebands, bearings, noise; segment against segment",
         evidence=evidence,

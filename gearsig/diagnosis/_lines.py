@@ -483,6 +483,8 @@ def _unexplained(signals: AnalysisSignals, trains: Sequence[float]) -> Finding |
             ratio = signals.rig.ratio(bearing.shaft)
             for order in bearing.orders().values() if ratio is not None else ():
                 excess = _without_bearing(excess, order * (ratio or 1.0))  # noqa: PLW2901
+        for train in trains:
+            excess = _without_low_multiples(excess, train, skirt=SPREAD_OF_FOUND)  # noqa: PLW2901
         spectrum = excess.spectrum
         with np.errstate(divide="ignore", invalid="ignore"):
             clear = 20 * np.log10(spectrum.values / excess.floor) > UNEXPLAINED_DB
@@ -501,9 +503,8 @@ def _unexplained(signals: AnalysisSignals, trains: Sequence[float]) -> Finding |
     origin = combination(signals, line.position, excess.spectrum, trains)
     if not origin and hunting is not None and _is_among_multiples(excess, line.position, hunting[0]):
         origin = hunting[1]
-    title = (
-        "The strongest line of no single shaft or mesh" if origin else "The strongest line of no known shaft or mesh"
-    )
+    known = "shaft or mesh" if signals.rig.pairs else "shaft"
+    title = f"The strongest line of no {'single' if origin else 'known'} {known}"
     evidence = [] if origin or hunting is None else [f"It is near {hunting[1]}, as chance may have it."]
     pull = "" if signals.speed_varies else magnetic_pull_at(line.position * signals.frequency_per_order_hz)
     if signals.rig.bearings:
@@ -529,7 +530,17 @@ multiples with their slip would cover a large part of any spectrum, and hide wha
 
 def _without_bearing(excess: LinesOverFloor, order: float) -> LinesOverFloor:
     """Mask the first multiples of an order of a bearing, with 2 % of the order to either side for its slip."""
-    every = excess.without_multiples(order, half_width=0.02 * order).masked
+    return _without_low_multiples(excess, order, half_width=0.02 * order)
+
+
+SPREAD_OF_FOUND = 2e-3
+"""Relative width of the multiples of a family that was found: how well its order is known, and how far it wanders."""
+
+
+def _without_low_multiples(
+    excess: LinesOverFloor, order: float, *, half_width: float = 0.0, skirt: float = 0.0
+) -> LinesOverFloor:
+    every = excess.without_multiples(order, half_width=half_width, skirt=skirt).masked
     is_low = excess.spectrum.positions <= (BEARING_MULTIPLES + 0.5) * order
     return replace(excess, masked=excess.masked | (every & is_low))
 

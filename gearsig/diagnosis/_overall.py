@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from gearsig.diagnosis._signals import AnalysisSignals
-from gearsig.diagnosis._types import Finding, Kind, Strength, Where
+from gearsig.diagnosis._types import VIBRATION_ZONE, Finding, Kind, Strength, Where
 from gearsig.formatting import percent
 from gearsig.indicators import ZONE_LIMITS_MM_PER_S, Indicator, velocity_band_hz, velocity_shares, vibration_zone
 from gearsig.rig import MachineSize
 
-VIBRATION_ZONE = "vibration-zone"
+OVERALL_VELOCITY = "overall-velocity"
+"""Code of the finding of the overall velocity where the zones are not known."""
+
 STANDARD = "ISO 20816-3"
 MEANINGS = {
     "A": "as of machines newly set to work",
-    "B": "fit for service without limit",
-    "C": "not fit for long service: find the cause at the next opportunity",
+    "B": "fit for unrestricted long-term operation",
+    "C": "not fit for long-term operation: find the cause at the next opportunity",
     "D": "severe enough to damage the machine",
 }
 CAN_DO_THAT = "can do that."
@@ -84,14 +86,18 @@ def detect_vibration_zone(signals: AnalysisSignals, indicators: Iterable[Indicat
 def _without_zone(signals: AnalysisSignals, largest: Indicator) -> Finding:
     """Return the overall velocity of a machine whose zones are not known, and what makes most of it."""
     source, causes = _source(signals, largest)
+    lowest = min(limits[2] for limits in ZONE_LIMITS_MM_PER_S.values())
+    is_loud = largest.value > lowest
+    loud = f", which is zone D of {STANDARD} for some machines" if is_loud else ""
     return Finding(
-        "overall-velocity",
-        Kind.INFORMATION,
-        f"Overall vibration {largest.value:.3g} mm/s rms in channel {largest.channel}, {largest.band}"
+        OVERALL_VELOCITY,
+        Kind.NOTICE if is_loud else Kind.INFORMATION,
+        f"Overall vibration {largest.value:.3g} mm/s rms in channel {largest.channel}, {largest.band}{loud}"
         f"{f'; {source}' if source else ''}.",
         Where((largest.channel,)),
         confidence_basis="direct measurement",
         evidence=(*_possible(source, causes), f"Zones of {STANDARD} need [machine] in the rig file."),
+        surer="[machine] in the rig file, with power and mounting." if is_loud else "",
     )
 
 

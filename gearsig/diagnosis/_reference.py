@@ -178,7 +178,7 @@ def reference_not_healthy(reference: Analysis, *, shows_fault: bool) -> list[Fin
         Finding(
             REFERENCE_NOT_HEALTHY,
             Kind.DATA_PROBLEM,
-            f"The reference is not healthy itself: {fault.title.removesuffix('.')} (at most "
+            f"The reference may not be healthy itself: {fault.title.removesuffix('.')} (at most "
             f"{percent(fault.confidence)} sure).{exchanged}",
             fault.where,
             fault.strength,

@@ -50,8 +50,14 @@ MIN_CHANGE_DB = 6.0
 CHANGED, UNCHANGED = "changed-since-reference", "unchanged-since-reference"
 """Codes of the findings that levels have changed since the reference, or not."""
 
+LEVELS_MATCH = "Levels match the reference"
+"""Begins the title of the second of them."""
+
 REFERENCE_UNFIT, REFERENCE_NOT_HEALTHY = "reference-unfit", "reference-not-healthy"
 """Codes of the findings that a given reference is not compared, and why; and that it shows a fault itself."""
+
+VIBRATION_ZONE = "vibration-zone"
+"""Code of the finding in which zone of ISO 20816-3 a machine vibrates; of the zones C and D a notice."""
 
 HINDERING = (
     *("channel-clipped", "channel-stuck", "channel-dead", "channel-wrapped", "channel-stepped", "channel-reversed"),
@@ -344,11 +350,14 @@ class Analysis(Result, rows="findings"):
 
 
 def outcome_of(findings: Sequence[Finding]) -> Outcome:
-    """Return what findings come to; "no fault" only where all that the rig describes could be examined."""
+    """Return what findings come to; "no fault" only where all that the rig describes could be examined.
+
+    A machine in zone C or D of ISO 20816-3 is suspicious, whether anything shows the cause or not.
+    """
     kinds = {finding.kind for finding in findings}
     if Kind.FAULT in kinds:
         return Outcome.FAULT
-    if Kind.SUSPICION in kinds:
+    if Kind.SUSPICION in kinds or any(f.code == VIBRATION_ZONE and f.kind is Kind.NOTICE for f in findings):
         return Outcome.SUSPICION
     examined = any(f.code in EXAMINED for f in findings)
     hindered = Kind.CANNOT_TELL in kinds or any(f.code in HINDERING for f in findings)

@@ -7,15 +7,17 @@ from dataclasses import replace
 
 from gearsig.angle import ShaftAngle
 from gearsig.diagnosis._lines import MESH_ELSEWHERE, NEAR_ZERO, SPEED_UNKNOWN, SURER_BEYOND_ZERO
-from gearsig.diagnosis._overall import CAN_DO_THAT, VIBRATION_ZONE
+from gearsig.diagnosis._overall import CAN_DO_THAT, OVERALL_VELOCITY
 from gearsig.diagnosis._sampling_rate import SAMPLING_RATE
 from gearsig.diagnosis._types import (
     CHANGED,
     EXAMINED,
     HINDERING,
+    LEVELS_MATCH,
     REFERENCE_NOT_HEALTHY,
     REFERENCE_UNFIT,
     UNCHANGED,
+    VIBRATION_ZONE,
     CannotTell,
     Finding,
     Kind,
@@ -35,7 +37,7 @@ DEPTH_UNKNOWN = "crack-depth-unknown"
 NOT_ALONE = "{} and misalignment would only show against an earlier recording."
 """What one recording alone does not tell: its lines are those of healthy machines, only higher."""
 
-NO_FAULT = "No fault shows."
+NO_FAULT, CANNOT_TELL = "No fault shows.", "Cannot tell."
 
 SURER_WITH, WHAT_WOULD_HELP = "Surer with: ", "What would help: "
 """Open the last sentence of a verdict that cannot tell."""
@@ -61,19 +63,22 @@ def verdict_of(findings: tuple[Finding, ...], *, has_reference: bool = False) ->
     doubt = said_first(findings, claims=outcome_of(findings) in (Outcome.FAULT, Outcome.SUSPICION))
     unfit = next((f.title for f in findings if f.code in (REFERENCE_UNFIT, REFERENCE_NOT_HEALTHY)), "")
     zoned = next((f for f in findings if f.code == VIBRATION_ZONE and f.kind is Kind.NOTICE), None)
-    zone = zoned.title if zoned is not None else ""
+    loud = (f for f in findings if f.code in (VIBRATION_ZONE, OVERALL_VELOCITY) and f.kind is Kind.NOTICE)
+    zone = next((f.title for f in loud), "")
     changed, unchanged = (next((f.title for f in findings if f.code == code), "") for code in (CHANGED, UNCHANGED))
-    others = tuple(f for f in findings if f.code not in (CHANGED, UNCHANGED))
+    others = tuple(f for f in findings if f.code not in (CHANGED, UNCHANGED, VIBRATION_ZONE))
     claims = [f for f in others if f.is_claim]
     # A change that no pattern explains is a suspicion by itself, and said already.
-    if not claims and outcome_of(findings) is Outcome.SUSPICION:
+    if not claims and any(f.code == CHANGED and f.is_claim for f in findings):
         return " ".join(filter(None, (doubt, changed, zone, unfit)))
     examined_text = _said(others, has_reference=has_reference)
-    if zoned is not None and examined_text.startswith(NO_FAULT):
+    if zoned is not None and not claims:  # nothing shows the cause, but the machine is not well
         causes = (text for text in zoned.evidence if text.endswith(CAN_DO_THAT))
         why = next(causes, "What is wrong does not show.")
-        examined_text = f"{zone} {why}{examined_text.removeprefix(NO_FAULT)}"
+        examined_text = f"{zone} {why}{examined_text.removeprefix(NO_FAULT).removeprefix(CANNOT_TELL)}"
         zone = ""
+    if claims:  # what is claimed may be new
+        unchanged = unchanged.replace(LEVELS_MATCH, f"Other {LEVELS_MATCH.lower()}")
     return " ".join(filter(None, (doubt, changed, examined_text, zone, unchanged, unfit)))
 
 
@@ -101,7 +106,7 @@ def _said(findings: tuple[Finding, ...], *, has_reference: bool) -> str:
     elif has_reference:
         nothing = "What shows, the reference shows as well."
     why = " ".join(f.title for f in gaps[:2]) or nothing
-    return " ".join(["Cannot tell.", why, *titles, *_remedy(gaps)])
+    return " ".join([CANNOT_TELL, why, *titles, *_remedy(gaps)])
 
 
 def _remedy(gaps: list[Finding]) -> list[str]:

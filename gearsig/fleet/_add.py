@@ -29,6 +29,9 @@ Progress = Callable[[int, int, "AddedRecording"], object]
 FAILED = "failed"
 """Outcome of a recording that could not be analysed."""
 
+UNTOLD = "cannot tell"
+"""Outcome of one that does not tell: it neither finds a fault nor clears one."""
+
 
 @dataclass(frozen=True)
 class AnalysisOptions:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from gearsig.checks import closest_match_hint, count, known_name, one_of
 from gearsig.errors import InputError
-from gearsig.fleet._add import FAILED, AddResult, AnalysisOptions, Progress, add_recordings
+from gearsig.fleet._add import FAILED, UNTOLD, AddResult, AnalysisOptions, Progress, add_recordings
 from gearsig.fleet._origin import Origin, PassedOver, origins
 from gearsig.fleet._statistics import ALARM, OK, WARNING
 from gearsig.fleet._store import SERIES, Store, write_query
@@ -71,7 +71,7 @@ _TYPED = ", ".join(f"{name}::{kind} AS {name}" for name, kind in _STATE.items())
 
 @dataclass(frozen=True)
 class DiagnosisChange:
-    """A measuring point whose last recording is diagnosed otherwise than the last one before."""
+    """A measuring point whose last recording that tells is diagnosed otherwise than the last one before."""
 
     machine: str
     point: str
@@ -235,7 +235,8 @@ class Fleet:
     def status(self) -> DataFrame:
         """Return a row per measuring point, the worst first.
 
-        Columns: machine, point, n_recordings, n_failed, first, last, outcome and verdict of the last recording, level
+        Columns: machine, point, n_recordings, n_failed, first, last, outcome and verdict of the last recording that
+        tells – a fault is there until a recording shows that it is not, and "cannot tell" does not –, level
         (of `STATUS_LEVELS`: the worse of diagnosis and trends, "unknown" where neither says anything), n_alarms,
         n_warnings, since, worst (indicator), worst_place (its gear, bearing or shaft), change (of that one against what
         is expected, in dB where change_in_db), changed (since when the level of some indicator is another one).
@@ -245,8 +246,8 @@ class Fleet:
             WITH latest AS (
                 SELECT machine, point, count(*) FILTER (outcome <> '{FAILED}') AS n_recordings,
                     count(*) FILTER (outcome = '{FAILED}') AS n_failed, min(date) AS first, max(date) AS last,
-                    arg_max(outcome, date) FILTER (outcome <> '{FAILED}') AS outcome,
-                    arg_max(verdict, date) FILTER (outcome <> '{FAILED}') AS verdict
+                    arg_max(outcome, (outcome <> '{UNTOLD}', date)) FILTER (outcome <> '{FAILED}') AS outcome,
+                    arg_max(verdict, (outcome <> '{UNTOLD}', date)) FILTER (outcome <> '{FAILED}') AS verdict
                 FROM recordings GROUP BY machine, point
             ), judged AS (
                 SELECT machine, point, max(level) AS level, count(*) FILTER (level = {ALARM}) AS n_alarms,
@@ -422,10 +423,12 @@ class Fleet:
         )
         rows = self._rows(
             f"""
-            WITH good AS (FROM recordings WHERE outcome <> '{FAILED}'), split AS (
+            WITH good AS (
+                SELECT *, (outcome <> '{UNTOLD}', date) AS latest FROM recordings WHERE outcome <> '{FAILED}'
+            ), split AS (
                 SELECT machine, point, max(date) AS date,
-                    arg_max(outcome, date) FILTER (added <= $1) AS before, arg_max(outcome, date) AS now,
-                    arg_max(verdict, date) AS verdict, max(added) AS added
+                    arg_max(outcome, latest) FILTER (added <= $1) AS before, arg_max(outcome, latest) AS now,
+                    arg_max(verdict, latest) AS verdict, max(added) AS added
                 FROM good GROUP BY machine, point
             )
             SELECT machine, point, date, coalesce(before, ''), now, verdict FROM split

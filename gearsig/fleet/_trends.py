@@ -15,6 +15,7 @@ import numpy as np
 from gearsig.cache import write_whole
 from gearsig.checks import FloatArray, count, not_negative, within
 from gearsig.errors import InputError
+from gearsig.fleet._add import UNTOLD
 from gearsig.fleet._statistics import (
     ALARM,
     MIN_SCATTER,
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 SETTINGS = "settings.toml"
-HEALTHY = ("no fault", "cannot tell")
+HEALTHY = ("no fault", UNTOLD)
 """Outcomes of a recording that may belong to a baseline that nobody stated."""
 
 SERIOUS_DB = 20.0

@@ -357,7 +357,7 @@ class _Panel:
 
     def axes(self, x: str, y: str, *, grid: bool = True) -> str:
         bottom, right = self.top + self.height, self.left + self.width
-        n = max(2, round(self.height / 45))
+        n = max(3, round(self.height / 45))
         values = _decades(*self.y, self.height / 16) if self.logarithmic else _ticks(*self.y, n)
         parts = []
         for value in values:

@@ -448,12 +448,9 @@ def _further_methods(
 
 def _recording_pictures(analysis: Analysis) -> Iterator[Picture]:
     recording = analysis.recording
-    names = recording.channel_names[:4]
-    more = (
-        f" The first {len(names)} of {len(recording.channels)} channels."
-        if len(names) < len(recording.channels)
-        else ""
-    )
+    claimed = {name for f in analysis.findings if f.is_claim for name in f.where.channels}
+    names = tuple(sorted(recording.channel_names, key=lambda name: name not in claimed))[:4]
+    more = f" {len(names)} of {len(recording.channels)} channels." if len(names) < len(recording.channels) else ""
     time = np.arange(recording.n_samples) / recording.sampling_rate_hz
     for name in names:
         channel = recording.channels[recording.index(name)]
@@ -464,9 +461,9 @@ def _recording_pictures(analysis: Analysis) -> Iterator[Picture]:
             x_limits=(0.0, max(recording.duration_s, 1.0 / recording.sampling_rate_hz)),
         )
         last = name == names[-1]
-        caption = f"Steps, spikes and clipped tops are the recording's, not the machine's.{more}" if last else ""
+        caption = f"Steps and clipped tops are the recording's; spikes may be impacts.{more}" if last else ""
         yield Picture.of_svg(
-            plot.svg_panel(panel, height=70), caption, f"Signal of {name} over {recording.duration_s:.4g} s."
+            plot.svg_panel(panel, height=100), caption, f"Signal of {name} over {recording.duration_s:.4g} s."
         )
     angle = analysis.shaft_angle
     if isinstance(angle, ShaftAngle):

@@ -217,9 +217,11 @@ def test_same_recording_same_answer(knocking: Analysis) -> None:
 def test_the_unit_of_the_channel_does_not_matter(gain: float, knocking: Analysis) -> None:
     samples = np.array(knocking.recording.samples)
     samples[0] *= gain
-    here, there = knocking, analyze(replace(knocking.recording, samples=samples))
-    assert codes(here) == codes(there)
-    assert [f.confidence for f in here.findings] == pytest.approx([f.confidence for f in there.findings])
+    here, there = (  # but for overall velocity, which is noticed where it is large
+        {f.code: f.confidence for f in analysis.findings if f.code != "overall-velocity"}
+        for analysis in (knocking, analyze(replace(knocking.recording, samples=samples)))
+    )
+    assert here == pytest.approx(there)
 
 
 def test_the_text_tells_place_strength_and_remedy(knocking: Analysis) -> None:

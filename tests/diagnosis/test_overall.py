@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gearsig.diagnosis import analyze
+from gearsig.diagnosis import Outcome, analyze
 from gearsig.recording import Channel, Recording
 from gearsig.rig import Bearing, ConstantSpeed, MachineSize, Rig, Shaft
 from tests.diagnosis.machines import codes, finding
@@ -75,13 +75,24 @@ def test_no_single_source_is_named_where_two_share_the_velocity() -> None:
 
 
 def test_of_machines_that_are_not_described_only_what_makes_most_of_it_is_said() -> None:
-    analysis = analyze(motor(9.0, replace(MOTOR, machine=None)))
-    assert not any("vibration-zone" in code for code in codes(analysis))
-    stated = finding(analysis, "overall-velocity")
-    assert stated.title == (
-        "Overall vibration 9 mm/s rms in channel a1, 10 to 1000 Hz; 100 % of its power is at 1 × shaft motor."
-    )
-    assert stated.title not in analysis.verdict
+    for mm_per_s, loud in ((4.0, ""), (9.0, ", which is zone D of ISO 20816-3 for some machines")):
+        analysis = analyze(motor(mm_per_s, replace(MOTOR, machine=None)))
+        assert not any("vibration-zone" in code for code in codes(analysis))
+        stated = finding(analysis, "overall-velocity")
+        assert stated.title == (
+            f"Overall vibration {mm_per_s:g} mm/s rms in channel a1, 10 to 1000 Hz{loud}; "
+            "100 % of its power is at 1 × shaft motor."
+        )
+        assert (stated.title in analysis.verdict) is bool(loud)
+
+
+def test_a_machine_in_zone_d_is_suspicious_where_the_rest_cannot_be_told() -> None:
+    short = motor(9.0).between(0.0, 1.0)
+    analysis = analyze(replace(short, rig=replace(MOTOR, bearings=(Bearing("front", "motor", 9, 7.94, 39.04),))))
+    assert "bearings-undecided" in codes(analysis)
+    assert analysis.outcome is Outcome.SUSPICION
+    assert analysis.verdict.startswith("Overall vibration 9 mm/s rms in channel a1: zone D")
+    assert "cannot be told" in analysis.verdict
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,9 @@ from gearsig.errors import InputError
 from gearsig.fleet import Fleet, TrendSettings, counts_text, fleet_changes, last_report, mark_reported, open_fleet
 from gearsig.report import fleet_page_html, fleet_page_pdf
 from gearsig.rig import ConstantSpeed, MachineSize, OperatingPoint, Rig, Sensor, Shaft
-from tests.fleet.recordings import PATTERN, write_daily_recordings
+from tests.fleet.recordings import PATTERN, write_daily_recordings, write_recording_file
+
+SAMPLES = Path(__file__).parents[2] / "sample_data"
 
 
 @pytest.fixture(scope="module")
@@ -31,6 +33,28 @@ def fleet(analysed, tmp_path) -> Fleet:
     """Of its own for each test."""
     shutil.copytree(analysed, tmp_path, dirs_exist_ok=True)
     return open_fleet(tmp_path / "store")
+
+
+def test_a_fault_stays_until_a_recording_shows_that_it_is_gone(tmp_path):
+    """What is recorded without a rig tells nothing; a sound machine on the third day does."""
+    data, rng = tmp_path / "data" / "pump", np.random.default_rng(0)
+    data.mkdir(parents=True)
+
+    def record_sample(name: str, day: str) -> None:
+        for file in SAMPLES.glob(f"{name}.*"):
+            shutil.copy(file, data / f"DE_{day}{file.name.removeprefix(name)}")
+
+    fleet = open_fleet(tmp_path / "store", create=True)
+    record_sample("damaged_tooth", "20260101")
+    fleet.add(data.parent, pattern=f"{PATTERN}.gz", n_processes=1)
+    write_recording_file(data / "DE_20260102.csv", 1.0, rng)
+    fleet.add(data.parent, pattern=PATTERN, n_processes=1)
+    status = fleet.status()
+    assert (status["outcome"][0], status["level"][0], status["n_recordings"][0]) == ("fault", "alarm", 2)
+    assert [d.now for d in fleet_changes(fleet).diagnoses] == ["fault"]
+    record_sample("no_tachometer", "20260103")
+    fleet.add(data.parent, pattern=PATTERN, n_processes=1)
+    assert fleet.status()["outcome"][0] == "no fault"
 
 
 @pytest.mark.slow
