@@ -37,16 +37,21 @@ def output_option(about: str, metavar: str = "DIR") -> Any:
     return typer.Option("--output", "-o", metavar=metavar, help=about)
 
 
-def rate_option(name: str, about: str) -> Any:
-    """Return an option for a sampling rate, in Hz or with its unit."""
+def quantity_option(name: str, unit: str, metavar: str, about: str) -> Any:
+    """Return an option for a number in a unit, or with a unit of its own."""
 
-    def hertz(text: str | float) -> float:
+    def parsed(text: str | float) -> float:
         try:
-            return quantity(str(text), "Hz", name)
+            return quantity(str(text), unit, name)
         except InputError as error:  # the parser takes it for one of its own
             raise typer.BadParameter(str(error)) from None
 
-    return typer.Option(name, metavar="RATE", parser=hertz, help=about)
+    return typer.Option(name, metavar=metavar, parser=parsed, help=about)
+
+
+def rate_option(name: str, about: str) -> Any:
+    """Return an option for a sampling rate, in Hz or with its unit."""
+    return quantity_option(name, "Hz", "RATE", about)
 
 
 SamplingRateOption = Annotated[
@@ -54,7 +59,7 @@ SamplingRateOption = Annotated[
 ]
 SpeedOption = Annotated[
     float | None,
-    typer.Option("--speed-rpm", metavar="RPM", help="Constant speed of the reference shaft, if it is known well."),
+    quantity_option("--speed-rpm", "rpm", "RPM", "Constant speed of the reference shaft, if it is known well."),
 ]
 TachometerTimesOption = Annotated[
     Path | None, typer.Option("--tach-times", metavar="FILE", help="File with the times of the tachometer pulses in s.")

@@ -13,6 +13,7 @@ from gearsig.formatting import power_of_ten
 from gearsig.indicators import Indicator
 from gearsig.motion import StartStop
 from gearsig.orders import OrderMap, SynchronousAverage
+from gearsig.prepared import has_mark
 from gearsig.recording import Recording
 from gearsig.results import Result, verdict_html
 from gearsig.rig import Rig
@@ -342,6 +343,10 @@ class Analysis(Result, rows="findings"):
         gears = self.rig.gear_teeth(shaft) if self.rig is not None else {}
         pairs = (f.where.gear.rpartition("/")[0] for f in self.findings if f.where.gear.endswith(f"/{shaft}"))
         return gears.get(next((pair for pair in pairs if pair in gears), next(iter(gears), "")))
+
+    def has_mark(self, shaft: str) -> bool:
+        """Whether angle 0 of a shaft is a mark on that very shaft: without one its teeth have no numbers."""
+        return has_mark(self.recording, self.rig or Rig(), shaft)
 
     def _repr_html_(self) -> str:
         """Return verdict and findings for notebooks; texts may come from files."""

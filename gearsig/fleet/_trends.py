@@ -588,7 +588,8 @@ class Trend:
         """What the limits rest on, and how often they are wrong, in a few sentences."""
         n = int(self.table["in_baseline"].sum())
         if self.basis == NONE:
-            parts = [f"No limits yet: the baseline has {counted(n, 'recording')}."]
+            n_all = len(self.table)
+            parts = [f"No limits yet: {counted(n_all, 'recording')} {'is' if n_all == 1 else 'are'} no baseline."]
         elif self.basis != STATISTICAL:
             parts = [f"Limits are the zones of {self.basis}."]
         else:

@@ -230,7 +230,7 @@ def angle_of(recording: Recording, shaft_angle: ShaftAngle | None, speed_rpm: fl
         return shaft_angle
     if speed_rpm is None:
         if recording.speed_source is None and recording.rig is None:
-            raise InputError("the shaft's speed is not known", remedy="give either shaft_angle or speed_rpm, not both")
+            raise InputError("the shaft's speed is not known", remedy="give speed_rpm, or shaft_angle")
         return find_shaft_angle(recording)
     if np.ndim(speed_rpm) == 0:
         rpm: Any = speed_rpm

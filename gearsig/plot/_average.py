@@ -99,6 +99,7 @@ def polar_figure(
     n_teeth: int | None = None,
     marks: Sequence[AngleMark] = (),
     largest: float | None = None,
+    numbered: bool = True,
 ) -> Figure:
     """Draw one mean revolution around the circle with its band of ± 2 standard errors.
 
@@ -109,11 +110,13 @@ def polar_figure(
     average : SynchronousAverage
         Usually the residual or difference signal: there a single tooth stands out.
     n_teeth : int or None
-        Draws and numbers the teeth.
+        Draws the teeth.
     marks : sequence of AngleMark
         Drawn in the colour of faults, with their tooth.
     largest : float or None
         Value drawn at full swing, for pictures that are to be compared; None: this average's own.
+    numbered : bool
+        Whether the teeth have numbers: those of a shaft without a mark have none.
 
     Returns
     -------
@@ -129,7 +132,7 @@ def polar_figure(
     _rings(axes, full, average.unit)
     _draw_signal(axes, average, SWING / full)
     if n_teeth:
-        draw_gear(axes, n_teeth, [mark.angle_deg for mark in marks])
+        draw_gear(axes, n_teeth, [mark.angle_deg for mark in marks], numbered=numbered)
     draw_degrees(axes, n_teeth is not None)
     for number, mark in enumerate(marks):
         draw_mark(axes, mark, n_teeth)

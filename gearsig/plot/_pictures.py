@@ -254,6 +254,7 @@ def svg_ring(
     *,
     n_teeth: int | None = None,
     marks: Sequence[AngleMark] = (),
+    numbered: bool = True,
     ink: str = "",
     line: str = style.MEASURED,
 ) -> str:
@@ -267,6 +268,8 @@ def svg_ring(
     n_teeth : int or None
         Of the gear.
     marks : sequence of AngleMark
+    numbered : bool
+        Whether the teeth have numbers: those of a shaft without a mark have none.
     ink : str
         Colour of text and axes; empty: of the text around.
     line : str
@@ -293,7 +296,7 @@ def svg_ring(
         points = "L".join("{:.1f} {:.1f}".format(*_round(r, middle + w * step)) for r, w in shape)
         looks = f'fill="{style.FAULT}"' if fault else 'fill="currentColor" fill-opacity="0.28"'
         parts.append(f'<path d="M{points}Z" {looks}/>')
-        if fault or tooth % ceil((n_teeth or 1) / 40) == 0:
+        if numbered and (fault or tooth % ceil((n_teeth or 1) / 40) == 0):
             x, y = _round(rim + 24, middle)
             bold = f'fill="{style.FAULT}" font-weight="700" font-size="15"' if fault else 'font-size="12" opacity="0.7"'
             parts.append(f'<text x="{x:.1f}" y="{y + 4.3:.1f}" text-anchor="middle" {bold}>{tooth + 1}</text>')

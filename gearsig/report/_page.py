@@ -637,7 +637,7 @@ def ring_picture(analysis: Analysis, picture: VerdictPicture) -> Picture:
     marks = plot.marks_of(analysis.findings, shaft, teeth)
     seen = f"; marked: {', '.join(mark.label for mark in marks)}" if marks else ""
     return Picture.of_svg(
-        plot.svg_ring(average, n_teeth=teeth, marks=marks),
+        plot.svg_ring(average, n_teeth=teeth, marks=marks, numbered=analysis.has_mark(shaft)),
         f"{shaft or 'The shaft'}: healthy teeth draw an even ring, a damaged one swings out."
         if teeth
         else f"{shaft or 'The shaft'}: what leaves the ring comes back at that angle every turn.",

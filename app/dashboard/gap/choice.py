@@ -149,10 +149,17 @@ def files_of(choice: Choice, folder: Path) -> GapRequest:
     Raises
     ------
     InputError
-        If there is more than one rig file for all, or for one recording.
+        If there is more than one rig file for all, or for one recording, or none.
     """
     common = common_rig(choice)
     rig = None
+    for file in choice.recorded if common is None else ():
+        if not isinstance(file.content, Path) and own_rig(file, choice.rigs) is None:
+            raise InputError(
+                "no rig file is given",
+                where=file.name,
+                remedy="upload one for all recordings, or one of the recording's name; the Analysis page makes it",
+            )
     if common is not None:
         rig = folder / "rig.toml"
         rig.write_text(common.rig_text, encoding="utf-8")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
@@ -295,6 +296,10 @@ def _config(kind: str, rig: Table, channels: Sequence[str]) -> dict[str, Any]:
     return made
 
 
+SPEED_NAMES = re.compile(r"tach|keyphas|trig|enc|speed|rpm", re.IGNORECASE)
+"""What channels that tell a speed are usually called."""
+
+
 def _edit_speed(speed: Table, rig: Table, key: Callable[[str], str], channels: Sequence[str]) -> Table:
     source = str(speed.get("source", "none"))
     columns = st.columns(4)
@@ -304,7 +309,8 @@ def _edit_speed(speed: Table, rig: Table, key: Callable[[str], str], channels: S
     edited["source"] = chosen
     for place, name in zip(columns[1:], SPEED_SOURCES[chosen], strict=False):
         if name == "channel":
-            offered = list(dict.fromkeys([*([speed["channel"]] if "channel" in speed else []), *channels])) or ["tacho"]
+            likely = sorted(channels, key=lambda channel: not SPEED_NAMES.search(channel))
+            offered = list(dict.fromkeys([*([speed["channel"]] if "channel" in speed else []), *likely])) or ["tacho"]
             edited[name] = place.selectbox("Channel", offered, key=key("speed channel"))
         else:
             step = 1 if name == "pulses_per_revolution" else 0.1

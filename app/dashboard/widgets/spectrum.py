@@ -255,27 +255,37 @@ def _show(analysis: Analysis, average: SynchronousAverage, n_teeth: int | None, 
         polar, unrolled = st.columns((6, 7), vertical_alignment="center")
         with polar:
             key = f"ring of {average.channel} {average.shaft} {average.kind}"
-            ring = show_ring(average, n_teeth, marks, words, state.view_key(key, analysis))
-            offer_ring(ring, average, n_teeth, marks)
+            numbered = analysis.has_mark(average.shaft)
+            ring = show_ring(average, n_teeth, marks, words, state.view_key(key, analysis), numbered=numbered)
+            offer_ring(ring, average, n_teeth, marks, numbered=numbered)
         with unrolled:
             _show_unrolled(analysis, average, n_teeth, cursors)
 
 
 def show_ring(
-    average: SynchronousAverage, n_teeth: int | None, marks: Sequence[AngleMark], words: str, key: str
+    average: SynchronousAverage,
+    n_teeth: int | None,
+    marks: Sequence[AngleMark],
+    words: str,
+    key: str,
+    *,
+    numbered: bool,
 ) -> str:
     """Show the ring of teeth in the page's colours, to be zoomed and read off; return it as SVG."""
     colours = palette()
-    svg = svg_ring(average, n_teeth=n_teeth, marks=marks, ink=colours.quiet, line=colours.measured)
+    looks = {"ink": colours.quiet, "line": colours.measured}
+    svg = svg_ring(average, n_teeth=n_teeth, marks=marks, numbered=numbered, **looks)
     # a place for each pixel of the ring, not for each sample
     values = average.values[:: max(len(average.values) // N_COLUMNS, 1)]
-    show_svg(svg, words, key, ring=Ring({"": values}, n_teeth or 0, unit_text(average.unit)))
+    show_svg(svg, words, key, ring=Ring({"": values}, (n_teeth or 0) * numbered, unit_text(average.unit)))
     return svg
 
 
-def offer_ring(svg: str, average: SynchronousAverage, n_teeth: int | None, marks: Sequence[AngleMark]) -> None:
+def offer_ring(
+    svg: str, average: SynchronousAverage, n_teeth: int | None, marks: Sequence[AngleMark], *, numbered: bool
+) -> None:
     """Offer the ring of teeth as files."""
-    drawn = partial(polar_figure, average, n_teeth=n_teeth, marks=marks)
+    drawn = partial(polar_figure, average, n_teeth=n_teeth, marks=marks, numbered=numbered)
     offer_picture(svg, drawn, f"ring-{average.shaft} of {average.channel} {average.kind}")
 
 
@@ -292,5 +302,7 @@ def _show_unrolled(analysis: Analysis, average: SynchronousAverage, n_teeth: int
     largest = int(np.argmax(np.abs(average.values)))
     degrees = 360 * largest / len(average.values)
     value = f"{readable(average.values[largest])} {unit_text(average.unit)}".strip()
-    tooth = f", tooth {int(degrees * n_teeth / 360) + 1} of {n_teeth}" if n_teeth else ""
+    tooth = ""
+    if n_teeth and analysis.has_mark(average.shaft):
+        tooth = f", tooth {int(degrees * n_teeth / 360) + 1} of {n_teeth}"
     st.markdown(f"Largest swing **{as_typed(value)}** at **{degrees:.1f}°**{tooth}")

@@ -141,9 +141,10 @@ def show_verdict_picture(analysis: Analysis) -> None:
         stand_out = f"{enumerated([mark.label for mark in marks])} {'stand' if len(marks) > 1 else 'stands'} out"
         words = f"Mean revolution of {picture.shaft}: {stand_out if marks else 'no tooth stands out'}"
         average = picture.average
-        ring = show_ring(average, teeth, marks, words, state.view_key(place, analysis))
+        numbered = analysis.has_mark(picture.shaft)
+        ring = show_ring(average, teeth, marks, words, state.view_key(place, analysis), numbered=numbered)
         with st.container(key="verdict-files"):
-            offer_ring(ring, average, teeth, marks)
+            offer_ring(ring, average, teeth, marks, numbered=numbered)
         return
     if picture.about == "resonance":
         panel, marked_points = level_panel(analysis, channel)
