@@ -220,7 +220,7 @@ def _envelope(
         prepared.recording, channel, narrowest_hz=3.0 * usual_hz, band_hz=band_hz
     )
     low, high = banded.envelope.band_hz
-    text = f"spectrum of the envelope of {readable(low)} to {readable(high)} Hz"
+    text = f"spectrum of the squared envelope of {readable(low)} to {readable(high)} Hz"
     top = min(float(banded.spectrum.positions[-1]), (high - low) / 2, usual_hz) if highest is None else highest
     answer = _spectrum_answer(prepared, channel, banded.spectrum, text, lowest, top, of_envelope=True)
     numbers = {"band_hz": [low, high], "reason": banded.reason, "warnings": list(banded.warnings)}

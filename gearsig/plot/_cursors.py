@@ -78,7 +78,8 @@ class Cursor:
 def order_cursors(lines: Iterable[OrderLine], revolutions_per_s: float = 1.0) -> tuple[Cursor, ...]:
     """Turn a rig's order lines into cursors with short labels.
 
-    Names of pairs and bearings are left out where there is only one; a sideband is called by its distance.
+    Names of pairs and bearings are left out where there is only one, or all have the same orders, so that nothing tells
+    them apart; a sideband is called by its distance.
 
     Parameters
     ----------
@@ -91,9 +92,13 @@ def order_cursors(lines: Iterable[OrderLine], revolutions_per_s: float = 1.0) ->
     tuple of Cursor
     """
     lines = tuple(lines)
-    only = {
-        kind: len({line.element for line in lines if line.kind == kind}) == 1 for kind in ("mesh", "bearing", "hunting")
-    }
+    only = {}
+    for kind in ("mesh", "bearing", "hunting"):
+        orders: dict[str, set[float]] = {}
+        for line in lines:
+            if line.kind == kind:
+                orders.setdefault(line.element, set()).add(round(line.order, 6))
+        only[kind] = len({frozenset(of_one) for of_one in orders.values()}) == 1
     return tuple(_cursor(line, revolutions_per_s, is_only=only.get(line.kind, False)) for line in lines)
 
 

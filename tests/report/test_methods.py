@@ -133,10 +133,10 @@ def test_a_rate_that_nothing_tells_is_said_to_be_assumed() -> None:
 def test_an_envelope_has_plain_numbers_and_the_lines_of_bearings() -> None:
     rig = replace(RIG, bearings=(Bearing("drive end", "input", bearing="6205"),))
     answer = apply_method("envelope", replace(recording(), rig=rig), band_hz=(1000.4, 4000.0))
-    assert answer.caption == "spectrum of the envelope of 1000 to 4000 Hz"
+    assert answer.caption == "spectrum of the squared envelope of 1000 to 4000 Hz"
     fast = replace(recording(), sampling_rate_hz=65536.0, rig=None)
     answer = apply_method("envelope", fast, band_hz=(12_207.03, 16_276.04))
-    assert answer.caption == "spectrum of the envelope of 12207 to 16276 Hz"
+    assert answer.caption == "spectrum of the squared envelope of 12207 to 16276 Hz"
     labels = [c.label for c in apply_method("envelope", replace(recording(), rig=rig)).panels[0].cursors]
     assert {"BPFO", "2× BPFO", "3× BPFO", "1× input"} <= set(labels)
     assert not any("mesh" in label for label in labels)
