@@ -911,7 +911,7 @@ def _shrinkage_text(report: GapReport) -> str:
     s, sizes = shrinkage.shrink, f"from {shrinkage.before.value:.2g} to {shrinkage.after.value:.2g} structural floors"
     low, high = (f"{100 * end:.0f}" for end in (s.low, s.high))
     closed = percent(s.value) + (f" ({low} to {high} %)" if low != high else "")
-    shrinks = f"shrinks {sizes}, by {closed} of what exceeds one,"
+    shrinks = f"shrinks {sizes}, by {closed} of its energy above one,"
     if s.value <= 0.0:
         shrinks = "does not shrink"
     elif shrinkage.after.high < 1.0:

@@ -155,7 +155,7 @@ def test_a_gap_that_an_effect_explains_ends_within_the_floor() -> None:
     assert "shrinks from 3.8 to 0.4 structural floors, within what healthy machines show, on" in line
     partly = replace(found, after=Interval(2.0, 1.9, 2.1), shrink=Interval(0.6, 0.5, 0.7))
     line = replace(report, causes=(replace(report.causes[0], shrinkage=partly), *report.causes[1:])).verdict[2]
-    assert "from 3.8 to 2 structural floors, by 60 % (50 to 70 %) of what exceeds one, on" in line
+    assert "from 3.8 to 2 structural floors, by 60 % (50 to 70 %) of its energy above one, on" in line
 
 
 def test_a_tooth_that_both_likeliest_effects_share_can_be_looked_at() -> None:

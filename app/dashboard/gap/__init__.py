@@ -545,7 +545,8 @@ def _show_how_far(finished: Finished) -> None:
     elif len(rows) > 1:
         st.caption(
             "What remains of the whole gap as effects are added to the simulator, in structural floors, on data that "
-            "no severity was fitted to."
+            "no severity was fitted to. What the verdict says shrinks more: it is of those features alone that the "
+            "effect changes."
         )
         labels, left, intervals, taken = zip(*rows, strict=True)
         simulators = [label if i == 0 else f"+ {label}" for i, label in enumerate(labels)]
