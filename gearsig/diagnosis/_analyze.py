@@ -368,14 +368,21 @@ def _mesh_band(parts: SeparatedAverage, teeth: int) -> SynchronousAverage | None
 def _of_bearings(
     signals: AnalysisSignals, name: str, envelopes: Sequence[BandEnvelope]
 ) -> Iterator[indicators.Indicator]:
-    """Take the band whose envelope has the clearest lines; a quiet one would only state its floor."""
+    """Take the band whose envelope has the clearest lines, as a quiet one would only state its floor, and the widest.
+
+    The clearest is another one from recording to recording: over time, levels compare in the widest alone.
+    """
     of_channel = [e for e in envelopes if e.channel == name]
-    clearest = max(of_channel, key=lambda e: float(e.excess.scores().sum()), default=None)
-    for bearing in signals.rig.bearings if clearest is not None else ():
+    if not of_channel:
+        return
+    clearest = max(of_channel, key=lambda e: float(e.excess.scores().sum()))
+    widest = max(of_channel, key=lambda e: e.band_hz[1] - e.band_hz[0])
+    for bearing in signals.rig.bearings:
         ratio = signals.rig.ratio(bearing.shaft)
-        if clearest is not None and ratio is not None and bearing.orders():
-            band, spectrum = f"{clearest.band_hz[0]:.0f} to {clearest.band_hz[1]:.0f} Hz", clearest.excess.spectrum
-            yield from indicators.bearing_indicators(spectrum, bearing, shaft_ratio=ratio, channel=name, band=band)
+        for envelope in [clearest] if clearest is widest else [clearest, widest]:
+            if ratio is not None and bearing.orders():
+                band, spectrum = "{:.0f} to {:.0f} Hz".format(*envelope.band_hz), envelope.excess.spectrum
+                yield from indicators.bearing_indicators(spectrum, bearing, shaft_ratio=ratio, channel=name, band=band)
 
 
 def _check_size(recording: Recording) -> None:
