@@ -129,12 +129,18 @@ def show_machine(file: ChosenFile, channels: Sequence[str] = (), *, is_told: boo
     if _rig_of(edited) != _rig_of(table) or (edited != table and isinstance(_rig_of(edited), str)):
         changed = tomli_w.dumps(edited)
         with st.container(horizontal=True):
-            look = ":material/check:"
-            st.button("Analyse with this machine", type="primary", icon=look, on_click=_take, args=(file, changed))
+            st.button(
+                "Analyse with this machine",
+                type="primary",
+                icon=":material/check:",
+                on_click=_take,
+                args=(file, changed),
+                disabled=isinstance(_rig_of(edited), str),  # what is wrong stands beside the form
+            )
             st.button("Discard", on_click=_take, args=(file, text))
     if not is_unknown:
         show_stated(file)
-    _show_text(file, text)
+    _show_text(file, text if edited == table else tomli_w.dumps(edited))
 
 
 def _rig_of(table: Table) -> Rig | str:
