@@ -36,6 +36,7 @@ from gearsig.diagnosis._signals import BandEnvelope
 from gearsig.diagnosis._tooth import localise
 from gearsig.diagnosis._types import (
     CHANGED,
+    VIBRATION_ZONE,
     Analysis,
     AnalysisSettings,
     CannotTell,
@@ -59,6 +60,7 @@ __all__ = [
     "REFERENCE_OPTIONS",
     "SAME_BEARING_ORDER",
     "SURER_WITH",
+    "VIBRATION_ZONE",
     "WHAT_WOULD_HELP",
     "AnalysedPart",
     "Analysis",

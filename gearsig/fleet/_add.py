@@ -246,11 +246,14 @@ def analyse_file(job: _AnalysisJob) -> tuple[Row, list[Row], Origin]:
 
 def _facts(analysis: Analysis, options: AnalysisOptions) -> Row:
     from gearsig.angle import ShaftAngle
+    from gearsig.diagnosis import VIBRATION_ZONE, outcome_of
     from gearsig.severity import CrackEstimate
 
     recording, rig, angle = analysis.recording, analysis.rig, analysis.shaft_angle
     top = analysis.top_claim
-    judged = rig is not None and any(f.code == "vibration-zone" for f in analysis.findings)
+    # Zones are limits of a trend: a machine that has always been in zone C has a baseline nevertheless.
+    outcome = outcome_of([f for f in analysis.findings if f.code != VIBRATION_ZONE])
+    judged = rig is not None and any(f.code == VIBRATION_ZONE for f in analysis.findings)
     machine = rig.machine if rig is not None and judged else None
     load = options.torque_nm
     if load is None and rig is not None:
@@ -263,7 +266,7 @@ def _facts(analysis: Analysis, options: AnalysisOptions) -> Row:
         "sampling_rate_hz": recording.sampling_rate_hz,
         "speed_rpm": angle.mean_speed_rpm if isinstance(angle, ShaftAngle) else None,
         "load_nm": _measured_load_nm(analysis, load),
-        "outcome": analysis.outcome.value,
+        "outcome": outcome.value,
         "verdict": analysis.verdict,
         "confidence": top.confidence if top is not None else None,
         "crack_mm": crack.depth_mm if isinstance(crack, CrackEstimate) else None,
