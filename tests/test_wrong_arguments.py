@@ -123,7 +123,7 @@ CASES = {
     "order_spectrum, no channel": (lambda: gearsig.order_spectrum(BARE, "b1"), r"no channel 'b1' \(allowed: a1, a2\)"),
     "order_spectrum, no speed": (
         lambda: gearsig.order_spectrum(BARE, "a1"),
-        r"speed is not known; give either shaft_angle or speed_rpm",
+        r"speed is not known; give speed_rpm, or shaft_angle",
     ),
     "order_spectrum, prepared": (lambda: gearsig.order_spectrum(PREPARED, "a1"), r"give signal\.recording"),
     "order_spectrum, angle": (lambda: gearsig.order_spectrum(BARE, "a1", shaft_angle=5.0), r"as speed_rpm"),

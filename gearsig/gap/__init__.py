@@ -5,6 +5,7 @@ from gearsig.gap._attribution import (
     Attribution,
     GapCalibration,
     attribute,
+    counted_against,
     is_calibrated,
     joint_probabilities,
     load_gap_calibration,
@@ -80,7 +81,6 @@ from gearsig.gap._path import MeasuredPath, measured_path
 from gearsig.gap._places import (
     ComparedPair,
     compared_pair,
-    counted_against,
     gap_places,
     locate_all_round,
     locate_mesh,

@@ -14,7 +14,7 @@ import numpy as np
 from gearsig.checks import closest_match_hint, listed, short
 from gearsig.errors import GearsigError, InputError, RefusalError
 from gearsig.formatting import odds_text
-from gearsig.gap._attribution import Attribution, attribute, is_calibrated
+from gearsig.gap._attribution import Attribution, attribute, counted_against, is_calibrated
 from gearsig.gap._conditions import Condition, Stage, conditions_of, simulated, warnings_of
 from gearsig.gap._curves import angle_curves, average_curves, spectrum_curves
 from gearsig.gap._evidence import CRACK, evidence_of
@@ -24,7 +24,6 @@ from gearsig.gap._labelled import LabelledRecording, labelled_changes
 from gearsig.gap._next_recording import next_recordings, next_steps
 from gearsig.gap._places import (
     compared_pair,
-    counted_against,
     gap_places,
     ranked_places,
     without_multiples,

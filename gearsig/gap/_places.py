@@ -34,10 +34,9 @@ from gearsig.gap._floors import (
     StructuralFloor,
     family_members,
     family_size,
-    kinds_of,
 )
 from gearsig.gap._reduction import DRIVER, N_MAINS_HARMONICS, N_MESH_HARMONICS, GearFrame, ReducedRecording, shaft_words
-from gearsig.gap._report import NONE, UNKNOWN, GapPlace, PlaceKind, likeliest_first
+from gearsig.gap._report import GapPlace, PlaceKind, likeliest_first
 from gearsig.gap._simulator import GapEffect
 from gearsig.prepared import MAINS_TOLERANCE
 from gearsig.recording import MAINS_HZ
@@ -96,60 +95,8 @@ def _joined(unexpected: GapPlace, same: Sequence[GapPlace]) -> GapPlace:
 
 
 # --------------------
-# What an order that is most of the gap says against effects that cannot make it.
+# What lines of races and shafts say against causes that would make them, or would not.
 # --------------------
-
-
-MAX_SHARE_OF_REST = 0.5
-"""Share of the gap from which one order is more of it than all else."""
-
-FAR_FROM_HEALTHY = 3.0
-"""Structural floors of an order from which it is no matter of healthy machines' differences."""
-
-N_FIRST_ORDERS = 2
-"""Multiples of a shaft that hardly anything but its own faults raises alone: it would have to turn along."""
-
-
-def counted_against(
-    probabilities: Mapping[str, float], effects: Mapping[str, GapEffect], places: Sequence[GapPlace], frame: GearFrame
-) -> dict[str, float]:
-    """Return the probabilities with those of causes lowered that cannot make the order that is most of the gap.
-
-    A cause of 2 % of a gap is hardly its cause: p → 2 (1 − s) p for a share s of more than a half; unknown gets the
-    rest. Only orders count against an effect, lines at their place in the spectrum: noise, tails and envelopes at a
-    shaft's multiples follow from much that theory does not list. Where healthy machines are far from them they count
-    against no gap as well, and the first orders of a shaft against unknown; the others share that.
-
-    Parameters
-    ----------
-    probabilities : mapping
-        Cause → probability.
-    effects : mapping
-        Effect → where it shows.
-    places : sequence of GapPlace
-        Of the gap, with their shares.
-    frame : GearFrame
-    """
-    lowered = dict(probabilities)
-    largest = [place for place in places if place.share > MAX_SHARE_OF_REST and _is_an_order(place, frame)]
-    for place in largest:
-        for name in probabilities.keys() & effects.keys():
-            if not _can_make(effects[name].shows_in, place):
-                lowered[name] *= 2.0 * (1.0 - place.share)
-    lowered[UNKNOWN] += 1.0 - sum(lowered.values())
-    for place in largest:
-        if place.structural >= FAR_FROM_HEALTHY:
-            for name in (NONE, *([UNKNOWN] if _is_first_of_a_shaft(place, frame) else [])):
-                lowered[name] *= 2.0 * (1.0 - place.share)
-    total = sum(lowered.values())
-    return likeliest_first({name: p / total for name, p in lowered.items()})
-
-
-def _is_first_of_a_shaft(place: GapPlace, frame: GearFrame) -> bool:
-    turns = np.divide(place.orders[0], frame.shaft_orders) if place.orders else np.zeros(1)
-    near = np.round(turns)
-    is_multiple = (near >= 1) & (near <= N_FIRST_ORDERS) & (np.abs(turns - near) <= SAME_ORDER * near)
-    return place.kind is PlaceKind.SHAFT and bool(is_multiple.any())
 
 
 RACES = {"bearing_outer_race": "outer", "bearing_inner_race": "inner"}
@@ -239,22 +186,6 @@ def _silent_races(comparison: ComparedPair) -> set[str]:
         if known and not heard:
             silent.add(effect)
     return silent
-
-
-def _is_an_order(place: GapPlace, frame: GearFrame) -> bool:
-    """Whether a place is one of lines: a shaft's, those of the residual, or an envelope's at no shaft's order."""
-    if place.kind is PlaceKind.ENVELOPE and place.orders:
-        return all(
-            abs(turns - round(turns)) > SAME_ORDER * turns for turns in np.divide(place.orders[0], frame.shaft_orders)
-        )
-    return place.kind in (PlaceKind.LINE, PlaceKind.SHAFT, PlaceKind.SIDEBANDS)
-
-
-def _can_make(shows_in: Sequence[str], place: GapPlace) -> bool:
-    kinds = kinds_of(shows_in)
-    if place.kind is PlaceKind.LINE:  # of the supply, or of a bearing, whose lines stand in envelope and spectrum
-        return not kinds or "mains_lines" in shows_in or PlaceKind.ENVELOPE in kinds
-    return not kinds or place.kind in kinds
 
 
 # --------------------
