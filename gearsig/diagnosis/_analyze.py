@@ -260,10 +260,12 @@ def _of_machine(
     yield from detect_tooth_damage(signals)
     impacts = detect_bearings(signals, envelopes, own_bands)
     yield from impacts
-    trains = tuple(f.where.order for f in impacts if f.where.order is not None and f.where.band_hz is not None)
+    of_envelopes = [f for f in impacts if f.where.order is not None and f.where.band_hz is not None]
+    trains = tuple(f.where.order for f in of_envelopes if f.where.order is not None)
     yield from detect_sidebands(signals, trains)
     yield from detect_between_orders(signals)
-    yield from detect_lines(signals, trains)
+    named = tuple(f.where.order for f in of_envelopes if f.where.order is not None and f.where.bearing and f.is_claim)
+    yield from detect_lines(signals, trains, named)
 
 
 def with_known_angle(

@@ -368,7 +368,7 @@ def _margin_db(excess: LinesOverFloor, mesh: float, order: float) -> float | Non
 # Single lines: the mains', and the strongest that belongs to nothing known.
 
 
-def detect_lines(signals: AnalysisSignals, trains: Sequence[float] = ()) -> list[Finding]:
+def detect_lines(signals: AnalysisSignals, trains: Sequence[float] = (), named: Sequence[float] = ()) -> list[Finding]:
     """Report mains hum and the strongest unexplained line; without speed the strongest line, as a start.
 
     Parameters
@@ -376,8 +376,10 @@ def detect_lines(signals: AnalysisSignals, trains: Sequence[float] = ()) -> list
     signals : AnalysisSignals
     trains : sequence of float
         Orders of impacts that the envelopes show: they stand beside the meshes as well.
+    named : sequence of float
+        Those among them that are a bearing's, which explains their multiples.
     """
-    strongest = _unexplained(signals, trains) if signals.order_excess else _strongest(signals)
+    strongest = _unexplained(signals, trains, named) if signals.order_excess else _strongest(signals)
     return [finding for finding in (_mains(signals), strongest) if finding is not None]
 
 
@@ -466,7 +468,7 @@ def magnetic_pull_at(hertz: float) -> str:
     return f"the magnetic pull of a {mains_hz:g} Hz supply ({pull_hz:g} Hz)"
 
 
-def _unexplained(signals: AnalysisSignals, trains: Sequence[float]) -> Finding | None:
+def _unexplained(signals: AnalysisSignals, trains: Sequence[float], named: Sequence[float]) -> Finding | None:
     """Return the strongest order line that is no multiple of a known shaft's order, and no low one of a bearing's."""
     best: tuple[float, str, int, LinesOverFloor] | None = None
     foot = RUN_UP_FOOT_ORDERS if signals.speed_varies else 0.0
@@ -483,7 +485,7 @@ def _unexplained(signals: AnalysisSignals, trains: Sequence[float]) -> Finding |
             ratio = signals.rig.ratio(bearing.shaft)
             for order in bearing.orders().values() if ratio is not None else ():
                 excess = _without_bearing(excess, order * (ratio or 1.0))  # noqa: PLW2901
-        for train in trains:
+        for train in named:
             excess = _without_low_multiples(excess, train, skirt=SPREAD_OF_FOUND)  # noqa: PLW2901
         spectrum = excess.spectrum
         with np.errstate(divide="ignore", invalid="ignore"):
