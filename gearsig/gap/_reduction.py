@@ -435,8 +435,8 @@ _APART = 20.0
 """Widths between a shaft's orders from which they can be told from the supply in four places of five."""
 _N_STRONG_MULTIPLES = 3
 """Of a shaft, which unbalance, misalignment and their like raise by themselves, and their harmonics with them."""
-_N_BESIDE = 3
-_AMONG_MULTIPLES_DB = 10.0
+_N_BESIDE, _AMONG_MULTIPLES_DB = 3, 10.0
+"""Multiples on either side that hum on one of them is held against, and by how much it must exceed the strongest."""
 
 
 def mains_lines(recording: Recording, names: Sequence[str], speed_hz: float, frame: GearFrame) -> tuple[float, ...]:
@@ -828,7 +828,7 @@ BEYOND_THE_ENDS = 2048
 
 
 def _continued(values: FloatArray, by: int) -> FloatArray:
-    """Return a record continued beyond both ends by its reflections in them, without a step in value or slope.
+    """Return a record continued beyond both ends by its reflections in them, which fade: no step in value or slope.
 
     The spectrum of a record takes its end for what comes before its beginning. Where a strong slow line, such as hum,
     differs in the two, that step is a click in every band: it would be impulsive noise that nobody recorded.
