@@ -106,13 +106,13 @@ def by_severity(entry: Entry) -> tuple[int, float, float, float, str]:
 
 
 KEY_INDICATORS = (
+    "overall velocity",
     "FM4",
     "kurtosis",
     "sideband index",
     "NA4",
     "sideband level",
     "FM0",
-    "overall velocity",
     "rms",
     "crest factor",
 )
