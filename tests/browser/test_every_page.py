@@ -180,7 +180,7 @@ def test_a_page_of_the_navigation_bar_is_one_step_of_the_history(page: playwrigh
 
 
 def test_an_index_of_recordings_with_dates_fits_a_narrow_window(browser: playwright.Browser, tmp_path: Path) -> None:
-    kinds = {"FM4": "", "kurtosis": "", "sideband index": "m/s^2"}
+    kinds = {"overall velocity": "mm/s", "FM4": "", "sideband index": "m/s^2"}
     indicators = tuple(Indicator(name, 3.21, unit, "a1") for name, unit in kinds.items())
     names = ("gearbox_north_2026-11-28.csv.gz", "gearbox_south_2026-11-27.csv.gz")
     entries = [Entry(name, "a.html", Outcome.FAULT, "", "A verdict of a few words.", 0.93, 41.2) for name in names]
