@@ -260,11 +260,11 @@ def _of_machine(
     yield from detect_tooth_damage(signals)
     impacts = detect_bearings(signals, envelopes, own_bands)
     yield from impacts
-    of_envelopes = [f for f in impacts if f.where.order is not None and f.where.band_hz is not None]
-    trains = tuple(f.where.order for f in of_envelopes if f.where.order is not None)
+    of_envelopes = [(f, f.where.order) for f in impacts if f.where.order is not None and f.where.band_hz is not None]
+    trains = tuple(order for _, order in of_envelopes)
     yield from detect_sidebands(signals, trains)
     yield from detect_between_orders(signals)
-    named = tuple(f.where.order for f in of_envelopes if f.where.order is not None and f.where.bearing and f.is_claim)
+    named = tuple(order for f, order in of_envelopes if f.where.bearing and f.is_claim)
     yield from detect_lines(signals, trains, named)
 
 
@@ -381,10 +381,11 @@ def _of_bearings(
     widest = max(of_channel, key=lambda e: e.band_hz[1] - e.band_hz[0])
     for bearing in signals.rig.bearings:
         ratio = signals.rig.ratio(bearing.shaft)
+        if ratio is None or not bearing.orders():
+            continue
         for envelope in [clearest] if clearest is widest else [clearest, widest]:
-            if ratio is not None and bearing.orders():
-                band, spectrum = "{:.0f} to {:.0f} Hz".format(*envelope.band_hz), envelope.excess.spectrum
-                yield from indicators.bearing_indicators(spectrum, bearing, shaft_ratio=ratio, channel=name, band=band)
+            band, spectrum = "{:.0f} to {:.0f} Hz".format(*envelope.band_hz), envelope.excess.spectrum
+            yield from indicators.bearing_indicators(spectrum, bearing, shaft_ratio=ratio, channel=name, band=band)
 
 
 def _check_size(recording: Recording) -> None:

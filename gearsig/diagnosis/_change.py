@@ -864,7 +864,7 @@ def _of_shaft(
     axial = [c for c in of_one_turn if _is_axial(c, signals)]
     radial = max((_velocity(c, signals, since=True) for c in of_one_turn if c not in axial), default=0.0)
     moved = max((_velocity(c, signals, since=True) for c in axial if c.is_change), default=0.0)
-    shakes_axially = bool(axial) and moved > AXIAL_OF_RADIAL**2 * radial
+    shakes_axially = moved > AXIAL_OF_RADIAL**2 * radial
     bends = second >= DOUBLE_OF_SINGLE**2
     bend = BENT_SHAFT if not axial else 1.0 if shakes_axially else BENT_SHAFT**2
     weights = {

@@ -62,9 +62,9 @@ def verdict_of(findings: tuple[Finding, ...], *, has_reference: bool = False) ->
     """
     doubt = said_first(findings, claims=outcome_of(findings) in (Outcome.FAULT, Outcome.SUSPICION))
     unfit = next((f.title for f in findings if f.code in (REFERENCE_UNFIT, REFERENCE_NOT_HEALTHY)), "")
-    zoned = next((f for f in findings if f.code == VIBRATION_ZONE and f.kind is Kind.NOTICE), None)
-    loud = (f for f in findings if f.code in (VIBRATION_ZONE, OVERALL_VELOCITY) and f.kind is Kind.NOTICE)
-    zone = next((f.title for f in loud), "")
+    noticed = (f for f in findings if f.code in (VIBRATION_ZONE, OVERALL_VELOCITY) and f.kind is Kind.NOTICE)
+    loud = next(noticed, None)
+    zone = loud.title if loud is not None else ""
     changed, unchanged = (next((f.title for f in findings if f.code == code), "") for code in (CHANGED, UNCHANGED))
     others = tuple(f for f in findings if f.code not in (CHANGED, UNCHANGED, VIBRATION_ZONE))
     claims = [f for f in others if f.is_claim]
@@ -72,8 +72,10 @@ def verdict_of(findings: tuple[Finding, ...], *, has_reference: bool = False) ->
     if not claims and any(f.code == CHANGED and f.is_claim for f in findings):
         return " ".join(filter(None, (doubt, changed, zone, unfit)))
     examined_text = _said(others, has_reference=has_reference)
-    if zoned is not None and not claims:  # nothing shows the cause, but the machine is not well
-        causes = (text for text in zoned.evidence if text.endswith(CAN_DO_THAT))
+    if (
+        loud is not None and loud.code == VIBRATION_ZONE and not claims
+    ):  # nothing shows the cause, but the machine is not well
+        causes = (text for text in loud.evidence if text.endswith(CAN_DO_THAT))
         why = next(causes, "What is wrong does not show.")
         examined_text = f"{zone} {why}{examined_text.removeprefix(NO_FAULT).removeprefix(CANNOT_TELL)}"
         zone = ""

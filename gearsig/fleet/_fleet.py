@@ -67,6 +67,8 @@ _STATE = {
 }
 _TYPED = ", ".join(f"{name}::{kind} AS {name}" for name, kind in _STATE.items())
 """Columns of a series' state: see `state_rows`."""
+LATEST = f"(outcome <> '{UNTOLD}', date)"
+"""What the recording is largest in that a diagnosis is of: the last that tells, else the last."""
 
 
 @dataclass(frozen=True)
@@ -246,8 +248,8 @@ class Fleet:
             WITH latest AS (
                 SELECT machine, point, count(*) FILTER (outcome <> '{FAILED}') AS n_recordings,
                     count(*) FILTER (outcome = '{FAILED}') AS n_failed, min(date) AS first, max(date) AS last,
-                    arg_max(outcome, (outcome <> '{UNTOLD}', date)) FILTER (outcome <> '{FAILED}') AS outcome,
-                    arg_max(verdict, (outcome <> '{UNTOLD}', date)) FILTER (outcome <> '{FAILED}') AS verdict
+                    arg_max(outcome, {LATEST}) FILTER (outcome <> '{FAILED}') AS outcome,
+                    arg_max(verdict, {LATEST}) FILTER (outcome <> '{FAILED}') AS verdict
                 FROM recordings GROUP BY machine, point
             ), judged AS (
                 SELECT machine, point, max(level) AS level, count(*) FILTER (level = {ALARM}) AS n_alarms,
@@ -423,12 +425,10 @@ class Fleet:
         )
         rows = self._rows(
             f"""
-            WITH good AS (
-                SELECT *, (outcome <> '{UNTOLD}', date) AS latest FROM recordings WHERE outcome <> '{FAILED}'
-            ), split AS (
+            WITH good AS (FROM recordings WHERE outcome <> '{FAILED}'), split AS (
                 SELECT machine, point, max(date) AS date,
-                    arg_max(outcome, latest) FILTER (added <= $1) AS before, arg_max(outcome, latest) AS now,
-                    arg_max(verdict, latest) AS verdict, max(added) AS added
+                    arg_max(outcome, {LATEST}) FILTER (added <= $1) AS before, arg_max(outcome, {LATEST}) AS now,
+                    arg_max(verdict, {LATEST}) AS verdict, max(added) AS added
                 FROM good GROUP BY machine, point
             )
             SELECT machine, point, date, coalesce(before, ''), now, verdict FROM split

@@ -464,10 +464,11 @@ def counted_against(
 
 
 def _is_first_of_a_shaft(place: GapPlace, frame: GearFrame) -> bool:
-    turns = np.divide(place.orders[0], frame.shaft_orders) if place.orders else np.zeros(1)
-    near = np.round(turns)
-    is_multiple = (near >= 1) & (near <= N_FIRST_ORDERS) & (np.abs(turns - near) <= SAME_ORDER * near)
-    return place.kind is PlaceKind.SHAFT and bool(is_multiple.any())
+    return place.kind is PlaceKind.SHAFT and any(
+        1 <= round(turns) <= N_FIRST_ORDERS and abs(turns - round(turns)) <= SAME_ORDER * round(turns)
+        for order in place.orders[:1]
+        for turns in np.divide(order, frame.shaft_orders)
+    )
 
 
 def _is_an_order(place: GapPlace, frame: GearFrame) -> bool:

@@ -59,12 +59,14 @@ def test_an_axial_sensor_tells_a_bent_shaft_from_an_unbalance() -> None:
     of_radial = beside_healthy(HEALTHY | {1.0: 0.5})
     assert finding(of_radial, "unbalance").title == "Perhaps unbalance or a bent shaft of rotor."
     axial = Channel("a2", "acceleration", "m/s^2", "front bearing, axial")
-    for share, cause in ((1.0, "bent-shaft"), (0.2, "unbalance")):
+    for share, cause, title in ((1.0, "bent-shaft", "a bent shaft"), (0.2, "unbalance", "unbalance")):
         now, healthy = (
             replace(one, samples=np.vstack([one.samples, share * one.samples]), channels=(*one.channels, axial))
             for one in (rotor(HEALTHY | {1.0: 0.5}, seed=1), rotor(HEALTHY, seed=2))
         )
-        assert codes(analyze(now, reference=healthy), Kind.SUSPICION) == ["changed-since-reference", cause]
+        analysis = analyze(now, reference=healthy)
+        assert codes(analysis, Kind.SUSPICION) == ["changed-since-reference", cause]
+        assert finding(analysis, cause).title == f"Perhaps {title} of rotor."
 
 
 def test_multiples_that_rise_together_are_no_matter_of_another_speed() -> None:

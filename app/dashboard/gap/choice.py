@@ -153,6 +153,9 @@ def files_of(choice: Choice, folder: Path) -> GapRequest:
     """
     common = common_rig(choice)
     rig = None
+    if common is not None:
+        rig = folder / "rig.toml"
+        rig.write_text(common.rig_text, encoding="utf-8")
     for file in choice.recorded if common is None else ():
         if not isinstance(file.content, Path) and own_rig(file, choice.rigs) is None:
             raise InputError(
@@ -160,9 +163,6 @@ def files_of(choice: Choice, folder: Path) -> GapRequest:
                 where=file.name,
                 remedy="upload one for all recordings, or one of the recording's name; the Analysis page makes it",
             )
-    if common is not None:
-        rig = folder / "rig.toml"
-        rig.write_text(common.rig_text, encoding="utf-8")
     paths = [_written(file, folder / str(i), choice.rigs) for i, file in enumerate(choice.recorded, 1)]
     n, n_compared = len(choice.recordings), len(choice.recordings) + len(choice.references)
     return GapRequest(

@@ -126,8 +126,8 @@ def show_machine(file: ChosenFile, channels: Sequence[str] = (), *, is_told: boo
         edited = _form(file, table, text, channels, first)
         with follows:
             _show_consequences(edited, shown_already=_rig_of(table) if is_told else None)
-    if _rig_of(edited) != _rig_of(table) or (edited != table and isinstance(_rig_of(edited), str)):
-        changed = tomli_w.dumps(edited)
+    described, changed = _rig_of(edited), text if edited == table else tomli_w.dumps(edited)
+    if described != _rig_of(table) or (edited != table and isinstance(described, str)):
         with st.container(horizontal=True):
             st.button(
                 "Analyse with this machine",
@@ -135,12 +135,12 @@ def show_machine(file: ChosenFile, channels: Sequence[str] = (), *, is_told: boo
                 icon=":material/check:",
                 on_click=_take,
                 args=(file, changed),
-                disabled=isinstance(_rig_of(edited), str),  # what is wrong stands beside the form
+                disabled=isinstance(described, str),  # what is wrong stands beside the form
             )
             st.button("Discard", on_click=_take, args=(file, text))
     if not is_unknown:
         show_stated(file)
-    _show_text(file, text if edited == table else tomli_w.dumps(edited))
+    _show_text(file, changed)
 
 
 def _rig_of(table: Table) -> Rig | str:
