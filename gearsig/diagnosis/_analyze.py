@@ -32,7 +32,7 @@ from gearsig.diagnosis._signals import (
     kurtogram_bands,
 )
 from gearsig.diagnosis._start_stop import start_stop_analysis
-from gearsig.diagnosis._tooth import detect_tooth_damage
+from gearsig.diagnosis._tooth import detect_tooth_damage, with_changed_teeth
 from gearsig.diagnosis._types import (
     Analysis,
     AnalysisSettings,
@@ -234,7 +234,7 @@ def _against(
     beside = (signals, now, then[0], before)
     not_healthy = reference_not_healthy(reference, shows_fault=outcome_of(findings) is Outcome.FAULT)
     findings = beside_reference(findings, reference, lambda f: family_change(f, *beside))
-    findings = with_clearest_band(findings, signals, then[0])
+    findings = with_changed_teeth(with_clearest_band(findings, signals, then[0]), signals, then[0])
     compared = level_changes(*beside)
     changed = change_findings(compared, signals, then[0], findings)
     # What the comparison names of a shaft is not named again from the recording alone.

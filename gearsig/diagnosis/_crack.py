@@ -85,9 +85,11 @@ def with_crack(findings: Sequence[Finding], answer: Answer | None, rig: Rig) -> 
         title = f"The depth of a root crack cannot be told: {answer.reason}."
         finding = cannot_tell(DEPTH_UNKNOWN, title, surer=surer)
         # Of several pairs, or of teeth whose size is not known, no depth is ever told: that hinders nothing that the
-        # reference was given for. What has changed at the teeth is told without it.
+        # reference was given for. What has changed at the teeth is told without it, or that nothing has.
         is_never_told = len(rig.pairs) > 1 or any(None in (p.module_mm, p.face_width_mm) for p in rig.pairs)
-        return [*findings, replace(finding, kind=Kind.INFORMATION) if is_never_told else finding]
+        codes = {f.code for f in findings}
+        are_examined = "no-tooth-local-damage" in codes and not codes & {"tooth-damage-undecided", "tooth-not-examined"}
+        return [*findings, replace(finding, kind=Kind.INFORMATION) if is_never_told or are_examined else finding]
     if isinstance(answer, NoCrackSeen):
         # Both gears of the pair are looked at: if a crack through half of the root would have shown, the teeth count as
         # examined.

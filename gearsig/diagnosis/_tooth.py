@@ -23,9 +23,12 @@ from gearsig.diagnosis._types import (
     from_p_value,
     p_text,
 )
+from gearsig.errors import RefusalError
 from gearsig.formatting import enumerated, percent, unit_text
-from gearsig.orders import whole_revolutions
+from gearsig.orders import SeparatedAverage, separate, whole_revolutions
 from gearsig.prepared import chance_of_any, has_mark, sliding_mean, strongest_window
+from gearsig.severity import ShaftLines, difference_lines, reversed_channels
+from gearsig.spectra import ComplexArray
 
 
 @dataclass(frozen=True)
@@ -279,10 +282,14 @@ def largest_event(shaft: ShaftSignals, signals: AnalysisSignals) -> LocalEvent:
 
 def _above(values: FloatArray, lowest_order: int) -> FloatArray:
     """Return periodic signals, (…, n_angles), without the orders below `lowest_order`."""
-    if lowest_order == 0:
-        return values
+    return values if lowest_order == 0 else _within(values, lowest_order, values.shape[-1])
+
+
+def _within(values: FloatArray, lowest_order: int, highest_order: int) -> FloatArray:
+    """Return periodic signals, (…, n_angles), with the orders from the lowest to the highest alone."""
     lines = np.fft.rfft(values, axis=-1)
     lines[..., :lowest_order] = 0
+    lines[..., highest_order + 1 :] = 0
     return np.asarray(np.fft.irfft(lines, values.shape[-1], axis=-1))
 
 
@@ -377,14 +384,23 @@ SMALLEST_SHARE, SMALLEST_SIGNIFICANCE = 0.05, 3.0
 is too small to matter, or is made by the ends of the record."""
 
 
+AGREES, RULES = 0.5, 1.5
+"""How far an average's pattern of teeth must agree with the healthy one's for what differs to be a change; else rms of
+the event over what the healthy average has there, from which it is no tooth of the healthy pattern, wrongly placed."""
+
+
 @dataclass(frozen=True)
 class _Examined:
-    """A shaft with its largest local event, and the event's chance after all shafts that were tried."""
+    """A shaft with its largest local event, and the event's chance after all shafts that were tried.
+
+    `since_reference` tells whether it is an event of what differs from the healthy average, not of the average itself.
+    """
 
     signals: AnalysisSignals
     shaft: ShaftSignals
     event: LocalEvent
     p_value: float
+    since_reference: bool = False
 
     @property
     def has_mark(self) -> bool:
@@ -401,8 +417,9 @@ class _Examined:
     def is_steady(self) -> bool:
         """Whether the event is of some size, and in odd and even revolutions alike; chance impacts correlate by 0."""
         event = self.event
-        smallest = max(SMALLEST_SHARE * event.average_rms, SMALLEST_SIGNIFICANCE * event.error_rms)
-        return event.rms >= smallest and event.place.repeatability >= 0.7
+        # The standard error counts other shafts' lines as well, which an average lessens and two averages share.
+        error = 0.0 if self.since_reference else SMALLEST_SIGNIFICANCE * event.error_rms
+        return event.rms >= max(SMALLEST_SHARE * event.average_rms, error) and event.place.repeatability >= 0.7
 
     @property
     def is_withheld(self) -> bool:
@@ -435,9 +452,104 @@ class _Examined:
 
 def detect_tooth_damage(signals: AnalysisSignals) -> list[Finding]:
     """Look at each shaft's difference signals for a local event, and say which shafts could not be examined."""
-    able = [s for s in signals.shafts if s.separated and _why_blind(signals, s) == ""]
-    tested = [(s, largest_event(s, signals)) for s in able]
-    examined = [_Examined(signals, s, event, min(1.0, event.place.p_value * len(tested))) for s, event in tested]
+    able = _able(signals)
+    return _findings(signals, _tested(signals, able)) + _not_examined(signals, {s.shaft for s in able})
+
+
+def with_changed_teeth(
+    findings: Sequence[Finding], signals: AnalysisSignals, healthy: AnalysisSignals
+) -> list[Finding]:
+    r"""Return the findings with what has changed at the teeth since the reference, where both averages compare.
+
+    What teeth are made with cancels in the difference of two averages at one speed, turned so that the same teeth meet:
+
+    .. math:: d[n] = x[n] - g_k r[n] e^{-2 \pi i n s}
+
+    with the shift s and each mesh harmonic's gain g of `gearsig.severity.difference_lines`. A local event of it is
+    tested as one of the average itself is. It takes the place of what the recording alone tells of teeth; where there
+    is none, "no damage shows" does so on shafts where a change of a useful size would have shown.
+    """
+    able = _able(signals)
+    compared = [s for s in (_since(signals, shaft, healthy) for shaft in able) if s is not None]
+    # Looking at the recording alone came before: two tests for each shaft.
+    new = _findings(signals, _tested(signals, compared, n_tests=2 * len(able), since_reference=True))
+    if any(f.is_claim for f in new):
+        return [*(f for f in findings if f.code not in _OF_TEETH), *new]
+    if len(compared) < len(able) or any(f.is_claim and f.code in _OF_TEETH for f in findings):
+        return list(findings)
+    new = [f for f in new if f.code in _STATEMENTS]
+    return [*(f for f in findings if f.code not in _STATEMENTS), *new] if new else list(findings)
+
+
+_STATEMENTS = ("no-tooth-local-damage", "tooth-damage-undecided")
+_OF_TEETH = (*_STATEMENTS, "tooth-local-damage")
+
+
+def _since(signals: AnalysisSignals, shaft: ShaftSignals, healthy: AnalysisSignals) -> ShaftSignals | None:
+    """Return what belongs to a shaft less what the healthy machine has; None where the two do not compare."""
+    before = next((s for s in healthy.shafts if s.shaft == shaft.shaft), None)
+    names = [n for n in shaft.separated if before is not None and n in before.separated]
+    if before is None or not names:
+        return None
+    highest = min(s.averages[n].highest_line for s in (shaft, before) for n in names)
+    now, then = _lines_of(signals, shaft, names, highest), _lines_of(healthy, before, names, highest)
+    on_either = {s for pair in signals.rig.pairs_on(shaft.shaft) for s in (pair.driver, pair.driven)}
+    is_marked = any(all(has_mark(g.recording, g.rig, s) for g in (signals, healthy)) for s in on_either)
+    then = then.turned_about(reversed_channels(now, then, whole_teeth=is_marked))
+    try:
+        changed, agreement = difference_lines(now, then, whole_teeth=is_marked)
+    except RefusalError:  # another speed
+        return None
+    separated, halves, born = {}, {}, {}
+    for name, row, was in zip(names, changed.lines, now.lines - changed.lines, strict=True):
+        average = shaft.averages[name]
+        visible = tuple(z for z in shaft.teeth if z <= highest)
+        separated[name], born[name] = (
+            separate(replace(average, values=_revolution(lines, len(average.values))), visible) for lines in (row, was)
+        )
+        # Both halves less the same: the whole healthy average.
+        halves[name] = _within(shaft.halves[name], 0, highest) - born[name].difference.values
+    since = replace(shaft, separated=separated, halves=halves)
+    return since if agreement >= AGREES or _rules(largest_event(since, signals), born) else None
+
+
+def _rules(event: LocalEvent, born: Mapping[str, SeparatedAverage]) -> bool:
+    """Whether an event is larger than what the healthy average has in its window."""
+    values = born[event.channel].difference.values
+    inside = round(event.place.start_rev * len(values)) + np.arange(round(event.place.width_rev * len(values)))
+    return event.rms >= RULES * float(np.sqrt(np.mean(values[inside % len(values)] ** 2)))
+
+
+def _lines_of(signals: AnalysisSignals, shaft: ShaftSignals, names: Sequence[str], highest: int) -> ShaftLines:
+    """Return a shaft's averages in the form that the alignment takes; of several gears the first one's teeth count."""
+    averages = [shaft.averages[name] for name in names]
+    lines, teeth = np.stack([average.lines()[: highest + 1] for average in averages]), shaft.teeth[0]
+    order_hz, is_marked = shaft.angle.mean_speed_rpm / 60.0, has_mark(signals.recording, signals.rig, shaft.shaft)
+    n_revolutions = averages[0].n_revolutions
+    return ShaftLines(shaft.shaft, teeth, teeth, lines, n_revolutions, highest, order_hz, tuple(names), is_marked)
+
+
+def _revolution(lines: ComplexArray, n_angles: int) -> FloatArray:
+    """Return the revolution of amplitudes (peak), without its mean."""
+    full = np.pad(lines, (0, n_angles // 2 + 1 - len(lines)))
+    full[0] = 0.0
+    return np.asarray(np.fft.irfft(full, n_angles) * (n_angles / 2.0))
+
+
+def _able(signals: AnalysisSignals) -> list[ShaftSignals]:
+    return [s for s in signals.shafts if s.separated and _why_blind(signals, s) == ""]
+
+
+def _tested(
+    signals: AnalysisSignals, shafts: Sequence[ShaftSignals], *, n_tests: int = 0, since_reference: bool = False
+) -> list[_Examined]:
+    events = [(shaft, largest_event(shaft, signals)) for shaft in shafts]
+    n = n_tests or len(shafts)
+    return [_Examined(signals, s, e, min(1.0, e.place.p_value * n), since_reference) for s, e in events]
+
+
+def _findings(signals: AnalysisSignals, examined: list[_Examined]) -> list[Finding]:
+    """Return what the shafts' largest events are, or that nothing shows at their teeth."""
     judged = [(e, _finding(e)) for e in _one_per_speed(examined)]
     findings = [f for _, f in judged if f is not None]
     codes = {f.code for f in findings}
@@ -448,7 +560,7 @@ def detect_tooth_damage(signals: AnalysisSignals) -> list[Finding]:
     elif "event-in-some-revolutions" not in codes:  # with it, even the speed is in doubt
         findings += _nothing_shows(signals, [e for e, f in judged if f is None])
         findings += _undecided([e for e, f in judged if f is not None], "other local events would cover damage")
-    return findings + _not_examined(signals, {s.shaft for s in able})
+    return findings
 
 
 def _one_per_speed(examined: list[_Examined]) -> list[_Examined]:
@@ -521,8 +633,10 @@ def _damage(examined: _Examined) -> Finding:
     # One in ten once-per-revolution events on a shaft with gears is no tooth's, but a key's, a coupling's or a rub's.
     confidence = from_p_value(examined.p_value) * 0.9
     confidence *= WITH_ASSUMED_DATA if assumed or examined.is_at_mark else 1.0
-    confidence *= ONE_ODD_TOOTH if place.ratio_db < UNEQUAL_DB else 1.0
-    clear = examined.reaches(CLEAR) and not assumed and not examined.is_at_mark
+    is_odd = place.ratio_db < UNEQUAL_DB and not examined.since_reference  # what a gear is made with, both have
+    confidence *= ONE_ODD_TOOTH if is_odd else 1.0
+    level = (CLEAR[0], WORTH_SAYING[1]) if examined.since_reference else CLEAR
+    clear = examined.reaches(level) and not assumed and not examined.is_at_mark
     tooth = int(place.angle_rev * shaft.teeth[0]) + 1 if len(shaft.teeth) == 1 and examined.has_mark else None
     at = f"at {360 * place.angle_rev:.0f}°, tooth {tooth} of {shaft.teeth[0]}," if tooth else "at one place"
     ratio = signals.rig.ratio(shaft.shaft) or 1.0
@@ -553,13 +667,19 @@ def _damage(examined: _Examined) -> Finding:
 
 def _evidence(examined: _Examined) -> Iterator[str]:
     shaft, event = examined.shaft, examined.event
-    yield f"Energy in one tooth pitch is {event.place.ratio_db:.1f} dB over the median pitch, all channels together."
+    of_what = " of what differs from the reference" if examined.since_reference else ""
+    yield (
+        f"Energy{of_what} in one tooth pitch is {event.place.ratio_db:.1f} dB over the median pitch, all channels "
+        "together."
+    )
     yield f"{shaft.averages[event.channel].n_revolutions} revolutions were averaged."
     yield f"It comes back: odd and even revolutions correlate there by {event.place.repeatability:.2f}."
     yield f"Its rms is {percent(event.rms / event.average_rms)} of the whole average's."
     if len(event.peaks_rev) > 1:
         yield f"It is the largest of {len(event.peaks_rev)} local events: several teeth, or another cause."
-    if event.place.ratio_db < UNEQUAL_DB:
+    if examined.since_reference:
+        yield "The averages were turned so that the same teeth meet: what teeth are made with cancels."
+    elif event.place.ratio_db < UNEQUAL_DB:
         yield "It stands out of teeth that are alike: a gear made with one odd tooth shows as much."
     if examined.is_at_mark:
         yield "It is at the tachometer's mark: cross-talk from its cable would look the same."
@@ -665,8 +785,9 @@ def _visible_text(examined: _Examined) -> str:
     share = 100 * smallest / event.average_rms if event.average_rms > 0 else 0.0
     unit = examined.signals.recording.channels[examined.signals.recording.index(event.channel)].unit
     return (
-        f"Shaft {examined.shaft.shaft}: the largest tooth is {event.place.ratio_db:.1f} dB over the median (chance if "
-        f"teeth merely differ: {p_text(examined.p_value)}). An event of {smallest:.3g}"
+        f"Shaft {examined.shaft.shaft}: the largest {'change of a tooth' if examined.since_reference else 'tooth'} is "
+        f"{event.place.ratio_db:.1f} dB over the median (chance if teeth merely differ: "
+        f"{p_text(examined.p_value)}). An event of {smallest:.3g}"
         f"{f' {unit_text(unit)}' if unit else ''} rms in {event.channel}, "
         f"{share:.0f} % of the average, would have shown."
     )
