@@ -25,7 +25,7 @@ from gearsig.diagnosis._types import (
 )
 from gearsig.errors import RefusalError
 from gearsig.formatting import enumerated, percent, unit_text
-from gearsig.orders import SeparatedAverage, separate, whole_revolutions
+from gearsig.orders import separate, whole_revolutions
 from gearsig.prepared import chance_of_any, has_mark, sliding_mean, strongest_window
 from gearsig.severity import ShaftLines, difference_lines, reversed_channels
 from gearsig.spectra import ComplexArray
@@ -388,6 +388,10 @@ AGREES, RULES = 0.5, 1.5
 """How far an average's pattern of teeth must agree with the healthy one's for what differs to be a change; else rms of
 the event over what the healthy average has there, from which it is no tooth of the healthy pattern, wrongly placed."""
 
+ODD_DB, SAME_SHAPE, PART = 6.0, 0.8, 0.5
+"""A tooth that stood out of the healthy gear as far, dB over the median, and differs by so small a part of what it was,
+in the same shape: another load has changed it, no damage."""
+
 
 @dataclass(frozen=True)
 class _Examined:
@@ -453,7 +457,9 @@ class _Examined:
 def detect_tooth_damage(signals: AnalysisSignals) -> list[Finding]:
     """Look at each shaft's difference signals for a local event, and say which shafts could not be examined."""
     able = _able(signals)
-    return _findings(signals, _tested(signals, able)) + _not_examined(signals, {s.shaft for s in able})
+    events = [(s, largest_event(s, signals)) for s in able]
+    examined = [_Examined(signals, s, event, min(1.0, event.place.p_value * len(able))) for s, event in events]
+    return _findings(signals, examined) + _not_examined(signals, {s.shaft for s in able})
 
 
 def with_changed_teeth(
@@ -470,9 +476,14 @@ def with_changed_teeth(
     is none, "no damage shows" does so on shafts where a change of a useful size would have shown.
     """
     able = _able(signals)
-    compared = [s for s in (_since(signals, shaft, healthy) for shaft in able) if s is not None]
+    pairs = [(c, largest_event(c.since, signals)) for c in (_compared(signals, s, healthy) for s in able) if c]
     # Looking at the recording alone came before: two tests for each shaft.
-    new = _findings(signals, _tested(signals, compared, n_tests=2 * len(able), since_reference=True))
+    compared = [
+        _Examined(signals, c.since, event, min(1.0, 2 * len(able) * event.place.p_value), since_reference=True)
+        for c, event in pairs
+        if not c.is_healthys(event)
+    ]
+    new = _findings(signals, compared)
     if any(f.is_claim for f in new):
         return [*(f for f in findings if f.code not in _OF_TEETH), *new]
     if len(compared) < len(able) or any(f.is_claim and f.code in _OF_TEETH for f in findings):
@@ -485,8 +496,40 @@ _STATEMENTS = ("no-tooth-local-damage", "tooth-damage-undecided")
 _OF_TEETH = (*_STATEMENTS, "tooth-local-damage")
 
 
-def _since(signals: AnalysisSignals, shaft: ShaftSignals, healthy: AnalysisSignals) -> ShaftSignals | None:
-    """Return what belongs to a shaft less what the healthy machine has; None where the two do not compare."""
+@dataclass(frozen=True)
+class _Compared:
+    """What belongs to a shaft less what the healthy machine has there, and how far both patterns of teeth agree."""
+
+    since: ShaftSignals
+    healthy: Mapping[str, FloatArray]
+    """Channel → the healthy average's difference signal, turned to the same teeth."""
+    agreement: float
+
+    def is_healthys(self, event: LocalEvent) -> bool:
+        """Whether a tooth of the healthy gear explains what differs: wrongly placed, or one that was odd before."""
+        n = len(self.healthy[event.channel])
+        width = round(event.place.width_rev * n)
+        inside = (round(event.place.start_rev * n) + np.arange(width)) % n
+        if self.agreement < AGREES:
+            was = float(np.sqrt(np.mean(self.healthy[event.channel][inside] ** 2)))
+            return event.rms < RULES * was
+        # Channels of their own units: each relative to the healthy average's energy.
+        healthy = np.stack(list(self.healthy.values()))
+        scale = np.sqrt(np.mean(healthy**2, axis=1, keepdims=True))
+        before = np.divide(healthy, scale, out=np.zeros_like(healthy), where=scale > 0)
+        now = np.stack([self.since.separated[name].difference.values for name in self.healthy])
+        change = np.divide(now, scale, out=np.zeros_like(now), where=scale > 0)[:, inside].ravel()
+        energy = sliding_mean(np.sum(before**2, axis=0), width)
+        tooth = before[:, inside].ravel()
+        sizes = float(np.linalg.norm(change)), float(np.linalg.norm(tooth))
+        if min(sizes) == 0 or np.mean(tooth**2) * len(healthy) < 10 ** (ODD_DB / 10) * np.median(energy):
+            return False
+        shape = abs(float(change @ tooth)) / (sizes[0] * sizes[1])
+        return shape >= SAME_SHAPE and sizes[0] <= PART * sizes[1]
+
+
+def _compared(signals: AnalysisSignals, shaft: ShaftSignals, healthy: AnalysisSignals) -> _Compared | None:
+    """Return a shaft beside the healthy machine's; None where the two do not compare."""
     before = next((s for s in healthy.shafts if s.shaft == shaft.shaft), None)
     names = [n for n in shaft.separated if before is not None and n in before.separated]
     if before is None or not names:
@@ -502,22 +545,14 @@ def _since(signals: AnalysisSignals, shaft: ShaftSignals, healthy: AnalysisSigna
         return None
     separated, halves, born = {}, {}, {}
     for name, row, was in zip(names, changed.lines, now.lines - changed.lines, strict=True):
-        average = shaft.averages[name]
-        visible = tuple(z for z in shaft.teeth if z <= highest)
-        separated[name], born[name] = (
+        average, visible = shaft.averages[name], tuple(z for z in shaft.teeth if z <= highest)
+        separated[name], healthy_parts = (
             separate(replace(average, values=_revolution(lines, len(average.values))), visible) for lines in (row, was)
         )
+        born[name] = healthy_parts.difference.values
         # Both halves less the same: the whole healthy average.
-        halves[name] = _within(shaft.halves[name], 0, highest) - born[name].difference.values
-    since = replace(shaft, separated=separated, halves=halves)
-    return since if agreement >= AGREES or _rules(largest_event(since, signals), born) else None
-
-
-def _rules(event: LocalEvent, born: Mapping[str, SeparatedAverage]) -> bool:
-    """Whether an event is larger than what the healthy average has in its window."""
-    values = born[event.channel].difference.values
-    inside = round(event.place.start_rev * len(values)) + np.arange(round(event.place.width_rev * len(values)))
-    return event.rms >= RULES * float(np.sqrt(np.mean(values[inside % len(values)] ** 2)))
+        halves[name] = _within(shaft.halves[name], 0, highest) - born[name]
+    return _Compared(replace(shaft, separated=separated, halves=halves), born, agreement)
 
 
 def _lines_of(signals: AnalysisSignals, shaft: ShaftSignals, names: Sequence[str], highest: int) -> ShaftLines:
@@ -538,14 +573,6 @@ def _revolution(lines: ComplexArray, n_angles: int) -> FloatArray:
 
 def _able(signals: AnalysisSignals) -> list[ShaftSignals]:
     return [s for s in signals.shafts if s.separated and _why_blind(signals, s) == ""]
-
-
-def _tested(
-    signals: AnalysisSignals, shafts: Sequence[ShaftSignals], *, n_tests: int = 0, since_reference: bool = False
-) -> list[_Examined]:
-    events = [(shaft, largest_event(shaft, signals)) for shaft in shafts]
-    n = n_tests or len(shafts)
-    return [_Examined(signals, s, e, min(1.0, e.place.p_value * n), since_reference) for s, e in events]
 
 
 def _findings(signals: AnalysisSignals, examined: list[_Examined]) -> list[Finding]:
