@@ -182,13 +182,17 @@ def _examined(
         findings.append(reference_unfit(reference_analysis))
         reference_analysis = healthy = None
     found = tuple(_indicators(signals, envelopes, then[0] if then is not None else None))
-    findings += [*_of_machine(signals, envelopes, own_bands), *detect_resonances(levels)]
+    beside = None
+    if healthy is not None and then is not None:
+        now, before = in_common_bands(signals, envelopes, *then, healthy)
+        beside = (signals, now, then[0], before)
+    findings += [*_of_machine(signals, envelopes, own_bands, beside), *detect_resonances(levels)]
     findings += detect_vibration_zone(signals, found)
 
     # Against the reference, findings that it shows as well step down before what has changed adds findings of its own.
     compared: tuple[LevelChange, ...] = ()
-    if healthy is not None and reference_analysis is not None and then is not None:
-        findings, compared = _against(findings, signals, envelopes, reference_analysis, then, healthy)
+    if beside is not None and reference_analysis is not None:
+        findings, compared = _against(findings, reference_analysis, beside)
     # Doubts come last, when all that they could lower is there; the crack's depth takes no channel that they spoil.
     findings, unfit = lowered(findings, names), dead | spoiled(findings, names)
     crack: Answer | None = withheld_crack(findings, is_asked=healthy is not None and bool(known.pairs))
@@ -221,22 +225,24 @@ def _of_reference(
     return healthy.keep(("diagnosis", settings), lambda: _examined(healthy, settings, None, None, lambda _: None))
 
 
+Beside = tuple[AnalysisSignals, Sequence[BandEnvelope], AnalysisSignals, Sequence[BandEnvelope]]
+"""What was looked at in a recording and in its reference, the envelopes in the same bands."""
+
+
 def _against(
-    findings: list[Finding],
-    signals: AnalysisSignals,
-    envelopes: Sequence[BandEnvelope],
-    reference: Analysis,
-    then: Shown,
-    healthy: PreparedRecording,
+    findings: list[Finding], reference: Analysis, beside: Beside
 ) -> tuple[list[Finding], tuple[LevelChange, ...]]:
     """Return the findings beside those of the reference, with what has changed, and the levels compared."""
-    now, before = in_common_bands(signals, envelopes, *then, healthy)
-    beside = (signals, now, then[0], before)
-    not_healthy = reference_not_healthy(reference, shows_fault=outcome_of(findings) is Outcome.FAULT)
-    findings = beside_reference(findings, reference, lambda f: family_change(f, *beside))
-    findings = with_changed_teeth(with_clearest_band(findings, signals, then[0]), signals, then[0])
+    signals, _, then, _ = beside
+
+    def measured(finding: Finding) -> LevelChange | None:
+        return family_change(finding.where, *beside)
+
+    not_healthy = reference_not_healthy(reference, measured, shows_fault=outcome_of(findings) is Outcome.FAULT)
+    findings = beside_reference(findings, reference, measured)
+    findings = with_changed_teeth(with_clearest_band(findings, signals, then), signals, then)
     compared = level_changes(*beside)
-    changed = change_findings(compared, signals, then[0], findings)
+    changed = change_findings(compared, signals, then, findings)
     # What the comparison names of a shaft is not named again from the recording alone.
     again = {HALF_ORDERS: {"looseness", "rub"}, OIL_WHIRL: {OIL_WHIRL}}
     named = {(f.code, f.where.shaft) for f in changed if f.is_claim}
@@ -245,7 +251,10 @@ def _against(
 
 
 def _of_machine(
-    signals: AnalysisSignals, envelopes: list[BandEnvelope], own_bands: Sequence[KurtogramBand]
+    signals: AnalysisSignals,
+    envelopes: list[BandEnvelope],
+    own_bands: Sequence[KurtogramBand],
+    beside: Beside | None,
 ) -> Iterator[Finding]:
     """Yield what gears, bearings, shafts and single lines show."""
     if not (signals.rig.pairs or signals.rig.bearings):
@@ -258,7 +267,12 @@ def _of_machine(
         yield cannot_tell("machine-not-described", title, surer=surer)
     yield from detect_mesh(signals)
     yield from detect_tooth_damage(signals)
-    impacts = detect_bearings(signals, envelopes, own_bands)
+
+    def is_as_before(where: Where) -> bool:
+        change = family_change(where, *beside) if beside is not None else None
+        return change is not None and not change.is_change
+
+    impacts = detect_bearings(signals, envelopes, own_bands, is_as_before)
     yield from impacts
     of_envelopes = [(f, f.where.order) for f in impacts if f.where.order is not None and f.where.band_hz is not None]
     trains = tuple(order for _, order in of_envelopes)

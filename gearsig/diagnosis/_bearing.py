@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from math import ceil, inf
 from statistics import median_high
@@ -63,6 +63,11 @@ whole multiple of it as well, and it is the part's only if the stated speed is r
 WORTH_A_SUSPICION = 0.3
 """Below this confidence a family at a part's order is worth a notice: other causes are more likely together."""
 
+SMOOTH = (20.0, 0.25)
+"""How far the line at a race's order must stand over the floor for its multiples to tell, in dB; power of these against
+its own up to which no knocks make the family, but play, waviness or elements that pass the load. Slip, which spreads
+the multiples, took that of knocks down to 0.31."""
+
 OTHER_MAKE = 0.04
 """How far the orders of two makes of a bearing of one designation may be apart."""
 
@@ -75,11 +80,15 @@ be. Of elements and cages, which seldom break first, half of them."""
 
 
 def detect_bearings(
-    signals: AnalysisSignals, envelopes: Sequence[BandEnvelope], kurtogram_bands: Sequence[KurtogramBand] = ()
+    signals: AnalysisSignals,
+    envelopes: Sequence[BandEnvelope],
+    kurtogram_bands: Sequence[KurtogramBand] = (),
+    is_as_before: Callable[[Where], bool] = lambda _: False,
 ) -> list[Finding]:
     """Name the race where the rig gives the bearing; else report families that nothing known explains.
 
-    The bands that the kurtograms choose are searched like the others, and say what they show of a race found.
+    The bands that the kurtograms choose are searched like the others, and say what they show of a race found. Lines
+    that are as strong in the healthy machine's recording leave no doubt whether a bearing has been damaged since.
     """
     cleaned = [
         replace(envelope, excess=without_shafts(signals, envelope.excess))
@@ -107,7 +116,7 @@ def detect_bearings(
     findings += trains
     if not claimed and signals.rig.bearings and cleaned:
         fixed = cleaned[: len(envelopes)]  # where a damage rings is not known beforehand; an own band follows it
-        findings += _none_shows(signals, fixed, families)
+        findings += _none_shows(signals, fixed, families, is_as_before)
     return findings
 
 
@@ -122,16 +131,16 @@ def _named_finding(signals: AnalysisSignals, candidate: Candidate, n_parts: int)
     is_beyond_slip = only_stated and abs(slip) > signals.settings.bearing_slip
     times = factor_left_open(signals)
     is_shared = candidate.name == "FTF" or candidate.in_train or n_parts > MAX_PARTS
-    is_hunting = _is_among_hunting_lines(signals, candidate)
+    is_hunting, is_smooth = _is_among_hunting_lines(signals, candidate), _is_smooth(candidate)
 
     confidence = from_p_value(candidate.p_value) * candidate.share
     confidence *= WITH_ASSUMED_DATA if signals.rig.assumed else 1.0
-    confidence *= SHARED_BY_OTHERS ** (is_shared + is_hunting)
+    confidence *= SHARED_BY_OTHERS ** (is_shared + is_hunting + is_smooth)
     is_of_other_speed = is_beyond_slip or times > 1
     if only_stated or is_of_other_speed:
         is_likely = (candidate.name in RACES or abs(slip) <= USUAL_SLIP) and not is_of_other_speed
         confidence *= WITH_STATED_SPEED if is_likely else AT_ANOTHER_SPEED
-    is_open = is_shared or is_of_other_speed
+    is_open = is_shared or is_smooth or is_of_other_speed
     clear = not is_open and candidate.modulation >= CLEAR_MODULATION and confidence >= 0.75
     suspected = Kind.SUSPICION if confidence >= WORTH_A_SUSPICION else Kind.NOTICE
 
@@ -159,6 +168,8 @@ def _named_finding(signals: AnalysisSignals, candidate: Candidate, n_parts: int)
         evidence.append("The rate is that of a train of lines: another machine's or a belt's would look the same.")
     if is_hunting:
         evidence.append("A multiple of a hunting-tooth order is there too: teeth that differ from each other do it.")
+    if is_smooth:
+        evidence.append("Its first line rules it: play, waviness and elements that pass the load modulate so smoothly.")
     if n_parts > MAX_PARTS:
         evidence.append(f"{n_parts} parts show at once, which a single other source of impacts explains as well.")
     surer = "Another sensor nearer to it."
@@ -197,6 +208,21 @@ def _is_among_hunting_lines(signals: AnalysisSignals, candidate: Candidate) -> b
     return candidate.name == "FTF" and any(
         abs(fundamental - round(fundamental / order) * order) <= width for order in hunting
     )
+
+
+def _is_smooth(candidate: Candidate) -> bool:
+    r"""Whether a family's multiples are weaker than knocks leave them, however slowly these ring down.
+
+    Knocks whose ringing outlasts the time between them (an exponential decay) give lines that fall with their number,
+    the least that knocks can give: together the multiples have the power :math:`\sum_{k \ge 2} 1/k^2 = 0.64` of the
+    first line. Asked only where the first line is so high that these would be seen.
+    """
+    powers = {
+        round(position / candidate.comb.fundamental): 10 ** (ratio_db / 10)
+        for position, ratio_db in zip(candidate.comb.positions, candidate.comb.ratios_db, strict=True)
+    }
+    first = powers.pop(1, 0.0)
+    return candidate.name in RACES and first >= 10 ** (SMOOTH[0] / 10) and sum(powers.values()) <= SMOOTH[1] * first
 
 
 def _bearings_named(candidate: Candidate) -> str:
@@ -356,10 +382,15 @@ def _modulation_text(candidate: Candidate) -> str:
 # Bearings in which nothing shows: good as far as damage would have shown, else undecided.
 
 
-def _none_shows(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope], families: Families) -> list[Finding]:
+def _none_shows(
+    signals: AnalysisSignals,
+    envelopes: Sequence[BandEnvelope],
+    families: Families,
+    is_as_before: Callable[[Where], bool],
+) -> list[Finding]:
     """State that nothing shows as far as it would have shown, and which parts could not have shown."""
     where = Where(channels=tuple(dict.fromkeys(e.channel for e in envelopes)))
-    reason = next(_reasons_to_leave_open(signals, envelopes, families), None)
+    reason = next(_reasons_to_leave_open(signals, envelopes, families, is_as_before), None)
     if reason is not None:
         return [_undecided(*reason, where)]
     # For each part of each bearing, the depth of modulation from which it would have shown.
@@ -399,20 +430,27 @@ def _none_shows(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope], fam
 
 
 def _reasons_to_leave_open(
-    signals: AnalysisSignals, envelopes: Sequence[BandEnvelope], families: Families
+    signals: AnalysisSignals,
+    envelopes: Sequence[BandEnvelope],
+    families: Families,
+    is_as_before: Callable[[Where], bool],
 ) -> Iterator[tuple[str, str]]:
     """Yield why no damage is not called none, and what would tell."""
+
+    def new(candidates: Iterable[Candidate]) -> list[Candidate]:
+        return [c for c in candidates if not is_as_before(_where(signals, c))]
+
     longer = "A longer recording, or another sensor."
     if not speed_is_confirmed(signals):
         why = "no line of a mesh or shaft stands where the speed puts it, so that bearing orders may be elsewhere"
         if (times := factor_left_open(signals)) > 1:
             why = _other_speed_text(times)
         yield why, f"A tachometer, or a sensor nearer to the {'gears' if signals.rig.pairs else 'bearings'}."
-    named_here = (*families.named, *(c for c in families.trains if c.bearing is not None))
+    named_here = new((*families.named, *(c for c in families.trains if c.bearing is not None)))
     rival = next((r for c in named_here for r in c.rivals), "")
     for seen, but in (
         (named_here, f"{rival} would show there as well" if rival else "something else explains them as well"),
-        (families.unclear, "families beside it are as clear"),
+        (new(families.unclear), "families beside it are as clear"),
     ):
         if seen:
             parts = ", ".join(part_text(c.name, c.bearing.name) for c in seen if c.bearing)
@@ -421,7 +459,7 @@ def _reasons_to_leave_open(
         if shaft := _shaft_as_stated(signals, train)[1]:
             why = f"impacts come at order {train.comb.fundamental:.4f}, which is {shaft} or a part's, and the speed is "
             yield f"{why}stated and taken as constant", "A tachometer."
-    if doubtful := doubtful_races(signals, list(envelopes)):
+    if doubtful := new(doubtful_races(signals, list(envelopes))):
         races = ", ".join(dict.fromkeys(part_text(c.name, c.bearing.name) for c in doubtful if c.bearing))
         chance = f"the chance of so many is {p_text(doubtful[0].p_value)}"
         yield f"lines stand at the order of the {races}, and {chance}", longer

@@ -144,22 +144,22 @@ def level_changes(
 
 
 def family_change(
-    finding: Finding,
+    where: Where,
     signals: AnalysisSignals,
     envelopes: Sequence[BandEnvelope],
     reference: AnalysisSignals,
     reference_envelopes: Sequence[BandEnvelope],
 ) -> LevelChange | None:
-    """Return the level of a finding's family of lines beside that in the reference, same channel, band and order.
+    """Return the level of a family of lines beside that in the reference, same channel, band and order.
 
-    Of the bands whose envelopes both have, the one that has most in common with the finding's; None where there is
-    none, or the finding is no family of an envelope.
+    Of the bands whose envelopes both have, the one that has most in common with the family's; None where there is
+    none, or nothing of an envelope is there.
     """
-    order, band = finding.where.order, finding.where.band_hz
+    order, band = where.order, where.band_hz
     if order is None or band is None:
         return None
     pairs = [(a, b) for a in envelopes for b in reference_envelopes if (a.channel, a.band_hz) == (b.channel, b.band_hz)]
-    pairs = [(a, b) for a, b in pairs if a.channel in finding.where.channels and _in_common(a.band_hz, band) > 0]
+    pairs = [(a, b) for a, b in pairs if a.channel in where.channels and _in_common(a.band_hz, band) > 0]
     if not pairs:
         return None
     try:
@@ -170,7 +170,7 @@ def family_change(
     now, then = (None if d is None else _family(d, order, SAME_FAMILY) for d in (_depths(e, block_rev) for e in best))
     if now is None or then is None:
         return None
-    quantity = _Quantity(finding.code, "bearing", finding.where, 0.0, "", now, then)
+    quantity = _Quantity("", "bearing", where, 0.0, "", now, then)
     change = _compared(quantity, 1, signals.settings.false_alarm_probability)
     return replace(change, is_change=change.is_change or (change.change_db > 0 and _is_new(*best, order)))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 
+from gearsig.diagnosis._tooth import AGREES
 from gearsig.diagnosis._types import (
     WITH_ASSUMED_DATA,
     WITHOUT_REFERENCE,
@@ -87,9 +88,10 @@ def with_crack(findings: Sequence[Finding], answer: Answer | None, rig: Rig) -> 
         # Of several pairs, or of teeth whose size is not known, no depth is ever told: that hinders nothing that the
         # reference was given for. What has changed at the teeth is told without it, or that nothing has.
         is_never_told = len(rig.pairs) > 1 or any(None in (p.module_mm, p.face_width_mm) for p in rig.pairs)
-        codes = {f.code for f in findings}
-        are_examined = "no-tooth-local-damage" in codes and not codes & {"tooth-damage-undecided", "tooth-not-examined"}
-        return [*findings, replace(finding, kind=Kind.INFORMATION) if is_never_told or are_examined else finding]
+        told = {f.code for f in findings}
+        are_examined = "no-tooth-local-damage" in told and not told & {"tooth-damage-undecided", "tooth-not-examined"}
+        kind = Kind.INFORMATION if is_never_told else Kind.NOTICE if are_examined else finding.kind
+        return [*findings, replace(finding, kind=kind)]
     if isinstance(answer, NoCrackSeen):
         # Both gears of the pair are looked at: if a crack through half of the root would have shown, the teeth count as
         # examined.
@@ -111,11 +113,13 @@ def with_crack(findings: Sequence[Finding], answer: Answer | None, rig: Rig) -> 
             surer=same.surer if not answer.with_reference else crack_finding.surer,
         )
         return [merged if f is same else f for f in left]
-    if any(f.kind is Kind.FAULT and f.where.bearing for f in findings):
-        # What a knocking bearing leaves in an average changes single teeth, too.
+    # What a knocking bearing leaves in an average changes single teeth, too; so does what changes all of them.
+    knocks = any(f.kind is Kind.FAULT and f.where.bearing for f in findings)
+    if knocks or (answer.agreement is not None and answer.agreement < AGREES):
         confidence = 0.5 * crack_finding.confidence
         kind = Kind.SUSPICION if confidence >= 0.35 else Kind.NOTICE
-        evidence = (*crack_finding.evidence, "Knocks of the damaged bearing may have made the change as well.")
+        cause = "Knocks of the damaged bearing" if knocks else "What has changed all teeth of the gear"
+        evidence = (*crack_finding.evidence, f"{cause} may have made the change as well.")
         crack_finding = replace(crack_finding, kind=kind, confidence=confidence, evidence=evidence)
     if not answer.with_reference and crack_finding.confidence < CLEAR:
         return list(findings)

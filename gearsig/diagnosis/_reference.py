@@ -160,20 +160,27 @@ def reference_unfit(reference: Analysis) -> Finding:
     )
 
 
-def reference_not_healthy(reference: Analysis, *, shows_fault: bool) -> list[Finding]:
+def reference_not_healthy(
+    reference: Analysis, measured: Callable[[Finding], LevelChange | None], *, shows_fault: bool
+) -> list[Finding]:
     """Say which fault a reference shows itself: what it has is not new, and what has fallen is no improvement.
 
     Parameters
     ----------
     reference : Analysis
         Of the reference alone.
+    measured : callable
+        See `beside_reference`.
     shows_fault : bool
-        Whether the recording shows one; else the two may have been exchanged.
+        Whether the recording shows one; else, and where it has not as much of the reference's, the two may have been
+        exchanged.
     """
     if reference.outcome is not Outcome.FAULT:
         return []
     fault = next(f for f in reference.findings if f.kind is Kind.FAULT)
-    exchanged = "" if shows_fault else " This recording shows none: the two may have been exchanged."
+    change = measured(fault)
+    is_there = shows_fault or (change is not None and change.change_db > -MIN_CHANGE_DB)
+    exchanged = "" if is_there else " This recording shows none: the two may have been exchanged."
     return [
         Finding(
             REFERENCE_NOT_HEALTHY,
@@ -265,7 +272,10 @@ def _change_db(old: Finding, new: Finding) -> float | None:
 def _is_alike(old: Finding, new: Finding, rig: Rig | None) -> bool:
     """Whether two findings say the same of the same part: shaft, gear, tooth, bearing, order or frequency."""
     then, now = old.where, new.where
-    if (old.code, then.shaft, then.gear, then.bearing) != (new.code, now.shaft, now.gear, now.bearing):
+    if (old.code, then.shaft, then.gear) != (new.code, now.shaft, now.gear):
+        return False
+    # Of bearings that cannot be told apart any may be the first of those that a finding names.
+    if then.bearing != now.bearing and not (then.bearing and now.bearing and then.bearing in new.title):
         return False
     if not _is_near(then.order, now.order):
         return False

@@ -558,9 +558,9 @@ def _compared(signals: AnalysisSignals, shaft: ShaftSignals, healthy: AnalysisSi
 def _lines_of(signals: AnalysisSignals, shaft: ShaftSignals, names: Sequence[str], highest: int) -> ShaftLines:
     """Return a shaft's averages in the form that the alignment takes; of several gears the first one's teeth count."""
     averages = [shaft.averages[name] for name in names]
-    lines, teeth = np.stack([average.lines()[: highest + 1] for average in averages]), shaft.teeth[0]
+    lines = np.stack([average.lines()[: highest + 1].astype(np.complex128) for average in averages])
     order_hz, is_marked = shaft.angle.mean_speed_rpm / 60.0, has_mark(signals.recording, signals.rig, shaft.shaft)
-    n_revolutions = averages[0].n_revolutions
+    teeth, n_revolutions = shaft.teeth[0], averages[0].n_revolutions
     return ShaftLines(shaft.shaft, teeth, teeth, lines, n_revolutions, highest, order_hz, tuple(names), is_marked)
 
 

@@ -99,7 +99,8 @@ def _said(findings: tuple[Finding, ...], *, has_reference: bool) -> str:
         has_teeth = any(f.code == "no-tooth-local-damage" for f in findings)
         is_steady = has_teeth or bool(titles)  # a drive that starts and stops has no lines to look at
         open_ones = NOT_ALONE.format("Damage of many teeth, unbalance" if has_teeth else "Unbalance")
-        return " ".join([NO_FAULT, *titles, *([open_ones] if is_steady and not has_reference else [])])
+        depth = [f.title for f in findings if f.code == DEPTH_UNKNOWN and f.kind is Kind.NOTICE]
+        return " ".join([NO_FAULT, *titles, *([open_ones] if is_steady and not has_reference else depth)])
     others = [f for f in findings if f not in unused and (f.code in HINDERING or f.kind is Kind.CANNOT_TELL)]
     gaps = [*unused, *others]
     nothing = "Nothing was examined that would show a fault."

@@ -693,6 +693,7 @@ def _crack_estimate(
         interval_percent=interval,
         p_value=model.p_value(model.score(features)),
         with_reference=best.agreement is not None,
+        agreement=best.agreement,
         features=dict(zip(FEATURES, features.tolist(), strict=True)),
         reasons=tuple(reasons),
         kind_probabilities=calibration.kinds[way].probabilities(kind_vector(features, best.shape)),

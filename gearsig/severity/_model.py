@@ -345,6 +345,8 @@ class CrackEstimate(Result):
     squeezed_rise_db : float
         Synchrosqueezed energy at high orders near the tooth over that of a median healthy tooth; see
         `gearsig.severity`. The estimate does not rest on it.
+    agreement : float or None
+        How far the teeth's pattern is that of the reference, see `difference_lines`; None without one.
     """
 
     shaft: str
@@ -363,6 +365,7 @@ class CrackEstimate(Result):
     kind_probabilities: Mapping[str, float] = field(default_factory=dict)
     reach_cycles: float = 0.0
     squeezed_rise_db: float = 0.0
+    agreement: float | None = None
 
     def __post_init__(self) -> None:
         low, high = self.interval_mm
