@@ -202,8 +202,8 @@ def beside_reference(
 ) -> list[Finding]:
     """Return the findings, each fault or suspicion with a sentence on what the reference shows of it.
 
-    A suspicion that the healthy machine gives as much reason for is a notice; damage of a bearing whose lines are there
-    as strong is a suspicion, as it is not new, or the reference is not of a healthy machine.
+    A suspicion that the healthy machine gives as much reason for is a notice; damage that shows there as strongly is a
+    suspicion, as it is not new, or the reference is not of a healthy machine.
 
     Parameters
     ----------
@@ -226,13 +226,14 @@ def _beside(finding: Finding, reference: Analysis, measured: LevelChange | None)
             )
         elif earlier is not None and not earlier.is_comparable:
             text = f"The reference shows it as well; since then it has changed by {signed(measured.change_db)} dB."
+        change_db: float | None = measured.change_db
     else:
         change_db = earlier.change_db if earlier is not None and earlier.is_comparable else None
         is_new = earlier is None or change_db is None or change_db >= MIN_CHANGE_DB
     kind, title = finding.kind, finding.title
     if kind is Kind.SUSPICION and not is_new:
         kind = Kind.NOTICE
-    elif kind is Kind.FAULT and measured is not None and measured.change_db < MIN_CHANGE_DB / 2 and earlier is not None:
+    elif kind is Kind.FAULT and earlier is not None and change_db is not None and change_db < MIN_CHANGE_DB / 2:
         kind, title = Kind.SUSPICION, f"{title.removesuffix('.')}, as strong in the reference: it is not new."
     return replace(finding, kind=kind, title=title, evidence=(*finding.evidence, text))
 

@@ -169,3 +169,45 @@ def test_an_event_that_does_not_come_back_from_turn_to_turn_is_withheld_and_that
     said = finding(analysis, "tooth-damage-undecided")
     assert "turn to turn" in said.title
     assert not said.title.startswith("Nothing shows")
+
+
+def knocking_teeth(sizes: np.ndarray, *, seed: int = 0, sign: float = 1.0) -> Recording:
+    """Return the gearbox with a knock of its own size at each tooth of the input gear."""
+    times = np.arange(0.01, 4.95, 1 / 27 / SHAFT_HZ)
+    recording = with_knocks(record(STEADY, seed=seed), times, np.resize(sizes, len(times)))
+    return replace(recording, samples=recording.samples * np.array([[sign], [1.0]]))
+
+
+UNEQUAL = 2.0 * np.exp(0.6 * np.random.default_rng(8).standard_normal(27))
+DAMAGED = UNEQUAL + 2.0 * (np.arange(27) == 11)
+PLACE_DEG = 360.0 * ((0.01 * SHAFT_HZ + 11 / 27) % 1.0)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_beside_a_reference_a_tooth_is_told_that_is_one_of_many_unequal_ones(sign: float) -> None:
+    recording, reference = knocking_teeth(DAMAGED), knocking_teeth(UNEQUAL, seed=1, sign=sign)
+    assert "tooth-local-damage" not in codes(analyze(recording))
+    told = finding(analyze(recording, reference=reference), "tooth-local-damage")
+    assert (told.kind, told.where.shaft) == (Kind.FAULT, "in")
+    assert told.where.angle_deg == pytest.approx(PLACE_DEG, abs=360 / 27)
+
+
+def test_unequal_teeth_that_are_as_they_were_are_no_damage() -> None:
+    analysis = analyze(knocking_teeth(UNEQUAL), reference=knocking_teeth(UNEQUAL, seed=1))
+    assert "tooth-local-damage" not in codes(analysis)
+    assert "in" in finding(analysis, "no-tooth-local-damage").title
+
+
+@pytest.mark.parametrize("size", [0.85, 1.15])
+def test_a_tooth_that_was_odd_and_knocks_a_little_harder_or_less_is_no_damage(size: float) -> None:
+    odd = 1.0 + 5.0 * (np.arange(27) == 11)
+    now = np.where(np.arange(27) == 11, size * odd, odd)
+    analysis = analyze(knocking_teeth(now), reference=knocking_teeth(odd, seed=1))
+    assert not [f for f in analysis.findings if f.is_claim and "not new" not in f.title]
+
+
+def test_a_reference_at_another_speed_leaves_the_teeth_to_the_recording_alone() -> None:
+    slower = record(replace(GOOD, speed=ConstantProfile(0.95 * 60 * SHAFT_HZ)))
+    analysis = analyze(record(replace(STEADY, tooth_damages=(DAMAGE,))), reference=slower)
+    told = finding(analysis, "tooth-local-damage")
+    assert "The averages were turned" not in " ".join(told.evidence)
