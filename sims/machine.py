@@ -1,4 +1,4 @@
-"""A spur gear pair between two rotors and how it is run: what its simulators share, and what effects change."""
+"""A gear pair between two rotors, how it is run and what a rig says of it: simulators share it, effects change it."""
 
 # mypy: allow-untyped-defs, allow-untyped-calls
 
