@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,6 +9,7 @@ from hypothesis import strategies as st
 
 from gearsig.angle import clock_tick, count_pulses, find_pulse_edges, pulse_train_angle
 from gearsig.errors import InputError, RefusalError
+from tests.measured import DATA, needs_data
 
 RATE = 10_000.0
 
@@ -76,8 +75,6 @@ def test_a_single_short_pulse_is_found_by_its_own_levels() -> None:
 
 
 # Pulse trains: closed-form motions, faults, quantised clocks, refusals.
-
-DATA = Path(__file__).parents[3] / "shared" / "data" / "tach_pulses" / "REC3642_tach_pulse_times.csv"
 
 
 def accelerated(n: int, start: float, acceleration: float, per_rev: int = 1) -> np.ndarray:
@@ -214,9 +211,9 @@ def test_a_long_gap_at_full_speed_is_refused() -> None:
         pulse_train_angle(t)
 
 
-@pytest.mark.skipif(not DATA.exists(), reason="measured recordings are not here")
+@needs_data
 def test_measured_run_up_and_run_down() -> None:
-    t = np.loadtxt(DATA)
+    t = np.loadtxt(DATA / "tach_pulses" / "REC3642_tach_pulse_times.csv")
     angle = pulse_train_angle(t)
     assert angle.n_revolutions == pytest.approx(len(t) - 1, abs=1e-3)
     intervals = np.diff(t)

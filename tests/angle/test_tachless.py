@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import gzip
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -14,9 +11,7 @@ from gearsig.recording import Channel, Recording
 
 # By path: test folders are no package.
 from tests.angle.gear_signals import Motion, gear_recording, rig_of
-
-DATA = Path(__file__).parents[3] / "shared" / "data"
-measured = pytest.mark.skipif(not DATA.exists(), reason="measured recordings are not here")
+from tests.measured import BY_NAME, car_run_up, needs_data
 
 CHECK = np.linspace(0.5, 7.5, 400)
 
@@ -116,35 +111,23 @@ def test_no_teeth_no_motion_no_time() -> None:
         estimate_shaft_angle(short, rig_of((23, 46), nominal_rpm=1980.0))
 
 
-def _gear_pair() -> Recording:
-    import warnings
-
-    from scipy.io import loadmat
-
-    rows = []
-    for number in (12, 14):
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # each variable is there twice
-            content = loadmat(DATA / "gear_pair_23_46" / f"3027_217_Data_Chan{number}.mat")
-        rows.append(
-            next(np.ravel(v) for k, v in content.items() if not k.startswith("__") and np.size(v) > 1000 and np.any(v))
-        )
-    return Recording(
-        np.array(rows, dtype=float), 25_600.0, (Channel("a12", "acceleration"), Channel("a14", "acceleration"))
-    )
-
-
 @pytest.mark.slow
-@measured
+@needs_data
 @pytest.mark.parametrize("nominal", [2000.0, None])
 def test_measured_gear_pair(nominal: float | None) -> None:
-    angle = estimate_shaft_angle(_gear_pair(), rig_of((23, None), nominal_rpm=nominal))
+    first, second = (BY_NAME[f"gear_pair_23_46/3027_217_Data_Chan{number}.mat"].read() for number in (12, 14))
+    both = Recording(
+        np.vstack([first.samples[:1], second.samples[:1]]),
+        25_600.0,
+        (Channel("a12", "acceleration"), Channel("a14", "acceleration")),
+    )
+    angle = estimate_shaft_angle(both, rig_of((23, None), nominal_rpm=nominal))
     assert angle.mean_speed_rpm == pytest.approx(1999.76, rel=5e-4)
     assert angle.quality > 0.6
 
 
 @pytest.mark.slow
-@measured
+@needs_data
 @pytest.mark.parametrize(
     ("name", "nominal", "teeth"),
     [
@@ -155,36 +138,22 @@ def test_measured_gear_pair(nominal: float | None) -> None:
     ],
 )
 def test_measured_bearings_are_no_gears(name: str, nominal: float | None, teeth: tuple[int, ...]) -> None:
-    from scipy.io import loadmat
-
-    bearing = loadmat(DATA / "bearing_races" / f"{name}.mat", squeeze_me=True)["bearing"]
-    samples = np.asarray(bearing["gs"].item(), dtype=float)[None]
-    recording = Recording(samples, float(bearing["sr"].item()), (Channel("a", "acceleration"),))
+    recording = BY_NAME[f"bearing_races/{name}.mat"].read()
     for number in teeth:
         with pytest.raises(RefusalError):
             estimate_shaft_angle(recording, rig_of((number, None), nominal_rpm=nominal))
 
 
 @pytest.mark.slow
-@measured
+@needs_data
 def test_measured_two_stage_gearbox() -> None:
-    with gzip.open(DATA / "two_stage_gearbox" / "h30hz50.csv.gz", "rt") as file:
-        samples = np.loadtxt(file, delimiter=",", skiprows=1).T
-    recording = Recording(samples, 4266.7, tuple(Channel(f"a{i}") for i in range(4)))
+    recording = BY_NAME["two_stage_gearbox/h30hz50.csv.gz"].read()
     angle = estimate_shaft_angle(recording, rig_of((32, 96), (32, 80)))
     assert angle.mean_speed_rpm == pytest.approx(29.68 * 60, rel=1e-3)
 
 
 @pytest.mark.slow
-@measured
+@needs_data
 def test_measured_car_is_not_claimed_wrongly() -> None:
-    import warnings
-
-    from scipy.io import wavfile
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # chunks that scipy does not know
-        rate, samples = wavfile.read(DATA / "car_run_up" / "accel_with_rpm.wav")
-    recording = Recording(samples[:, :1].T.astype(float), float(rate), (Channel("p", "sound_pressure"),))
     with pytest.raises(RefusalError):
-        estimate_shaft_angle(recording, rig_of((23, None)))
+        estimate_shaft_angle(car_run_up()[0], rig_of((23, None)))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,9 +14,10 @@ from vmdpy import VMD
 from gearsig.angle import AngleSignal, ShaftAngle
 from gearsig.decompose import Modes, VmdSettings, modes_by_block, vmd
 from gearsig.errors import InputError
-from gearsig.recording import Channel, Recording, read_recording
+from gearsig.recording import Channel, Recording
 from gearsig.spectra import Envelope, band_envelope
 from gearsig.timefreq import UniformSignal
+from tests.measured import BY_NAME, needs_data
 
 INIT = {"zero": 0, "uniform": 1, "random": 2}
 
@@ -408,7 +408,6 @@ FS = 10_000.0
 TIME = np.arange(20_000) / FS
 MODULATION = 1 + 0.5 * np.cos(2 * np.pi * 20 * TIME) + 0.3 * np.cos(2 * np.pi * 90 * TIME)
 MODULATED = 2.0 * MODULATION * np.cos(2 * np.pi * 3000 * TIME)
-DATA = Path(__file__).parents[3] / "shared" / "data" / "bearing_races"
 
 
 def _recording(*rows: np.ndarray) -> Recording:
@@ -447,10 +446,9 @@ def test_modes_of_the_envelope_are_its_modulations():
     assert modes.rms * np.sqrt(2) == pytest.approx([1.0, 0.6], abs=0.02)
 
 
-@pytest.mark.skipif(not DATA.exists(), reason="no measured data beside the checkout")
+@needs_data
 def test_the_outer_race_shows_in_a_mode_of_the_measured_envelope():
-    path = next(p for p in sorted(DATA.iterdir()) if "outer" in p.name.lower())
-    recording = read_recording(path)
+    recording = BY_NAME["bearing_races/OuterRaceFault_vload_4.mat"].read()
     name = recording.vibration_names()[0]
     settings = VmdSettings(4, penalty=20_000.0, start="peaks")
     envelope = band_envelope(recording.values(name), recording.sampling_rate_hz, (2000, 2600), kind="magnitude")
