@@ -99,6 +99,10 @@ def test_nonsense_is_refused():
         Accelerometer(range_mps2=0.0)
     with pytest.raises(InputError, match="n_bits"):
         Converter(10.0, 4)
+    with pytest.raises(InputError, match="duty"):
+        Tachometer(duty=0.0)
+    with pytest.raises(InputError, match="pulses_per_revolution"):
+        Tachometer(pulses_per_revolution=0)
     with pytest.raises(InputError, match="bias_mps2"):
         Accelerometer(bias_mps2=float("nan"))
 
