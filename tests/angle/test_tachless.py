@@ -2,18 +2,74 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 
 from gearsig.angle import comb_elsewhere, estimate_shaft_angle
+from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
 from gearsig.recording import Channel, Recording
-
-# By path: test folders are no package.
-from tests.angle.gear_signals import Motion, gear_recording, rig_of
+from gearsig.rig import GearPair, OperatingPoint, Rig, Shaft
 from tests.measured import BY_NAME, car_run_up, needs_data
 
+RATE_HZ = 12_800.0
 CHECK = np.linspace(0.5, 7.5, 400)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Speed in rev/s: start + ramp·t, times (1 + depth·sin(2π·rate·t))."""
+
+    start: float
+    ramp: float = 0.0
+    depth: float = 0.0
+    rate: float = 0.5
+
+    def revolutions(self, t: FloatArray) -> FloatArray:
+        w = 2 * np.pi * self.rate
+        # ∫ (a + b t)(1 + d sin wt) dt in closed form.
+        steady = self.start * t + 0.5 * self.ramp * t**2
+        wander = -self.start * np.cos(w * t) / w + self.ramp * (np.sin(w * t) / w**2 - t * np.cos(w * t) / w)
+        return steady + self.depth * (wander + self.start / w)
+
+    def speed(self, t: FloatArray) -> FloatArray:
+        return (self.start + self.ramp * t) * (1 + self.depth * np.sin(2 * np.pi * self.rate * t))
+
+
+def rig_of(*teeth: tuple[int, int | None], nominal_rpm: float | None = None, tolerance: float = 5.0) -> Rig:
+    """Return a rig of pairs in a row, shaft names s0, s1, …"""
+    shafts = tuple(Shaft(f"s{i}") for i in range(len(teeth) + 1))
+    pairs = tuple(GearPair(f"p{i}", f"s{i}", f"s{i + 1}", a, b) for i, (a, b) in enumerate(teeth))
+    return Rig(shafts=shafts, pairs=pairs, operating_point=OperatingPoint("s0", nominal_rpm, tolerance))
+
+
+def gear_recording(motion: Motion, teeth: tuple[tuple[int, int], ...], rng: np.random.Generator) -> Recording:
+    """Return mesh harmonics, each amplitude-modulated once per turn of both gears, shaft harmonics, and white noise.
+
+    Two channels, which differ by phases and gains; noise of standard deviation 1 where the strongest mesh harmonic has
+    amplitude 1.
+    """
+    t = np.arange(round(8.0 * RATE_HZ)) / RATE_HZ
+    angle, speed = 2 * np.pi * motion.revolutions(t), motion.speed(t)
+
+    def turning(order: float) -> FloatArray:
+        return np.cos(order * angle + rng.uniform(0, 6.28))
+
+    samples = np.zeros((2, len(t)))
+    for row in range(2):
+        ratio = 1.0
+        for z1, z2 in teeth:
+            driver, driven = ratio, ratio * z1 / z2
+            envelope = (1 + 0.3 * turning(driver)) * (1 + 0.7 * 0.3 * turning(driven))
+            for k, amplitude in enumerate((1.0, 0.6, 0.4, 0.2), 1):
+                inside = k * z1 * driver * speed < 0.45 * RATE_HZ  # what the recorder's filter would let through
+                samples[row] += inside * amplitude * rng.uniform(0.5, 1.0) * envelope * turning(k * z1 * driver)
+            samples[row] += 0.5 * 0.3 * turning(driver)
+            ratio = driven
+    samples += rng.normal(size=samples.shape)
+    return Recording(samples, RATE_HZ, (Channel("a0", "acceleration", "m/s^2"), Channel("a1", "acceleration", "m/s^2")))
 
 
 @pytest.mark.slow

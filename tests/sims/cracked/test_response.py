@@ -11,12 +11,37 @@ from sims.cracked import Response, check_convergence, default_step_s, derivative
 from sims.machine import Drive, Lubrication, Machine, Operation, Profile, Roughness, SpeedSwing
 from sims.mesh import FractalSurface, RootCrack, mesh_stiffness
 from tests.sims.cracked.machines import cracked, frictionless
-from tests.sims.cracked.runs import by_angle, run
 from tests.sims.machines import spur_pair_machine
 
 MESH_HZ = 55 * 500 / 60
 STEADY = Operation.steady(500.0, 110.0)
 FRACTAL_LINES_HZ = 1.0312 * 1.5 ** np.arange(7, 19)
+
+
+def run(
+    machine: Machine, signals: tuple[str, ...], duration_s: float = 0.6, settle_s: float = 0.4, **more: float
+) -> Response:
+    """Return a settled run: the first `settle_s` lie before time 0 and are cut off."""
+    operation = Operation.steady(more.get("speed_rpm", 500.0), more.get("torque_nm", 110.0))
+    response = respond(
+        machine,
+        operation,
+        duration_s=duration_s + settle_s,
+        rng=np.random.default_rng(1),
+        signals=signals,
+        start_s=-settle_s,
+    )
+    keep = response.time_s >= 0.0
+    cut = {name: values[keep] for name, values in response.signals.items()}
+    return Response(0.0, response.interval_s, cut, response.step_s, response.energy_j)
+
+
+def by_angle(response: Response, name: str, per_cycle: int = 100) -> NDArray[np.float64]:
+    """Return a signal at even mesh cycles from the first whole driver revolution on."""
+    cycles = 55 * response["driver angle"] / (2 * np.pi)
+    first = 55 * np.ceil(cycles[0] / 55)
+    grid = np.arange(first, cycles[-1], 1 / per_cycle)
+    return np.interp(grid, cycles, response[name])
 
 
 def lines(response: Response, name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
