@@ -44,14 +44,7 @@ from gearsig.plot import (
 from gearsig.recording import Channel, Recording
 from gearsig.rig import ConstantSpeed
 from gearsig.timefreq import UniformSignal
-
-
-def _drawn(figure):
-    """Draw, which raises where matplotlib warns; return all texts."""
-    figure.savefig(BytesIO(), format="png", dpi=40)
-    from matplotlib.text import Text
-
-    return [text.get_text() for text in figure.findobj(Text) if text.get_text()]
+from tests.plot.drawn import texts_of
 
 
 def _line(figure, axes=0):
@@ -61,7 +54,7 @@ def _line(figure, axes=0):
 @pytest.mark.parametrize("n", [1, 2, 3, 5000])
 def test_time_of_any_length(recording_of, n):
     figure = time_figure(recording_of(np.zeros((2, n)), "a", "b"))
-    assert {"a: acceleration", "b: acceleration"} <= set(_drawn(figure))
+    assert {"a: acceleration", "b: acceleration"} <= set(texts_of(figure))
 
 
 def test_time_of_a_million_samples_is_thinned_and_quick(recording_of):
@@ -70,7 +63,7 @@ def test_time_of_a_million_samples_is_thinned_and_quick(recording_of):
     recording = recording_of(samples, "a")
     start = perf_counter()
     figure = time_figure(recording)
-    _drawn(figure)
+    texts_of(figure)
     assert perf_counter() - start < 3.0
     assert len(_line(figure).get_ydata()) <= 4000
     assert max(_line(figure).get_ydata()) == 7.0
@@ -83,13 +76,13 @@ def test_time_limits_cut_the_signal(recording_of):
 
 
 def test_names_are_never_markup(recording_of):
-    assert "$\\frac{: acceleration" in _drawn(time_figure(recording_of(np.zeros(5), "$\\frac{")))
+    assert "$\\frac{: acceleration" in texts_of(time_figure(recording_of(np.zeros(5), "$\\frac{")))
 
 
 @pytest.mark.parametrize("scale", ["log", "decibel", "linear"])
 @pytest.mark.parametrize("values", [np.zeros(10), np.zeros(1), np.ones(1), np.full(10, 1e-30), np.arange(50.0)])
 def test_spectrum_of_any_values(spectrum_of, values, scale):
-    assert _drawn(spectrum_figure(spectrum_of(values), scale=scale))
+    assert texts_of(spectrum_figure(spectrum_of(values), scale=scale))
 
 
 def test_spectrum_draws_cursors_floor_and_marked_positions(spectrum_of):
@@ -97,7 +90,7 @@ def test_spectrum_draws_cursors_floor_and_marked_positions(spectrum_of):
     spectrum = spectrum_of(rng.rayleigh(size=20_000))
     cursors = [Cursor(23.0, "mesh", "1× mesh"), Cursor(24.0, "sideband", ""), Cursor(9999.0, "shaft", "far away")]
     figure = spectrum_figure(spectrum, cursors, floor=np.ones(20_000), limits=(0, 100), marked=(23.0,))
-    texts = _drawn(figure)
+    texts = texts_of(figure)
     assert "1× mesh" in texts
     assert "far away" not in texts
     assert any(line.get_marker() == "o" for line in figure.axes[0].lines)
@@ -131,7 +124,7 @@ def test_order_map_of_any_shape(shape, level):
     values = np.full(shape, level)
     time, positions = np.arange(shape[0]) * 0.1, np.arange(shape[1]) * 0.05
     order_map = OrderMap(values, positions, time, 1000 + time, "order", "amplitude peak", "m/s^2", 0.05, "a1", "input")
-    assert _drawn(order_map_figure(order_map, [Cursor(1.0, "mesh", "1× mesh")] if shape[1] > 30 else []))
+    assert texts_of(order_map_figure(order_map, [Cursor(1.0, "mesh", "1× mesh")] if shape[1] > 30 else []))
 
 
 def test_order_map_keeps_a_single_tall_cell():
@@ -147,18 +140,18 @@ def test_order_map_keeps_a_single_tall_cell():
 @pytest.mark.parametrize("n", [1, 2, 100, 5000])
 @pytest.mark.parametrize("teeth", [None, 3, 23, 300])
 def test_polar_of_any_length_and_teeth(average_of, n, teeth):
-    assert _drawn(polar_figure(average_of(np.zeros(n)), n_teeth=teeth))
+    assert texts_of(polar_figure(average_of(np.zeros(n)), n_teeth=teeth))
 
 
 def test_polar_without_any_signal_or_scatter(average_of):
-    assert _drawn(polar_figure(average_of(np.zeros(64), error=0.0), n_teeth=8))
+    assert texts_of(polar_figure(average_of(np.zeros(64), error=0.0), n_teeth=8))
 
 
 def test_polar_colours_the_marked_tooth(average_of):
     from gearsig.plot import FAULT
 
     figure = polar_figure(average_of(np.zeros(64)), n_teeth=8, marks=[AngleMark(100.0, "tooth 3, 100°")])
-    assert "tooth 3, 100°" in _drawn(figure)
+    assert "tooth 3, 100°" in texts_of(figure)
     bold = [text.get_text() for text in figure.axes[0].texts if text.get_color() == FAULT]
     assert "3" in bold
     assert "2" not in bold
@@ -173,7 +166,7 @@ def test_polar_radius_is_zero_ring_plus_value(average_of):
 @pytest.mark.parametrize("n", [1, 2, 4096])
 def test_average_of_any_length(average_of, n):
     averages = [average_of(np.ones(n), kind="average"), average_of(np.zeros(n))]
-    assert _drawn(average_figure(averages, n_teeth=23, marks=[AngleMark(359.0, "tooth 23")]))
+    assert texts_of(average_figure(averages, n_teeth=23, marks=[AngleMark(359.0, "tooth 23")]))
 
 
 @pytest.mark.parametrize("uncertainty", [float("nan"), 1e-4])
@@ -181,7 +174,7 @@ def test_speed_at_rest_and_turning(uncertainty):
     for speed in (0.0, 25.0):
         time = np.array([0.0, 1.0])
         angle = ShaftAngle("input", time, speed * time, np.full(2, speed), "pulses", uncertainty)
-        assert "speed of input" in _drawn(speed_figure(angle))
+        assert "speed of input" in texts_of(speed_figure(angle))
 
 
 @pytest.mark.slow
@@ -296,7 +289,7 @@ def _modes(n: int = 5000, n_modes: int = 2, **told: str) -> Modes:
 @pytest.mark.parametrize("n", [16, 17, 5000, 50_001])
 def test_a_row_for_each_mode_and_the_residual(n):
     figure = modes_figure(_modes(n, unit="m/s^2", source="a1"))
-    texts = _drawn(figure)
+    texts = texts_of(figure)
     assert len(figure.axes) == 6
     assert sum(text.startswith("mode ") for text in texts) == 2
     assert any(text.startswith("residual") for text in texts)
@@ -315,7 +308,7 @@ def test_rows_go_by_rising_centre_and_mark_it():
 
 
 def test_over_angle_the_axes_are_orders_and_revolutions():
-    texts = _drawn(modes_figure(_modes(axis="order", shaft="input")))
+    texts = texts_of(modes_figure(_modes(axis="order", shaft="input")))
     assert any("order" in text and "input" in text for text in texts)
     assert "angle of input (revolutions)" in texts
 
@@ -334,7 +327,7 @@ def test_limits_cut_both_sides():
 
 
 def test_names_from_files_are_no_markup():
-    assert any("$x^2$" in text for text in _drawn(modes_figure(_modes(source="$x^2$ \\frac"))))
+    assert any("$x^2$" in text for text in texts_of(modes_figure(_modes(source="$x^2$ \\frac"))))
 
 
 @pytest.mark.parametrize("limits", [(2.0, 1.0), (1.0, 1.0), (9.0, 10.0)])

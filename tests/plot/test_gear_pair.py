@@ -3,12 +3,10 @@
 import gc
 import weakref
 from dataclasses import replace
-from io import BytesIO
 from itertools import pairwise
 
 import numpy as np
 import pytest
-from matplotlib.text import Text
 
 from gearsig.errors import InputError
 from gearsig.plot import (
@@ -25,17 +23,13 @@ from gearsig.plot import (
     speed_spectra_figure,
     speed_sweep_figure,
 )
+from tests.plot.drawn import texts_of
 
 CYCLES = np.linspace(0.0, 2.0, 401)
 STIFFNESS = {
     "none": 3e8 + 1e8 * np.sign(np.sin(2 * np.pi * CYCLES)),
     "2 mm": 2.9e8 + 1e8 * np.sign(np.sin(2 * np.pi * CYCLES)),
 }
-
-
-def _texts(figure):
-    figure.savefig(BytesIO(), format="png", dpi=40)
-    return [text.get_text() for text in figure.findobj(Text) if text.get_text()]
 
 
 def _line(axes, label):
@@ -51,7 +45,7 @@ def test_stiffness_is_drawn_as_given_with_units_and_names():
         inside = (CYCLES >= 0.5) & (CYCLES <= 1.0)
         np.testing.assert_allclose(_line(zoom, label).get_ydata(), values[inside] / 1e8)
     assert zoom.get_xlim() == (0.5, 1.0)
-    texts = _texts(figure)
+    texts = texts_of(figure)
     assert {"none", "2 mm", "crack depth", "A pair", "mesh cycles (tooth passages)"} <= set(texts)
     assert texts.count("mesh stiffness (10⁸ N/m)") == 2
 
@@ -95,7 +89,7 @@ def test_load_sharing_draws_forces_where_pairs_touch_and_errors_in_um():
     assert drawn[200] == 0.0  # the fall to zero is shown
     assert np.isnan(drawn[201:]).all()
     np.testing.assert_allclose(_line(lower, "healthy").get_ydata(), error * 1e6)
-    assert {"force of a pair (N)", "transmission error (µm)", "mesh cycles (tooth passages)"} <= set(_texts(figure))
+    assert {"force of a pair (N)", "transmission error (µm)", "mesh cycles (tooth passages)"} <= set(texts_of(figure))
 
 
 def test_pairs_keep_their_names_beside_cases_of_the_same_colours():
@@ -127,7 +121,7 @@ def test_friction_is_drawn_as_given_and_names_approach_and_recess():
     )
     for label, values in curves.items():
         np.testing.assert_array_equal(_line(figure.axes[0], label).get_ydata(), values)
-    assert {"0 µm", "1.4 µm", "roughness", "pitch point", "approach", "recess", "μ"} <= set(_texts(figure))
+    assert {"0 µm", "1.4 µm", "roughness", "pitch point", "approach", "recess", "μ"} <= set(texts_of(figure))
     assert figure.axes[0].get_ylabel() == "friction coefficient × direction (–)"
     assert "tooth passages" in figure.axes[0].get_xlabel()
 
@@ -138,7 +132,7 @@ def test_friction_without_sign_starts_at_zero_and_may_have_gaps():
     figure = friction_figure(ENGAGEMENT, {"a": values})
     assert figure.axes[0].get_ylim()[0] == 0.0
     assert figure.axes[0].get_ylabel() == "friction coefficient (–)"
-    assert _texts(figure)
+    assert texts_of(figure)
 
 
 @pytest.mark.parametrize(
@@ -173,14 +167,14 @@ def test_backlash_and_its_spectrum_are_drawn_in_um():
     spectra = [line for line in lower.lines if len(line.get_xdata()) == 1991]
     assert len(spectra) == 1  # a smooth flank has no lines
     np.testing.assert_allclose(spectra[0].get_ydata(), 1 / HZ)
-    texts = _texts(figure)
+    texts = texts_of(figure)
     assert {"17.9", "26.9", "mesh", "time (s)", "frequency (Hz)"} <= set(texts)
     assert {"half backlash (µm)", "amplitude (µm peak)"} <= set(texts)
     assert "4321" not in texts
 
 
 def test_backlash_of_smooth_flanks_alone_draws():
-    assert _texts(_backlash(backlash_m={"a": np.full(1001, 2e-5)}, amplitude_m={"a": np.zeros(1991)}))
+    assert texts_of(_backlash(backlash_m={"a": np.full(1001, 2e-5)}, amplitude_m={"a": np.zeros(1991)}))
 
 
 @pytest.mark.parametrize(
@@ -231,7 +225,7 @@ def test_response_draws_what_it_is_given_in_um_and_mm_per_s():
         np.testing.assert_allclose(dots.get_xdata(), case.poincare_displacement_m * 1e6)
         np.testing.assert_allclose(section.lines[0].get_ydata(), case.poincare_velocity_mps * 1e3)
     wanted = {"smooth", "rough", "T", "mesh", "2×", "3×", "time (s)", "frequency (Hz)", "displacement (µm)"}
-    assert wanted | {"amplitude (µm)", "velocity (mm/s)"} <= set(_texts(figure))
+    assert wanted | {"amplitude (µm)", "velocity (mm/s)"} <= set(texts_of(figure))
 
 
 def test_rows_of_a_response_share_their_scales():
@@ -246,7 +240,7 @@ def test_response_at_rest_draws():
     still = ResponseCase(
         "still", STEADY_S, 0 * STEADY_S, 0 * STEADY_S, LINES_HZ, 0 * LINES_HZ, np.zeros(0), np.zeros(0)
     )
-    assert _texts(response_figure([still], mesh_frequency_hz=MESH_HZ))
+    assert texts_of(response_figure([still], mesh_frequency_hz=MESH_HZ))
 
 
 def test_response_refuses_what_does_not_fit():
@@ -294,7 +288,7 @@ def test_crack_comparison_marks_impacts_and_enlarges_the_middle_one():
     np.testing.assert_allclose(_longest(close_3).get_xdata(), (REVOLUTIONS[at] - 2.0) * 50)
     np.testing.assert_allclose(_longest(close).get_ydata(), np.abs(cases["healthy"][at]), atol=2e-12)
     assert close.get_ylim() == close_3.get_ylim()
-    texts = set(_texts(figure))
+    texts = set(texts_of(figure))
     assert {
         "healthy",
         "3 mm",
@@ -338,7 +332,7 @@ def test_crack_comparison_refuses_what_does_not_fit(changes, message):
 @pytest.mark.slow
 def test_figures_are_freed_with_their_last_reference():
     figure = response_figure([_case("a")], mesh_frequency_hz=MESH_HZ)
-    _texts(figure)
+    texts_of(figure)
     gone = weakref.ref(figure)
     del figure
     gc.collect()
@@ -352,17 +346,12 @@ TORQUE = np.linspace(10.0, 500.0, 20)
 SWEEP_HZ = np.linspace(750.0, 3400.0, 60)
 
 
-def texts(figure):
-    figure.savefig(BytesIO(), format="png", dpi=40)
-    return [text.get_text() for text in figure.findobj(Text) if text.get_text()]
-
-
 def test_maps_show_values_over_angle_and_torque():
     values = 2.5 + 0.3 * np.cos(2.0 * np.pi * MAP_CYCLES)[:, None] + 1e-3 * TORQUE
     figure = mesh_maps_figure(
         MAP_CYCLES, TORQUE, {"stiffness (10⁸ N/m)": values, "STE (µm)": 4.0 * values}, title="A pair"
     )
-    assert {"stiffness (10⁸ N/m)", "STE (µm)", "torque (N·m)", "A pair"} <= set(texts(figure))
+    assert {"stiffness (10⁸ N/m)", "STE (µm)", "torque (N·m)", "A pair"} <= set(texts_of(figure))
     drawn = figure.axes[0].collections[0].get_array()
     np.testing.assert_allclose(np.asarray(drawn).reshape(len(TORQUE), len(MAP_CYCLES)), values.T)
     with pytest.raises(InputError, match="shape"):
@@ -382,7 +371,7 @@ def test_sweeps_show_both_ways_and_mark_the_mode():
     np.testing.assert_allclose(axes.lines[0].get_ydata(), up * 1e6)
     np.testing.assert_allclose(axes.lines[1].get_ydata(), down * 1e6)
     assert axes.lines[1].get_linestyle() != axes.lines[0].get_linestyle()
-    assert {"ωₙ", "ωₙ/2", "ωₙ/3", "jump up", "dynamic transmission error, rms (µm)"} <= set(texts(figure))
+    assert {"ωₙ", "ωₙ/2", "ωₙ/3", "jump up", "dynamic transmission error, rms (µm)"} <= set(texts_of(figure))
     with pytest.raises(InputError):
         speed_sweep_figure([])
 
@@ -424,7 +413,7 @@ def test_spectra_share_one_scale():
     limits = {axes.get_ylim() for axes in figure.axes}
     assert len(figure.axes) == 2
     assert len(limits) == 1
-    assert {"1000 rpm", "2000 rpm", "frequency (Hz)", "transmission error (µm)"} <= set(texts(figure))
+    assert {"1000 rpm", "2000 rpm", "frequency (Hz)", "transmission error (µm)"} <= set(texts_of(figure))
 
 
 def test_natural_frequencies_that_move_stand_out():

@@ -1,7 +1,5 @@
 """Figures of time–frequency maps, of the kurtogram and of spectral coherence."""
 
-from io import BytesIO
-
 import numpy as np
 import pytest
 
@@ -9,6 +7,7 @@ from gearsig.errors import InputError
 from gearsig.plot import CURSOR_COLOURS, Cursor, coherence_figure, kurtogram_figure, time_frequency_figure
 from gearsig.spectra import enhanced_envelope, kurtogram, spectral_coherence
 from gearsig.timefreq import Ridge, TimeFrequencyMap
+from tests.plot.drawn import texts_of
 
 
 @pytest.fixture
@@ -25,20 +24,13 @@ def levels_of():
     return make
 
 
-def _texts(figure):
-    from matplotlib.text import Text
-
-    figure.savefig(BytesIO(), format="png", dpi=40)
-    return {text.get_text() for text in figure.findobj(Text) if text.get_text()}
-
-
 @pytest.mark.parametrize("spacing", ["linear", "logarithmic"])
 @pytest.mark.parametrize("shape", [(1, 1), (2, 3), (1000, 130), (3000, 1100)])
 def test_any_shape_is_drawn_and_thinned(levels_of, spacing, shape):
     values = np.zeros(shape)
     values[shape[0] // 2, shape[1] // 2] = 4.0
     figure = time_frequency_figure(levels_of(values, spacing))
-    texts = _texts(figure)
+    texts = set(texts_of(figure))
     assert {"a$1", "time (s)", "frequency (Hz)", "CWT; mean power per column", "dB re 1 m/s²"} <= texts
     drawn = figure.axes[0].collections[0].get_array()
     assert drawn.size <= 1200 * 500
@@ -46,14 +38,14 @@ def test_any_shape_is_drawn_and_thinned(levels_of, spacing, shape):
 
 
 def test_orders_and_largest_values_are_named(levels_of):
-    texts = _texts(time_frequency_figure(levels_of(np.ones((20, 9)), axis="order", reduction="max")))
-    assert {"angle (revolutions of input)", "order (of input)", "CWT; largest per column"} <= texts
+    texts = texts_of(time_frequency_figure(levels_of(np.ones((20, 9)), axis="order", reduction="max")))
+    assert {"angle (revolutions of input)", "order (of input)", "CWT; largest per column"} <= set(texts)
 
 
 def test_axis_of_frequencies_follows_the_lines(levels_of):
     figure = time_frequency_figure(levels_of(np.ones((20, 64)), "logarithmic"))
     assert figure.axes[0].get_yscale() == "log"
-    assert {"20", "50", "100"} <= _texts(figure)
+    assert {"20", "50", "100"} <= set(texts_of(figure))
     assert time_frequency_figure(levels_of(np.ones((20, 64)))).axes[0].get_yscale() == "linear"
 
 
@@ -105,7 +97,7 @@ def test_kurtogram_outlines_the_band(n):
     band = k.best_band()
     outline = axes.lines[-1]
     assert (min(outline.get_xdata()), max(outline.get_xdata())) == band.band_hz
-    texts = _texts(figure)
+    texts = set(texts_of(figure))
     assert {"kurtogram of a$1", "frequency (Hz)", "spectral kurtosis", "1", "2", "3"} <= texts
     other = kurtogram_figure(k, k.best_band(highest_hz=2000.0))
     assert max(other.axes[0].lines[-1].get_xdata()) <= 2000.0
@@ -113,14 +105,16 @@ def test_kurtogram_outlines_the_band(n):
 
 def test_kurtogram_says_what_speaks_against_its_band():
     k = kurtogram(np.random.default_rng(1).normal(size=20_000), FS)
-    assert any("noise alone reaches" in text for text in _texts(kurtogram_figure(k)))
+    assert any("noise alone reaches" in text for text in texts_of(kurtogram_figure(k)))
 
 
 @pytest.mark.parametrize("n", [6001, 60_000])
 def test_coherence_draws_map_mean_and_level(n):
     c = spectral_coherence(_signal(n), FS, highest_alpha_hz=200.0, n_bands=16, source="a$1")
     figure = coherence_figure(c, cursors=(Cursor(31.0, "shaft", "1× input"), Cursor(93.0, "bearing", "BPFO")))
-    assert {"spectral coherence of a$1", "cyclic frequency (Hz)", "carrier (Hz)", "1× input", "BPFO"} <= _texts(figure)
+    assert {"spectral coherence of a$1", "cyclic frequency (Hz)", "carrier (Hz)", "1× input", "BPFO"} <= set(
+        texts_of(figure)
+    )
     for axes in figure.axes[:2]:  # in both panels, each kind in its colour
         colours = {line.get_color() for line in axes.lines if len(set(line.get_xdata())) == 1}
         assert colours >= {CURSOR_COLOURS["shaft"], CURSOR_COLOURS["bearing"]}
@@ -136,7 +130,7 @@ def test_mean_over_a_band_is_named_and_must_belong_to_the_map():
     c = spectral_coherence(_signal(8000), FS, highest_alpha_hz=200.0, n_bands=16)
     band = enhanced_envelope(c, (1000.0, 2500.0))
     low, high = band.band_hz
-    assert f"carriers {low:.5g} to {high:.5g} Hz" in _texts(coherence_figure(c, band))
+    assert f"carriers {low:.5g} to {high:.5g} Hz" in texts_of(coherence_figure(c, band))
     other = spectral_coherence(_signal(9000), FS, highest_alpha_hz=200.0, n_bands=16)
     with pytest.raises(InputError, match="does not belong"):
         coherence_figure(other, band)
