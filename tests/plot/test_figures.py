@@ -148,8 +148,6 @@ def test_polar_without_any_signal_or_scatter(average_of):
 
 
 def test_polar_colours_the_marked_tooth(average_of):
-    from gearsig.plot import FAULT
-
     figure = polar_figure(average_of(np.zeros(64)), n_teeth=8, marks=[AngleMark(100.0, "tooth 3, 100°")])
     assert "tooth 3, 100°" in texts_of(figure)
     bold = [text.get_text() for text in figure.axes[0].texts if text.get_color() == FAULT]

@@ -186,9 +186,6 @@ def test_energy_is_conserved_while_pairs_come_and_go() -> None:
     """Turning loaded by their own spin: the changing number of pairs works on the rotation, not on the balance."""
     made = free_bodies({"restitution": 1.0, "half_backlash_um": 5.0})
     made = replace(made, contact=replace(made.contact, driven_inertia_kg_m2=0.5))
-    from sims.forging import FirstState, respond
-    from tests.sims.forging.drives import AT_REST
-
     start = FirstState(0.0, 20.0, 3e-5, 0.0)
     run = respond(made, AT_REST, duration_s=0.2, interval_s=1e-4, first=start, tolerance=1e-10)
     pairs = run["pairs in contact"]

@@ -411,8 +411,6 @@ def test_a_shaft_that_would_lift_in_its_bearing_is_refused():
 
 def test_starts_from_rest_have_friction_without_chatter():
     pair = synthetic_pair(friction="on")
-    from sims.reduced_fe import constants
-
     standing = Operation.steady(0.0, 170.0)
     own = constants(pair, standing)
     first = start_state(pair, own, standing, 0.0)
