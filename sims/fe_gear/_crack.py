@@ -312,15 +312,12 @@ class CrackLaws(NamedTuple):
     depth_mm : array, (n_depths,)
     roll_rad : array, (n_heights,)
         Where on the flank the tooth is loaded.
-    healthy_m_per_n : array, (n_heights,)
-        Compliance of the healthy tooth and its body by finite elements, bore held.
     added_m_per_n : mapping
         Law → (n_depths, n_heights), "finite elements" first.
     """
 
     depth_mm: FloatArray
     roll_rad: FloatArray
-    healthy_m_per_n: FloatArray
     added_m_per_n: dict[str, FloatArray]
 
 
@@ -342,15 +339,12 @@ def compare_crack_laws(gear: ReducedGear, depth_mm: FloatArray) -> CrackLaws:
     g, material = gear.blank.geometry, gear.blank.material
     roll, width = gear.grid.roll_rad, g.face_width_mm * 1e-3
     cracks = [RootCrack(float(q), READY_ANGLE_DEG) for q in np.atleast_1d(depth_mm)]
-    _, n_heights, n_slices = gear.grid.shape
-    at_own_tooth = gear.clamped_compliance_m_per_n[0].reshape(2, n_heights, n_slices, 2, n_heights, n_slices)
-    healthy = at_own_tooth[0, :, :, 0].mean(axis=(1, 3)).diagonal()
     added = {"finite elements": np.array([crack_added_m_per_n(gear, crack).mean(axis=(1, 2)) for crack in cracks])}
     whole = tooth_compliance(g, material, roll).total
     for law in CRACK_LAWS:
         lines = [tooth_compliance(g, material, roll, (c.depth_mm, c.angle_deg), law).total - whole for c in cracks]
         added[law] = np.array(lines) / width
-    return CrackLaws(np.atleast_1d(depth_mm), roll, healthy, added)
+    return CrackLaws(np.atleast_1d(depth_mm), roll, added)
 
 
 @lru_cache(maxsize=64)
