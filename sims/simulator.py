@@ -354,6 +354,6 @@ def _listed_sources() -> str:
     sims_folder = Path(__file__).parent
     digest = sha256()
     for room in _ROOMS:
-        for path in sorted((sims_folder / room).rglob("*.py")):
+        for path in sorted(sims_folder.glob(f"{room}.py")) or sorted((sims_folder / room).rglob("*.py")):
             digest.update(path.relative_to(sims_folder).as_posix().encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()[:16]

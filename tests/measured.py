@@ -1,11 +1,15 @@
 """The measured recordings in `../shared/data`, with the rig of each and what is known of it."""
 
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from gearsig.recording import Recording, read_recording
+from gearsig.angle import ShaftAngle
+from gearsig.checks import FloatArray
+from gearsig.recording import Channel, Recording, read_recording
 from gearsig.rig import Bearing, ConstantSpeed, GearPair, OperatingPoint, Rig, Shaft
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
@@ -126,3 +130,17 @@ def halves(recording: Recording) -> tuple[Recording, Recording]:
     """Return the two halves of a recording."""
     middle = recording.duration_s / 2
     return recording.between(0.0, middle), recording.between(middle, recording.duration_s)
+
+
+@cache
+def car_run_up() -> tuple[Recording, ShaftAngle, FloatArray]:
+    """Return the sound "p" of a car's run-up, its crankshaft's angle, and another vendor's table of its order levels.
+
+    The table has rows of speed in rpm, and of orders 2 and 4 the level in dB.
+    """
+    whole = read_recording(DATA / "car_run_up" / "accel_with_rpm.wav")
+    rpm, rate_hz = whole.samples[1].astype(np.float64), whole.sampling_rate_hz
+    revolutions = np.concatenate([[0.0], np.cumsum(rpm[1:] + rpm[:-1]) / 120 / rate_hz])
+    angle = ShaftAngle("crankshaft", whole.time_s(), revolutions, rpm / 60, "speed channel")
+    sound = Recording(whole.samples[:1].astype(np.float64), rate_hz, (Channel("p", "sound_pressure", "Pa"),))
+    return sound, angle, np.loadtxt(DATA / "car_run_up" / "reference_order_levels.txt", skiprows=1)

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import isfinite, sqrt
+from math import isfinite
 from operator import attrgetter
 from typing import Any, TypeVar
 
@@ -275,9 +275,6 @@ def group_of(cause: str) -> str:
 # --------------------
 
 
-Z = 1.6448536269514722
-"""Two-sided 90 % of the normal distribution."""
-
 N_RESAMPLES = 500
 
 T = TypeVar("T")
@@ -306,18 +303,15 @@ NO_SCORE = Score(float("nan"), float("nan"), float("nan"), 0)
 def share(n_hits: int, n: int) -> Score:
     """Return a share with Wilson's score interval.
 
-    (p + z²/2n ± z √(p(1−p)/n + z²/4n²))/(1 + z²/n).
-
     Source: E. B. Wilson, *Probable inference, the law of succession, and statistical inference* (J. Am. Stat. Assoc.,
     1927).
     """
+    from scipy.stats import binomtest
+
     if n == 0:
         return NO_SCORE
-    p, z2 = n_hits / n, Z**2
-    middle = (p + z2 / (2 * n)) / (1 + z2 / n)
-    half = Z * sqrt(p * (1 - p) / n + z2 / (4 * n**2)) / (1 + z2 / n)
-    # Rounding may leave 1e-17 beyond the ends.
-    return Score(p, max(0.0, min(middle - half, p)), min(1.0, max(middle + half, p)), n)
+    interval = binomtest(n_hits, n).proportion_ci(0.9, method="wilson")
+    return Score(n_hits / n, float(interval.low), float(interval.high), n)
 
 
 def resampled(

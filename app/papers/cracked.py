@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline
 from scipy.signal import resample_poly
 
 from app.papers import Paper, PaperFigure, Progress, judged, within_part
-from gearsig import plot
+from gearsig import indicators, plot
 from gearsig.checks import FloatArray
 from gearsig.decompose import VmdSettings, vmd
 from gearsig.plot import CurvePanel, ResponseCase, curves_figure
@@ -628,7 +628,7 @@ def _crack_maps() -> tuple[PaperFigure, PaperFigure]:
     time_figure = PaperFigure("crack_times", "Figure 18", "time signals at 1000 rpm", figure, time_claims)
     # The most impulsive mode of the signal holds the shocks, apart from the mesh harmonics.
     modes = vmd(times, None, VmdSettings(5, penalty=2000.0))
-    kurtosis, whole = [_kurtosis(m) for m in modes.waveforms], _kurtosis(levels[2])
+    kurtosis, whole = [indicators.kurtosis(m) for m in modes.waveforms], indicators.kurtosis(levels[2])
     chosen = int(np.argmax(kurtosis))
     squeezed = squeezed_cwt_map(modes.signal(chosen), lowest=float(modes.centres[chosen]) / 4.0)
     drawn = plot.time_frequency_figure(squeezed)
@@ -659,10 +659,6 @@ def _crack_maps() -> tuple[PaperFigure, PaperFigure]:
     )
     title = f"squeezed wavelet transform of the mode at {modes.centres[chosen]:.0f} Hz, crack of 4 mm, 1000 rpm"
     return time_figure, PaperFigure("crack_maps", "Figures 16 and 20", title, drawn, map_claims)
-
-
-def _kurtosis(x: FloatArray) -> float:
-    return float(np.mean((x - x.mean()) ** 4) / np.var(x) ** 2)
 
 
 def _repeats_after(x: FloatArray, step_s: float, near_s: float) -> float:

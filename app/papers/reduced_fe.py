@@ -6,6 +6,7 @@ Machine: preset "flexible_50_50" at the study's 8 % of damping; the hub inertia 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -323,13 +324,9 @@ def _stress(pair: FlexiblePair, torque_nm: float) -> list[PaperFigure]:
     between, body, n_heights = _between_heights(pair, mesh, force, lambda field: shown(field)["von Mises"])
     residual_share = float(np.sqrt(np.mean(error["von Mises, full less modal"] ** 2) / np.mean(full["von Mises"] ** 2)))
     title = f"{force:.0f} N on one tooth, bore held, {mesh.n_dof} degrees of freedom"
-    static = plot.stress_maps_figure(view.points_mm, view.triangles, full, near_mm=near, title=f"Static: {title}")
-    by_modes = plot.stress_maps_figure(
-        view.points_mm, view.triangles, modal, near_mm=near, title=f"{N_MODES} modes alone: {title}"
-    )
-    error_maps = plot.stress_maps_figure(
-        view.points_mm, view.triangles, error, near_mm=near, title=f"Full less {N_MODES} modes: {title}"
-    )
+    drawn = partial(plot.stress_maps_figure, view.points_mm, view.triangles, near_mm=near)
+    static, by_modes = drawn(full, title=f"Static: {title}"), drawn(modal, title=f"{N_MODES} modes alone: {title}")
+    error_maps = drawn(error, title=f"Full less {N_MODES} modes: {title}")
     # Four angles of a mesh cycle: two with both pairs in contact, two with one, as the contact ratio lies below two.
     moving, n_contacts = {}, []
     for row in (0, 2, 5, 7):
@@ -337,13 +334,7 @@ def _stress(pair: FlexiblePair, torque_nm: float) -> list[PaperFigure]:
         n_contacts.append(len(forces))
         words = " and ".join(f"{f:.0f} N" for f in forces)
         moving[f"mesh cycle {maps.mesh_cycles[row]:.2f}: {words}"] = shown(field)["von Mises"]
-    track = plot.stress_maps_figure(
-        view.points_mm,
-        view.triangles,
-        moving,
-        near_mm=near,
-        title=f"Von Mises stress of the driver as its contacts move, {torque_nm:g} N·m",
-    )
+    track = drawn(moving, title=f"Von Mises stress of the driver as its contacts move, {torque_nm:g} N·m")
     # The study's statements, each judged by one of these numbers.
     far = view.values(np.array([np.full(mesh.n_nodes, float(abs(k) == 2)) for k in NEIGHBOURS])) > 0.5
     quiet = float(np.median(full["von Mises"][far]) / full["von Mises"].max())

@@ -423,7 +423,7 @@ class SeparatedShafts(Result):
     residual: AngleSignal
 
 
-def separate_shafts(signals: Sequence[AngleSignal], teeth: Sequence[int], *, n_passes: int = 3) -> SeparatedShafts:
+def separate_shafts(signals: Sequence[AngleSignal], teeth: Sequence[int]) -> SeparatedShafts:
     """Separate the periodic parts of several meshing shafts from each other, and from the residual.
 
     Alternating projections (Gauss–Seidel on the normal equations of x(θ) = a1(θ) + a2(θ z1/z2) + … + residual): from
@@ -436,9 +436,6 @@ def separate_shafts(signals: Sequence[AngleSignal], teeth: Sequence[int], *, n_p
     teeth : sequence of int
         Of the gear on each shaft; all have one mesh frequency, as a pair or a train of idlers. Mesh harmonics stay in
         all signals; other orders that shafts have in common go to the first of them.
-    n_passes : int
-        Orders of two shafts lie close, and few revolutions tell them apart badly: each pass leaves of the leak its
-        square.
 
     Returns
     -------
@@ -451,7 +448,6 @@ def separate_shafts(signals: Sequence[AngleSignal], teeth: Sequence[int], *, n_p
     RefusalError
         If a signal has no whole revolution.
     """
-    count(n_passes, "n_passes")
     signals = _check_angle_signals(signals, "signals")
     teeth = [count(z, f"teeth[{k}]") for k, z in enumerate(listed(teeth, "teeth", object))]
     if len(signals) != len(teeth) or len({signal.channel_names for signal in signals}) != 1:
@@ -460,7 +456,7 @@ def separate_shafts(signals: Sequence[AngleSignal], teeth: Sequence[int], *, n_p
     residual = separated[0].copy()
     for row, name in enumerate(signals[0].channel_names):
         means: list[FloatArray | None] = [None] * len(signals)
-        for _ in range(n_passes):
+        for _ in range(3):  # few revolutions tell close orders apart badly: each pass leaves of the leak its square
             for k, signal in enumerate(signals):
                 separated[k][row] = signal.samples[row]
                 for j, mean in enumerate(means):

@@ -440,7 +440,6 @@ def respond(
     start_s: float = 0.0,
     step_s: float | None = None,
     stride: int = 1,
-    with_energy: bool = False,
     first: PairState | None = None,
     on_progress: Callable[[float], None] | None = None,
     steps_per_call: int = STEPS_PER_CALL,
@@ -463,7 +462,6 @@ def respond(
         None: `sims.cracked.default_step_s`.
     stride : int
         Every how many steps a point is kept.
-    with_energy : bool
     first : PairState or None
         `Response.last` of another run; None: the static balance at `start_s`.
     on_progress : callable or None
@@ -515,7 +513,7 @@ def respond(
     kept, energies = plan.run(
         march,
         signals,
-        with_energy=with_energy,
+        with_energy=False,
         remedy="look for stiffness, damping and inertia that do not go together, or give a shorter step_s",
         on_progress=on_progress,
     )

@@ -6,22 +6,12 @@ these, or a file of one's own (`add_effect`), is an effect without further ado; 
 `sims.effects.textbook` are what such a file is written with.
 """
 
-from sims.effects._catalogue import (
-    VARIABLE,
-    add_effect,
-    as_gap_effect,
-    completed,
-    effect,
-    effects,
-    is_user_effect,
-    user_files,
-    with_effects,
-)
 from sims.effects._effect import (
     GEAR_OPTION,
     GROUPS,
     SHOWS_IN,
     TOOTH_OPTION,
+    VARIABLE,
     DriveEffect,
     DriveParameters,
     Effect,
@@ -32,6 +22,14 @@ from sims.effects._effect import (
     OptionValue,
     PlausibleRange,
     Severity,
+    add_effect,
+    as_gap_effect,
+    completed,
+    effect,
+    effects,
+    is_user_effect,
+    user_files,
+    with_effects,
 )
 from sims.effects._parts import (
     ANGLE_OPTION,

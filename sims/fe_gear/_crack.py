@@ -312,27 +312,23 @@ class CrackLaws(NamedTuple):
     depth_mm : array, (n_depths,)
     roll_rad : array, (n_heights,)
         Where on the flank the tooth is loaded.
-    healthy_m_per_n : array, (n_heights,)
-        Compliance of the healthy tooth and its body by finite elements, bore held.
     added_m_per_n : mapping
         Law → (n_depths, n_heights), "finite elements" first.
     """
 
     depth_mm: FloatArray
     roll_rad: FloatArray
-    healthy_m_per_n: FloatArray
     added_m_per_n: dict[str, FloatArray]
 
 
-def compare_crack_laws(gear: ReducedGear, depth_mm: FloatArray, angle_deg: float = READY_ANGLE_DEG) -> CrackLaws:
+def compare_crack_laws(gear: ReducedGear, depth_mm: FloatArray) -> CrackLaws:
     """Compare the lines behind a crack, by which models of the literature cut its tooth, with finite elements.
 
     Parameters
     ----------
     gear : ReducedGear
     depth_mm : array, (n_depths,)
-        Above 0.
-    angle_deg : float
+        Above 0; of cracks at `READY_ANGLE_DEG`.
 
     Notes
     -----
@@ -342,16 +338,13 @@ def compare_crack_laws(gear: ReducedGear, depth_mm: FloatArray, angle_deg: float
     """
     g, material = gear.blank.geometry, gear.blank.material
     roll, width = gear.grid.roll_rad, g.face_width_mm * 1e-3
-    cracks = [RootCrack(float(q), angle_deg) for q in np.atleast_1d(depth_mm)]
-    _, n_heights, n_slices = gear.grid.shape
-    at_own_tooth = gear.clamped_compliance_m_per_n[0].reshape(2, n_heights, n_slices, 2, n_heights, n_slices)
-    healthy = at_own_tooth[0, :, :, 0].mean(axis=(1, 3)).diagonal()
+    cracks = [RootCrack(float(q), READY_ANGLE_DEG) for q in np.atleast_1d(depth_mm)]
     added = {"finite elements": np.array([crack_added_m_per_n(gear, crack).mean(axis=(1, 2)) for crack in cracks])}
     whole = tooth_compliance(g, material, roll).total
     for law in CRACK_LAWS:
-        lines = [tooth_compliance(g, material, roll, (c.depth_mm, angle_deg), law).total - whole for c in cracks]
+        lines = [tooth_compliance(g, material, roll, (c.depth_mm, c.angle_deg), law).total - whole for c in cracks]
         added[law] = np.array(lines) / width
-    return CrackLaws(np.atleast_1d(depth_mm), roll, healthy, added)
+    return CrackLaws(np.atleast_1d(depth_mm), roll, added)
 
 
 @lru_cache(maxsize=64)

@@ -549,7 +549,7 @@ def cell_gradients_at_nodes(points_m: FloatArray, cells: IntArray) -> FloatArray
     return _gradients(points_m, cells, _shape_functions(local, cells.shape[1])[1])[0]
 
 
-def sector_matrices(mesh: SectorMesh, material: Material | None = None) -> tuple[sparse.csr_array, sparse.csr_array]:
+def sector_matrices(mesh: SectorMesh) -> tuple[sparse.csr_array, sparse.csr_array]:
     """Stiffness (N/m) and consistent mass (kg) of one sector in cylindrical components.
 
     K_e[(a,i),(b,j)] = ∫ λ ∂_i N_a ∂_j N_b + μ (∂_j N_a ∂_i N_b + δ_ij ∇N_a·∇N_b) dV,  M_e = ρ ∫ N_a N_b dV
@@ -564,7 +564,7 @@ def sector_matrices(mesh: SectorMesh, material: Material | None = None) -> tuple
     E. L. Wilson, A non-conforming element for stress analysis, International Journal for Numerical Methods in
     Engineering 10 (1976).
     """
-    used = mesh.blank.material if material is None else material
+    used = mesh.blank.material
     fields = cell_fields(mesh.points_m, mesh.cells)
     nodes = mesh.cells.reshape(len(mesh.cells), -1)
     turn = cylindrical_turn(mesh)

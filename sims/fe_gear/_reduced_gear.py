@@ -243,16 +243,6 @@ class ReducedGear:
         held: FloatArray = blocks - hub.T @ rigid - rigid.T @ hub + rigid.T @ self.hub_compliance @ rigid
         return held
 
-    def residual_compliance_m_per_n(self, teeth: Sequence[int], n_modes: int | None = None) -> FloatArray:
-        """Free compliance less that of the first `n_modes` elastic modes (None: all at hand), shaped as the former.
-
-        C − Σ φφᵀ/ω². Cut `n_modes` between pairs, not within one: the rest would depend on the tooth.
-        """
-        n = self.n_modes if n_modes is None else count(n_modes, "n_modes", minimum=0)
-        modes = np.hstack([self.modes_at(t)[:n] for t in teeth]) / self.angular_frequencies_rad_s[:n, None]
-        rest: FloatArray = self.compliance_m_per_n(teeth) - modes.T @ modes
-        return rest
-
     def _block(self, stored: FloatArray, offset: int) -> FloatArray:
         z = self.blank.n_teeth
         around = (offset + z // 2) % z - z // 2

@@ -128,7 +128,7 @@ def polar_stress_pa(mesh: SectorMesh, displacement_m: FloatArray) -> dict[str, F
     return {**by_component, "von Mises": _von_mises(stress)}
 
 
-def modal_load(gear: CyclicGear, modes: CyclicModes, load: ToothLoad, spread: Spread = "patch") -> FloatArray:
+def modal_load(gear: CyclicGear, modes: CyclicModes, load: ToothLoad) -> FloatArray:
     """Answer to a force on a tooth by modes alone, u = Σ φ (φᵀ f)/ω², at all nodes, (n_teeth, n_nodes, 3).
 
     What a reduction by its lowest modes without the static rest would give, to be compared with `load_tooth`.
@@ -139,11 +139,10 @@ def modal_load(gear: CyclicGear, modes: CyclicModes, load: ToothLoad, spread: Sp
     modes : CyclicModes
         With the bore held, as `load` is.
     load : ToothLoad
-    spread : str
-        As the load's.
+        Over a patch.
     """
     grid = FlankGrid(np.array([load.roll_rad]), np.array([0.0]))
-    row = flank_rows(gear.mesh, grid, spread, gear.own_places, 3 * len(gear.own_nodes))[0]
+    row = flank_rows(gear.mesh, grid, "patch", gear.own_places, 3 * len(gear.own_nodes))[0]
     total = np.zeros((gear.n_sectors, gear.mesh.n_nodes, 3))
     pairs = modes.multiplicity(gear.n_sectors)
     for mode, hertz in enumerate(modes.frequencies_hz):

@@ -314,7 +314,6 @@ def cracked_tooth_compliance(
     roll_rad: FloatArray,
     crack: RootCrack,
     face_width_m: float,
-    n_slices: int = 12,
 ) -> FloatArray:
     """Compliance of a tooth with a crack over all or part of its width, slices side by side: 1/k = 1/Σ k(w) dw.
 
@@ -325,8 +324,6 @@ def cracked_tooth_compliance(
     crack : RootCrack
     face_width_m : float
         Loaded width; a crack wider than it counts as all through.
-    n_slices : int
-        Gauss points over the cracked width of a parabolic front.
 
     Returns
     -------
@@ -340,7 +337,7 @@ def cracked_tooth_compliance(
     width = face_width_m if crack.width_mm is None else min(crack.width_mm * 1e-3, face_width_m)
     part, weight = np.array([0.0]), np.array([1.0])
     if crack.front == "parabolic":
-        part, weight = _gauss(n_slices)
+        part, weight = _gauss(12)
     stiffness = np.zeros(np.shape(np.atleast_1d(roll_rad)))
     if width < face_width_m:
         stiffness += (face_width_m - width) / tooth_compliance(gear, material, roll_rad).total

@@ -322,9 +322,9 @@ def kept_modes(gear: ReducedGear, limit_hz: float, groups: FloatArray) -> Retain
     return RetainedModes(np.flatnonzero(matters & ~paired), np.column_stack((pairs, pairs + 1)))
 
 
-def residual_compliance(gear: ReducedGear, teeth: list[int], kept: RetainedModes) -> FloatArray:
-    """Free compliance less that of the kept modes, C − Σ φφᵀ/ω²."""
-    modes = np.hstack([gear.modes_at(t)[kept.all] for t in teeth]) / gear.angular_frequencies_rad_s[kept.all, None]
+def residual_compliance(gear: ReducedGear, teeth: list[int], kept: NDArray[np.int64]) -> FloatArray:
+    """Free compliance less that of the modes at these places, C − Σ φφᵀ/ω²; never one of a pair without the other."""
+    modes = np.hstack([gear.modes_at(t)[kept] for t in teeth]) / gear.angular_frequencies_rad_s[kept, None]
     residual: FloatArray = gear.compliance_m_per_n(teeth) - modes.T @ modes
     return residual
 
@@ -670,7 +670,7 @@ def _contact(pair: FlexiblePair) -> tuple[ContactTable, list[RetainedModes], Flo
         kept = [kept_modes(gear, pair.mode_limit_hz, groups) for gear in pair.gears]
 
         def rest(gear: ReducedGear, teeth: list[int]) -> FloatArray:
-            return residual_compliance(gear, teeth, kept[0] if gear is pair.gears[0] else kept[1])
+            return residual_compliance(gear, teeth, kept[0 if gear is pair.gears[0] else 1].all)
 
         table = contact_table(pair.gears, pair.machine.mesh, rest)
         hubs = HubSprings.of(pair.gears[0], kept[0].all), HubSprings.of(pair.gears[1], kept[1].all)

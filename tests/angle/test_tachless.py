@@ -2,23 +2,74 @@
 
 from __future__ import annotations
 
-import gzip
-from pathlib import Path
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
 
 from gearsig.angle import comb_elsewhere, estimate_shaft_angle
+from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
 from gearsig.recording import Channel, Recording
+from gearsig.rig import GearPair, OperatingPoint, Rig, Shaft
+from tests.measured import BY_NAME, car_run_up, needs_data
 
-# By path: test folders are no package.
-from tests.angle.gear_signals import Motion, gear_recording, rig_of
-
-DATA = Path(__file__).parents[3] / "shared" / "data"
-measured = pytest.mark.skipif(not DATA.exists(), reason="measured recordings are not here")
-
+RATE_HZ = 12_800.0
 CHECK = np.linspace(0.5, 7.5, 400)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Speed in rev/s: start + ramp·t, times (1 + depth·sin(2π·rate·t))."""
+
+    start: float
+    ramp: float = 0.0
+    depth: float = 0.0
+    rate: float = 0.5
+
+    def revolutions(self, t: FloatArray) -> FloatArray:
+        w = 2 * np.pi * self.rate
+        # ∫ (a + b t)(1 + d sin wt) dt in closed form.
+        steady = self.start * t + 0.5 * self.ramp * t**2
+        wander = -self.start * np.cos(w * t) / w + self.ramp * (np.sin(w * t) / w**2 - t * np.cos(w * t) / w)
+        return steady + self.depth * (wander + self.start / w)
+
+    def speed(self, t: FloatArray) -> FloatArray:
+        return (self.start + self.ramp * t) * (1 + self.depth * np.sin(2 * np.pi * self.rate * t))
+
+
+def rig_of(*teeth: tuple[int, int | None], nominal_rpm: float | None = None, tolerance: float = 5.0) -> Rig:
+    """Return a rig of pairs in a row, shaft names s0, s1, …"""
+    shafts = tuple(Shaft(f"s{i}") for i in range(len(teeth) + 1))
+    pairs = tuple(GearPair(f"p{i}", f"s{i}", f"s{i + 1}", a, b) for i, (a, b) in enumerate(teeth))
+    return Rig(shafts=shafts, pairs=pairs, operating_point=OperatingPoint("s0", nominal_rpm, tolerance))
+
+
+def gear_recording(motion: Motion, teeth: tuple[tuple[int, int], ...], rng: np.random.Generator) -> Recording:
+    """Return mesh harmonics, each amplitude-modulated once per turn of both gears, shaft harmonics, and white noise.
+
+    Two channels, which differ by phases and gains; noise of standard deviation 1 where the strongest mesh harmonic has
+    amplitude 1.
+    """
+    t = np.arange(round(8.0 * RATE_HZ)) / RATE_HZ
+    angle, speed = 2 * np.pi * motion.revolutions(t), motion.speed(t)
+
+    def turning(order: float) -> FloatArray:
+        return np.cos(order * angle + rng.uniform(0, 6.28))
+
+    samples = np.zeros((2, len(t)))
+    for row in range(2):
+        ratio = 1.0
+        for z1, z2 in teeth:
+            driver, driven = ratio, ratio * z1 / z2
+            envelope = (1 + 0.3 * turning(driver)) * (1 + 0.7 * 0.3 * turning(driven))
+            for k, amplitude in enumerate((1.0, 0.6, 0.4, 0.2), 1):
+                inside = k * z1 * driver * speed < 0.45 * RATE_HZ  # what the recorder's filter would let through
+                samples[row] += inside * amplitude * rng.uniform(0.5, 1.0) * envelope * turning(k * z1 * driver)
+            samples[row] += 0.5 * 0.3 * turning(driver)
+            ratio = driven
+    samples += rng.normal(size=samples.shape)
+    return Recording(samples, RATE_HZ, (Channel("a0", "acceleration", "m/s^2"), Channel("a1", "acceleration", "m/s^2")))
 
 
 @pytest.mark.slow
@@ -116,35 +167,23 @@ def test_no_teeth_no_motion_no_time() -> None:
         estimate_shaft_angle(short, rig_of((23, 46), nominal_rpm=1980.0))
 
 
-def _gear_pair() -> Recording:
-    import warnings
-
-    from scipy.io import loadmat
-
-    rows = []
-    for number in (12, 14):
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # each variable is there twice
-            content = loadmat(DATA / "gear_pair_23_46" / f"3027_217_Data_Chan{number}.mat")
-        rows.append(
-            next(np.ravel(v) for k, v in content.items() if not k.startswith("__") and np.size(v) > 1000 and np.any(v))
-        )
-    return Recording(
-        np.array(rows, dtype=float), 25_600.0, (Channel("a12", "acceleration"), Channel("a14", "acceleration"))
-    )
-
-
 @pytest.mark.slow
-@measured
+@needs_data
 @pytest.mark.parametrize("nominal", [2000.0, None])
 def test_measured_gear_pair(nominal: float | None) -> None:
-    angle = estimate_shaft_angle(_gear_pair(), rig_of((23, None), nominal_rpm=nominal))
+    first, second = (BY_NAME[f"gear_pair_23_46/3027_217_Data_Chan{number}.mat"].read() for number in (12, 14))
+    both = Recording(
+        np.vstack([first.samples[:1], second.samples[:1]]),
+        25_600.0,
+        (Channel("a12", "acceleration"), Channel("a14", "acceleration")),
+    )
+    angle = estimate_shaft_angle(both, rig_of((23, None), nominal_rpm=nominal))
     assert angle.mean_speed_rpm == pytest.approx(1999.76, rel=5e-4)
     assert angle.quality > 0.6
 
 
 @pytest.mark.slow
-@measured
+@needs_data
 @pytest.mark.parametrize(
     ("name", "nominal", "teeth"),
     [
@@ -155,36 +194,22 @@ def test_measured_gear_pair(nominal: float | None) -> None:
     ],
 )
 def test_measured_bearings_are_no_gears(name: str, nominal: float | None, teeth: tuple[int, ...]) -> None:
-    from scipy.io import loadmat
-
-    bearing = loadmat(DATA / "bearing_races" / f"{name}.mat", squeeze_me=True)["bearing"]
-    samples = np.asarray(bearing["gs"].item(), dtype=float)[None]
-    recording = Recording(samples, float(bearing["sr"].item()), (Channel("a", "acceleration"),))
+    recording = BY_NAME[f"bearing_races/{name}.mat"].read()
     for number in teeth:
         with pytest.raises(RefusalError):
             estimate_shaft_angle(recording, rig_of((number, None), nominal_rpm=nominal))
 
 
 @pytest.mark.slow
-@measured
+@needs_data
 def test_measured_two_stage_gearbox() -> None:
-    with gzip.open(DATA / "two_stage_gearbox" / "h30hz50.csv.gz", "rt") as file:
-        samples = np.loadtxt(file, delimiter=",", skiprows=1).T
-    recording = Recording(samples, 4266.7, tuple(Channel(f"a{i}") for i in range(4)))
+    recording = BY_NAME["two_stage_gearbox/h30hz50.csv.gz"].read()
     angle = estimate_shaft_angle(recording, rig_of((32, 96), (32, 80)))
     assert angle.mean_speed_rpm == pytest.approx(29.68 * 60, rel=1e-3)
 
 
 @pytest.mark.slow
-@measured
+@needs_data
 def test_measured_car_is_not_claimed_wrongly() -> None:
-    import warnings
-
-    from scipy.io import wavfile
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # chunks that scipy does not know
-        rate, samples = wavfile.read(DATA / "car_run_up" / "accel_with_rpm.wav")
-    recording = Recording(samples[:, :1].T.astype(float), float(rate), (Channel("p", "sound_pressure"),))
     with pytest.raises(RefusalError):
-        estimate_shaft_angle(recording, rig_of((23, None)))
+        estimate_shaft_angle(car_run_up()[0], rig_of((23, None)))

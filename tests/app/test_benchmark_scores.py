@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.stats import norm
 
 from app.benchmark.answer import Answer
 from app.benchmark.cases import Truth
@@ -11,7 +12,6 @@ from app.benchmark.diagnosers import bare_report
 from app.benchmark.scores import (
     Located,
     Row,
-    Z,
     bins_of,
     brier,
     calibration_error,
@@ -33,6 +33,9 @@ from gearsig.plot import calibration_figure, confusion_figure
 from tests.app.answers import cause
 
 PAIR = {"z1": 20, "z2": 40, "module_mm": 2.0}
+
+Z = norm.ppf(0.95)
+"""Two-sided 90 % of the normal distribution."""
 
 
 def answer(outcome, **probabilities):

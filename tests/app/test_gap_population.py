@@ -1,4 +1,4 @@
-"""Where the rows of the gap diagnosis's population come from."""
+"""The gap's population: where its rows come from, its machines' tolerances, signatures by hand."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ import pytest
 
 from app.studies.drawn_rigs import DrawnRig, simulate_rig
 from app.studies.gap import gearboxes as independent
-from app.studies.gap.gearboxes import PopulationSample, draw_machine, write
+from app.studies.gap.by_hand import FOREIGN, SIGNATURES, scene_of, with_foreign_vibration, with_signature
+from app.studies.gap.gearboxes import Ordinary, PopulationSample, draw_machine, write
 from app.studies.gap.population import pack
 from gearsig.errors import InputError
 from gearsig.gap import (
@@ -21,14 +22,18 @@ from gearsig.gap import (
     LEARNED_FILE,
     NONE,
     UNKNOWN,
+    ReducedRecording,
+    change_once,
     load_learned,
     load_population,
+    once,
     read_learned,
     reduce_recording,
     soft_size,
 )
 from sims.blind import CATALOGUE
 from sims.effects import EffectSetting
+from tests.gap.synthetic import RATE_HZ, RIG, SPEED_HZ, TEETH, record
 from tests.marks import further
 
 FLOOR = load_learned().floor(with_reference=True)
@@ -148,3 +153,141 @@ def test_a_full_disk_leaves_the_library_as_it_was(tmp_path, monkeypatch) -> None
     with pytest.raises(InputError, match="No space left"):
         pack([raw], to)
     assert (to.read_bytes(), list(to.parent.iterdir())) == (whole, [to])
+
+
+# Tolerances of the population's machines: the same on every day, at the driven gear's own place, and no more.
+
+HEALTHY = record()
+
+
+def test_a_day_repeats_the_machine_and_not_the_noise() -> None:
+    ordinary = Ordinary.of(HEALTHY, 3)
+    first, again = (ordinary.on(HEALTHY, 0, np.random.default_rng(5)) for _ in range(2))
+    other = ordinary.on(HEALTHY, 0, np.random.default_rng(6))
+    np.testing.assert_array_equal(first.samples, again.samples)
+    assert 0.0 < np.std(first.samples - other.samples) < 0.2 * np.std(first.samples)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(4))
+def test_machines_get_sidebands_and_shaft_lines_that_last(seed: int) -> None:
+    ordinary = Ordinary.of(HEALTHY, seed)
+    days = [reduce_recording(ordinary.on(record(seed=day), 0, np.random.default_rng(day)), RIG) for day in (1, 2)]
+    names, before = once(reduce_recording(HEALTHY, RIG))
+    _, after = once(days[0])
+    raised = dict(zip(names, after - before, strict=True))
+    assert max(raised[f"shaft.{side}.{n}.to_mesh"] for side in ("driver", "driven") for n in (1, 2, 3)) > 6.0
+    change = dict(zip(*change_once(days[1], days[0]), strict=True))
+    assert abs(change["sideband.driver.1"]) < 1.0
+    assert max(change["change.driver.agreement"], change["change.driven.agreement"]) > 7.0
+
+
+def test_a_later_beginning_keeps_the_driven_gears_place() -> None:
+    """After as many turns as the driven gear has teeth all is as before; after one it is not."""
+    ordinary = Ordinary.of(HEALTHY, 1)
+    rows = [ordinary.on(HEALTHY, turns, np.random.default_rng(0)).samples for turns in (0, 1, TEETH[1])]
+    assert np.abs(rows[2] - rows[0]).max() < 1e-6 * np.abs(rows[0]).max()
+    assert np.abs(rows[1] - rows[0]).max() > 1e-3 * np.abs(rows[0]).max()
+
+
+def test_pulses_move_by_less_than_a_hundredth_of_a_turn() -> None:
+    time = np.arange(round(RATE_HZ * 2.0)) / RATE_HZ
+    pulses = (np.mod(SPEED_HZ * time, 1.0) < 0.1).astype(np.float64)
+    channel = replace(HEALTHY.channels[0], name="tacho", quantity="tachometer", unit="V")
+    n = len(time)
+    with_mark = replace(
+        HEALTHY,
+        samples=np.vstack([HEALTHY.samples[:, :n], pulses]),
+        channels=(*HEALTHY.channels, channel),
+        speed=replace(HEALTHY.speed, times_s=HEALTHY.speed.times_s[HEALTHY.speed.times_s < 2.0]),
+    )
+    found = Ordinary.of(with_mark, 2).on(with_mark, 0, np.random.default_rng(1)).samples[-1]
+    before, after = (np.flatnonzero(np.diff(row) > 0.5) for row in (pulses, np.round(found)))
+    assert len(before) == len(after)
+    assert np.abs(after - before).max() <= 0.01 * RATE_HZ / SPEED_HZ
+
+
+# Signatures by hand: each moves what the literature says it moves, and nothing but the vibration.
+
+STRONG = [seed for seed in range(6) if np.random.default_rng(seed).uniform() > 0.6]
+EXPECTED = {
+    "unbalance": ("shaft.driver.1", "shaft.driven.1"),
+    "misalignment": ("shaft.driver.2", "shaft.driven.2"),
+    "eccentricity": ("sideband.driver.1", "sideband.driven.1"),
+    "pitch_error": ("tooth.driver.level", "tooth.driven.level"),
+    "chipped_tooth": ("surprise.driver.peak", "surprise.driven.peak"),
+    "root_crack": ("surprise.driver.peak", "surprise.driven.peak"),
+    "tooth_wear": ("mesh.total",),
+    "sliding_friction": ("mesh.total",),
+    "bearing_clearance": ("shaft.driver.low", "shaft.driven.low"),
+    "bearing_outer_race": ("envelope.outer",),
+    "bearing_inner_race": ("envelope.inner",),
+    "surface_roughness": ("floor.total", "tooth.driver.level", "tooth.driven.level"),
+    "clipping": ("raw.near_the_extreme",),
+}
+
+
+@pytest.fixture(scope="module")
+def reference() -> ReducedRecording:
+    return reduce_recording(record(seed=1), RIG)
+
+
+@pytest.mark.parametrize("name", SIGNATURES)
+def test_only_the_vibration_changes_and_a_seed_repeats_it(name: str) -> None:
+    first, again = (with_signature(HEALTHY, name, np.random.default_rng(5)) for _ in range(2))
+    np.testing.assert_array_equal(first[0].samples, again[0].samples)
+    assert first[1] == again[1]
+    for row, before, channel in zip(first[0].samples, HEALTHY.samples, HEALTHY.channels, strict=True):
+        assert np.isfinite(row).all()
+        assert np.array_equal(row, before) is not channel.is_vibration
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("n_channels", [1, 3])
+def test_a_machine_may_have_any_number_of_sensors(n_channels: int) -> None:
+    kept = [i for i, channel in enumerate(HEALTHY.channels) if not channel.is_vibration]
+    heard = next(i for i, channel in enumerate(HEALTHY.channels) if channel.is_vibration)
+    rows = [*([heard] * n_channels), *kept]
+    channels = [replace(HEALTHY.channels[row], name=f"c{i}") for i, row in enumerate(rows)]
+    channels[n_channels:] = [HEALTHY.channels[row] for row in kept]
+    recording = replace(HEALTHY, samples=HEALTHY.samples[rows], channels=tuple(channels))
+    for name in SIGNATURES:
+        now, _ = with_signature(recording, name, np.random.default_rng(5))
+        assert np.isfinite(now.samples).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", EXPECTED)
+def test_strong_ones_move_their_own_features(name: str, reference: ReducedRecording) -> None:
+    changes = []
+    for seed in STRONG:
+        now, strength = with_signature(HEALTHY, name, np.random.default_rng(seed))
+        assert strength > 0.6
+        change = dict(zip(*change_once(reduce_recording(now, RIG), reference), strict=True))
+        changes.append(max(change[feature] for feature in EXPECTED[name]))
+    assert np.median(changes) > 3.0
+
+
+@pytest.mark.parametrize("name", FOREIGN)
+def test_foreign_vibration_lasts_as_long_as_the_recording(name: str) -> None:
+    scene = scene_of(HEALTHY)
+    for seed in range(3):
+        vibration = FOREIGN[name](scene, np.random.default_rng(seed))
+        assert vibration.shape == scene.time_s.shape
+        assert np.isfinite(vibration).all()
+        assert vibration.std() > 0.0
+
+
+def test_a_neighbours_gear_is_at_no_order_of_this_one() -> None:
+    """Its clock is its own: at another speed of the machine it has the same frequencies, and so other orders."""
+    scene = scene_of(HEALTHY)
+    faster = replace(scene, revolutions=1.37 * scene.revolutions)
+    for name in ("gear of another machine", "belt", "motor field"):
+        one, other = (FOREIGN[name](s, np.random.default_rng(4)) for s in (scene, faster))
+        np.testing.assert_array_equal(one, other)
+
+
+def test_foreign_vibration_has_a_name_and_is_no_effect() -> None:
+    now, name = with_foreign_vibration(HEALTHY, np.random.default_rng(2))
+    assert name.replace(" ", "_") not in SIGNATURES
+    assert not np.array_equal(now.samples, HEALTHY.samples)

@@ -8,11 +8,11 @@ sixteenth of the step. Tabulating the machine is part of both times.
 
 from __future__ import annotations
 
-import time
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from interleaved import best_of
 from scipy.integrate import solve_ivp
 
 from sims import simulate
@@ -80,30 +80,18 @@ def main() -> None:
         its_error = float(np.std(found - exact) / np.std(exact))
         if its_error <= error:
             break
-    fast, slow = [], []
-    for _ in range(N_ROUNDS):
-        start = time.perf_counter()
-        fixed_step(m, step)
-        middle = time.perf_counter()
-        adaptive(m, tolerance)
-        fast.append(middle - start)
-        slow.append(time.perf_counter() - middle)
+    (fast_s, _), (slow_s, _) = best_of(N_ROUNDS, lambda: fixed_step(m, step), lambda: adaptive(m, tolerance))
     print(f"{DURATION_S} s of motion, step {1e6 * step:.2f} us ({round(DURATION_S / step)} steps)")
-    print(f"fixed-step RK4 : error {error:.1e}, {1e3 * min(fast):8.1f} ms")
-    print(f"solve_ivp      : error {its_error:.1e}, {1e3 * min(slow):8.1f} ms (rtol {tolerance:.0e}, {n_calls} calls)")
-    print(f"ratio          : {min(slow) / min(fast):.1f}")
-    long = []
-    for _ in range(N_ROUNDS):
-        start = time.perf_counter()
-        run = respond(m, OPERATION, duration_s=2.0, rng=np.random.default_rng(1), signals=("driver y",), stride=16)
-        long.append((time.perf_counter() - start) / (2.0 / run.step_s))
-    print(f"one step       : {1e6 * min(long):.2f} us, everything on, one core")
-    whole = []
-    for _ in range(N_ROUNDS):
-        start = time.perf_counter()
-        simulate("cracked", preset="published_55_75", effects={"root_crack": 2.0}, duration_s=5.0, seed=1)
-        whole.append(time.perf_counter() - start)
-    print(f"recording      : {min(whole):.2f} s for 5 s at 20.48 kHz, two accelerometers and tachometer")
+    print(f"fixed-step RK4 : error {error:.1e}, {1e3 * fast_s:8.1f} ms")
+    print(f"solve_ivp      : error {its_error:.1e}, {1e3 * slow_s:8.1f} ms (rtol {tolerance:.0e}, {n_calls} calls)")
+    print(f"ratio          : {slow_s / fast_s:.1f}")
+    (long_s, run), (whole_s, _) = best_of(
+        N_ROUNDS,
+        lambda: respond(m, OPERATION, duration_s=2.0, rng=np.random.default_rng(1), signals=("driver y",), stride=16),
+        lambda: simulate("cracked", preset="published_55_75", effects={"root_crack": 2.0}, duration_s=5.0, seed=1),
+    )
+    print(f"one step       : {1e6 * long_s * run.step_s / 2.0:.2f} us, everything on, one core")
+    print(f"recording      : {whole_s:.2f} s for 5 s at 20.48 kHz, two accelerometers and tachometer")
 
 
 if __name__ == "__main__":

@@ -7,10 +7,9 @@ interleaved rounds), and by how much the process grew at its peak, each engine i
 import subprocess
 import sys
 from functools import partial
-from pathlib import Path
 
 import numpy as np
-from interleaved import best_of
+from interleaved import best_of, peak_mb
 
 from gearsig.decompose import VmdSettings, vmd
 from gearsig.timefreq import Morse, UniformSignal, inverse, squeezed_cwt, squeezed_cwt_map, squeezed_stft
@@ -49,11 +48,6 @@ CASES = {
 }
 
 
-def _peak_mb() -> float:
-    """Return the process's own largest resident size; getrusage would hand down the parent's."""
-    return int(Path("/proc/self/status").read_text().split("VmHWM:")[1].split()[0]) / 1e3
-
-
 def _growth_mb(name: str, engine: str) -> float:
     command = [sys.executable, __file__, "--memory", name, engine]
     return float(subprocess.run(command, check=True, capture_output=True, text=True).stdout.split()[-1])
@@ -62,9 +56,9 @@ def _growth_mb(name: str, engine: str) -> float:
 def _grow(name: str, engine: str) -> None:
     n, run, _ = CASES[name]
     run(_signal(512 if "VMD" in name else 4096), engine)  # compiles and loads
-    before = _peak_mb()
+    before = peak_mb()
     run(_signal(n), engine)
-    print(_peak_mb() - before)
+    print(peak_mb() - before)
 
 
 def main() -> None:

@@ -4,10 +4,11 @@ Processor seconds of one thread, which other work on the machine does not stretc
 `python tests/benchmarks/bench_fe_gear.py`, `--whole` adds the whole matrices at that size (4 GB, minutes).
 """
 
-import resource
 import sys
 from collections.abc import Callable
 from time import process_time
+
+from interleaved import peak_mb
 
 from sims.fe_gear import (
     READY,
@@ -34,11 +35,6 @@ def seconds(work: Callable[[], object]) -> float:
     return process_time() - start
 
 
-def peak_gb() -> float:
-    """Of this process since it began; the largest job comes last."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
-
-
 def compare_modes(mesh: SectorMesh) -> None:
     cyclic = min(seconds(lambda: cyclic_modes(CyclicGear(mesh), 20)) for _ in range(2))
     whole = seconds(lambda: full_modes(CyclicGear(mesh), 20))
@@ -53,16 +49,18 @@ def main() -> None:
         took = seconds(lambda: cyclic_modes(CyclicGear(mesh), 20))
         print(f"20 modes of {mesh.n_dof:7d} DoF: cyclic {took:7.2f} s")
         plan = plan_for(GEAR, WANTED)
-        print(f"free-interface reduction {seconds(lambda: reduce_gear(GEAR, plan)):7.2f} s, peak {peak_gb():.2f} GB")
+        print(
+            f"free-interface reduction {seconds(lambda: reduce_gear(GEAR, plan)):7.2f} s, peak {peak_mb() / 1e3:.2f} GB"
+        )
         start = process_time()
         accuracy = craig_bampton(mesh).accuracy
         print(
-            f"Craig–Bampton to 229 {process_time() - start:7.2f} s, peak {peak_gb():.2f} GB, "
+            f"Craig–Bampton to 229 {process_time() - start:7.2f} s, peak {peak_mb() / 1e3:.2f} GB, "
             f"worst of 20 frequencies {100 * accuracy.worst_error:.4f} %, least subspace MAC {accuracy.minimum_mac:.6f}"
         )
         if "--whole" in sys.argv:
             compare_modes(mesh)
-            print(f"peak {peak_gb():.2f} GB")
+            print(f"peak {peak_mb() / 1e3:.2f} GB")
 
 
 if __name__ == "__main__":

@@ -6,11 +6,10 @@ installed. Times are the process' own processor time, so that other work on the 
 
 import importlib.util
 import os
-import resource
 from collections.abc import Callable
 
 import numpy as np
-from interleaved import best_of
+from interleaved import best_of, peak_mb
 from scipy.signal import upfirdn
 
 from gearsig.spectra import kurtogram, spectral_coherence, splitter
@@ -50,19 +49,15 @@ def scipy_filter_bank(x: np.ndarray, n_levels: int) -> list[list[float]]:
     return rows
 
 
-def _peak_mb() -> float:
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-
-
 def main() -> None:
     """Print ratios, agreement and memory."""
     print("machine load", *(f"{v:.1f}" for v in os.getloadavg()))
     kurtogram(np.random.default_rng(0).normal(size=4096), 1.0)  # compiles, or loads what is compiled
     long = np.zeros(1 << 24, dtype=np.float32)
     long[::4096] = 1.0
-    before = _peak_mb()
+    before = peak_mb()
     kurtogram(long, 1.0)
-    print(f"2^24 samples of float32 (64 MB): peak memory rises by {_peak_mb() - before:.0f} MB")
+    print(f"2^24 samples of float32 (64 MB): peak memory rises by {peak_mb() - before:.0f} MB")
     x = np.random.default_rng(0).normal(size=1 << 20)
     others: dict[str, Callable[[], object]] = {"scipy's filter, node by node": lambda: scipy_filter_bank(x, N_LEVELS)}
     if importlib.util.find_spec("pysdkit") is not None:

@@ -9,11 +9,10 @@ import subprocess
 import sys
 import tracemalloc
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from interleaved import best_of
+from interleaved import best_of, peak_mb
 
 from gearsig.timefreq import (
     Morlet,
@@ -112,20 +111,14 @@ def _cases() -> list[tuple[str, dict[str, Case], int]]:
 
 def _long(kind: str) -> None:
     """Map ten million samples and print how much the process grew."""
-    before = _largest_resident_gb()
+    before = peak_mb() / 1e3
     x = np.random.default_rng(0).normal(size=10_000_000)
     signal = UniformSignal(x, 25_600.0)
     run = {"squeezed CWT": squeezed_cwt_map, "squeezed STFT": squeezed_stft_map, "CWT": cwt_map, "STFT": stft_map}[kind]
     found = run(signal)
-    peak = _largest_resident_gb()
+    peak = peak_mb() / 1e3
     shape = " × ".join(str(n) for n in found.values.shape)
     print(f"{kind} for display ({shape}), 10^7 samples: peak {peak:.2f} GB, of it {before:.2f} GB before the signal")
-
-
-def _largest_resident_gb() -> float:
-    """Return the process's own largest resident size (Linux); getrusage would hand down the parent's."""
-    status = Path("/proc/self/status").read_text()
-    return int(status.split("VmHWM:")[1].split()[0]) / 1e6
 
 
 def main() -> None:

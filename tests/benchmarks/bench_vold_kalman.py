@@ -7,13 +7,12 @@ band, and `track_vold_kalman` as a whole: checks, phases, envelope, waveform, re
 """
 
 import os
-import resource
 import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from interleaved import best_of
+from interleaved import best_of, peak_mb
 from scipy import sparse
 from scipy.linalg import LinAlgError, solveh_banded
 from scipy.sparse.linalg import spsolve
@@ -174,7 +173,7 @@ def main() -> None:
     _two_orders(10**5, 0.5, 2, exact=True)
     if "--long" in sys.argv:
         _two_orders(N, 2.0, 2, exact=False)
-    print(f"peak memory of this process: {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20:.2f} GiB")
+    print(f"peak memory of this process: {peak_mb() / 1e3:.2f} GB")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
-"""What the benchmarks share: one thread each, and the best of interleaved rounds."""
+"""What the benchmarks share: one thread each, the best of interleaved rounds, the largest memory."""
 
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,3 +25,8 @@ def best_of(n_rounds: int, *runs: Callable[[], Any]) -> list[tuple[float, Any]]:
             if elapsed < best[i][0]:
                 best[i] = (elapsed, result)
     return best
+
+
+def peak_mb() -> float:
+    """Return the process's own largest resident size (Linux); getrusage would hand down the parent's."""
+    return int(Path("/proc/self/status").read_text().split("VmHWM:")[1].split()[0]) / 1e3

@@ -1,4 +1,4 @@
-"""Variational modes against vmdpy, closed forms and invariants."""
+"""Variational modes against vmdpy, closed forms and invariants; block by block; of all kinds of signals."""
 
 from __future__ import annotations
 
@@ -11,9 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from vmdpy import VMD
 
-from gearsig.decompose import VmdSettings, vmd
+from gearsig.angle import AngleSignal, ShaftAngle
+from gearsig.decompose import Modes, VmdSettings, modes_by_block, vmd
 from gearsig.errors import InputError
+from gearsig.recording import Channel, Recording
+from gearsig.spectra import Envelope, band_envelope
 from gearsig.timefreq import UniformSignal
+from tests.measured import BY_NAME, needs_data
 
 INIT = {"zero": 0, "uniform": 1, "random": 2}
 
@@ -292,3 +296,161 @@ def test_an_engine_that_is_missing_or_fails_says_so(monkeypatch):
     with pytest.raises(InputError, match="MemoryError: too much"):
         vmd(_signal(64), 1.0, VmdSettings(2, engine="vmdpy"))
     assert vmd(_signal(64), 1.0, VmdSettings(2)).n_modes == 2
+
+
+# Block by block, modes join without gap and say where they do not go on.
+
+SAMPLES = np.arange(20_000)
+TONES = np.stack([np.cos(0.2 * SAMPLES), 0.5 * np.cos(1.3 * SAMPLES + 0.4)])
+
+
+@settings(max_examples=25)
+@given(n=st.integers(300, 3000), n_per_block=st.integers(64, 700), overlap=st.floats(0.01, 1 / 3))
+def test_stretches_cover_the_signal_once_and_sum_to_it(n, n_per_block, overlap):
+    x = TONES.sum(axis=0)[:n]
+    exact = VmdSettings(2, penalty=20.0, dual_step=0.5, tolerance=0.0)
+    segments = list(modes_by_block(x, 1.0, exact, n_per_block=n_per_block, overlap=overlap))
+    ends = [s.start + s.waveforms.shape[1] for s in segments]
+    assert [s.start for s in segments] == [0, *ends[:-1]]
+    assert ends[-1] == n
+    # The line at half the sampling rate is all that an exact block leaves; a sample doubled or left out would jump.
+    assert np.abs(np.concatenate([s.waveforms for s in segments], axis=1).sum(axis=0) - x).max() < 1e-2
+    assert all(0 < s.n_fade <= s.waveforms.shape[1] for s in segments[1:])
+
+
+def test_a_short_signal_is_one_block():
+    (segment,) = modes_by_block(TONES.sum(axis=0), 1.0, VmdSettings(2))
+    whole = vmd(TONES.sum(axis=0), 1.0, VmdSettings(2))
+    assert np.array_equal(segment.waveforms, whole.waveforms)
+    assert (segment.n_fade, segment.start) == (0, 0)
+
+
+def test_steady_tones_go_on_over_the_seams():
+    segments = list(modes_by_block(TONES.sum(axis=0), 1.0, VmdSettings(2), n_per_block=3000))
+    assert len(segments) > 5
+    assert max(s.seam_mismatch.max() for s in segments) < 0.1
+    error = np.concatenate([s.waveforms for s in segments], axis=1)[:, 200:-200] - TONES[:, 200:-200]
+    assert np.sqrt(np.mean(error**2)) < 0.02
+
+
+def test_a_frequency_that_wanders_is_followed():
+    phase = np.cumsum(0.5 + 0.6 * SAMPLES / len(SAMPLES))
+    blocks = modes_by_block(np.cos(phase), 1.0, VmdSettings(1, penalty=2e4, start=(0.08,)), n_per_block=2000)
+    centres = np.array([s.centres[0] for s in blocks]) * 2 * np.pi
+    assert np.all(np.diff(centres) > 0)
+    assert centres[[0, -1]] == pytest.approx([0.53, 1.07], abs=0.02)
+
+
+def test_a_component_that_ends_shows_at_its_seam():
+    second = np.where(SAMPLES < 10_000, np.cos(1.3 * SAMPLES), np.cos(2.2 * SAMPLES))
+    segments = list(modes_by_block(TONES[0] + second, 1.0, VmdSettings(2), n_per_block=3000))
+    mismatch = np.array([s.seam_mismatch for s in segments])
+    assert mismatch[:, 0].max() < 0.2
+    assert mismatch[:, 1].max() > 0.3
+
+
+def test_the_mode_at_zero_stays_first():
+    segments = modes_by_block(TONES[1] + 2.0, 1.0, VmdSettings(2, zero_mode=True), n_per_block=3000)
+    assert all(s.centres[0] == 0.0 for s in segments)
+
+
+def test_a_block_without_signal_has_no_modes():
+    x = np.where(SAMPLES < 10_000, TONES[0], 0.0)
+    with pytest.raises(InputError, match="constant"):
+        list(modes_by_block(x, 1.0, VmdSettings(1), n_per_block=2000))
+
+
+@pytest.mark.parametrize("wrong", [{"overlap": 0.0}, {"overlap": 0.5}, {"n_per_block": 10}])
+def test_blocks_that_do_not_do(wrong):
+    with pytest.raises(InputError):
+        modes_by_block(TONES[0], 1.0, VmdSettings(1), **wrong)
+
+
+# A long signal's modes as one answer.
+
+
+def test_a_short_signal_is_taken_whole():
+    x = TONES.sum(axis=0)[:3000]
+    found, whole = vmd(x, 1.0, VmdSettings(2)), vmd(x, 1.0, VmdSettings(2))
+    np.testing.assert_array_equal(found.waveforms, whole.waveforms)
+    assert found.n_iterations == whole.n_iterations
+
+
+def test_blocks_find_what_the_whole_signal_shows():
+    x = TONES.sum(axis=0)
+    found = vmd(UniformSignal(x, 1.0, unit="g", source="a"), None, VmdSettings(2), n_per_block=3000)
+    whole = vmd(x, 1.0, VmdSettings(2))
+    assert found.centres == pytest.approx(whole.centres, rel=2e-3)
+    np.testing.assert_allclose(found.waveforms.sum(axis=0) + found.residual, x, atol=1e-12)
+    assert np.sqrt(np.mean((found.waveforms - TONES)[:, 200:-200] ** 2)) < 0.02
+    assert (found.unit, found.source, found.notes) == ("g", "a", ())
+    assert len(found.centre_history) > 6
+
+
+def test_a_mode_that_wanders_is_as_wide_as_it_wanders():
+    """A frequency that rises evenly from f to f + d has the standard deviation d/√12."""
+    frequency = 0.08 + 0.02 * SAMPLES / len(SAMPLES)
+    x = np.cos(2 * np.pi * np.cumsum(frequency))
+    found = vmd(x, 1.0, VmdSettings(1, start=(0.08,)), n_per_block=1000)
+    assert found.centres[0] == pytest.approx(0.09, abs=2e-4)
+    assert found.bandwidths[0] == pytest.approx(0.02 / np.sqrt(12), rel=0.05)
+
+
+def test_a_component_that_changes_is_told_at_its_seam():
+    second = np.where(SAMPLES < 10_000, np.cos(1.3 * SAMPLES), np.cos(2.2 * SAMPLES))
+    (note,) = vmd(TONES[0] + second, 1.0, VmdSettings(2), n_per_block=3000).notes
+    assert "does not go on over the seam at" in note
+
+
+# Modes of channels, of signals over angle, of envelopes.
+
+FS = 10_000.0
+TIME = np.arange(20_000) / FS
+MODULATION = 1 + 0.5 * np.cos(2 * np.pi * 20 * TIME) + 0.3 * np.cos(2 * np.pi * 90 * TIME)
+MODULATED = 2.0 * MODULATION * np.cos(2 * np.pi * 3000 * TIME)
+
+
+def _recording(*rows: np.ndarray) -> Recording:
+    names = [Channel(f"a{i + 1}", "acceleration", "g") for i in range(len(rows))]
+    return Recording(np.stack(rows), FS, tuple(names))
+
+
+def test_a_channels_modes_carry_its_name_and_unit():
+    x = np.cos(2 * np.pi * 200 * TIME) + 0.5 * np.cos(2 * np.pi * 2000 * TIME)
+    modes = vmd(_recording(MODULATED, x), "a2", 2)
+    assert modes.centres == pytest.approx([200.0, 2000.0], abs=1.0)
+    assert (modes.source, modes.unit, modes.sampling_rate) == ("a2", "g", FS)
+    assert modes.rms == pytest.approx([0.707, 0.354], abs=0.01)
+    assert modes.positions[-1] == pytest.approx(TIME[-1])
+
+
+def test_over_angle_the_centres_are_orders():
+    n = 256 * 80
+    revolutions = np.arange(n) / 256
+    x = np.cos(2 * np.pi * 23 * revolutions) + 0.5 * np.cos(2 * np.pi * 4 * revolutions)
+    angle = ShaftAngle("input", np.array([0.0, 10.0]), np.array([0.0, 80.0]), np.array([4.0, 12.0]), "constant")
+    signal = AngleSignal(x[None, :], 256, angle, 0.0, ("a1",), ("m/s^2",), 100.0)
+    modes = vmd(signal, "a1", VmdSettings(2, start=(4.0, 23.0)))
+    assert modes.centres == pytest.approx([4.0, 23.0], abs=0.05)
+    assert (modes.axis, modes.shaft, modes.unit) == ("order", "input", "m/s^2")
+
+
+def envelope_modes(envelope: Envelope, settings: VmdSettings) -> Modes:
+    return vmd(envelope.values - envelope.values.mean(), envelope.sampling_rate_hz, settings)
+
+
+def test_modes_of_the_envelope_are_its_modulations():
+    envelope = band_envelope(MODULATED, FS, (2700, 3300), kind="magnitude", unit="g", source="a1")
+    modes = envelope_modes(envelope, VmdSettings(2, start="peaks"))
+    assert modes.centres == pytest.approx([20.0, 90.0], abs=0.5)
+    assert modes.rms * np.sqrt(2) == pytest.approx([1.0, 0.6], abs=0.02)
+
+
+@needs_data
+def test_the_outer_race_shows_in_a_mode_of_the_measured_envelope():
+    recording = BY_NAME["bearing_races/OuterRaceFault_vload_4.mat"].read()
+    name = recording.vibration_names()[0]
+    settings = VmdSettings(4, penalty=20_000.0, start="peaks")
+    envelope = band_envelope(recording.values(name), recording.sampling_rate_hz, (2000, 2600), kind="magnitude")
+    modes = envelope_modes(envelope, settings)
+    assert np.abs(modes.centres - 81.125).min() < 4.0

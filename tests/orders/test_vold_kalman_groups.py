@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gearsig.angle import AngleSignal, ShaftAngle, resample_to_angle
+from gearsig.angle import AngleSignal, resample_to_angle
 from gearsig.errors import InputError
 from gearsig.orders import (
     FrequencyTrack,
@@ -14,20 +14,9 @@ from gearsig.orders import (
 from gearsig.orders.vold_kalman import (
     settling_time,
 )
-from gearsig.recording import Channel, Recording
-from tests.orders.test_vold_kalman import gain_of
+from tests.orders.test_vold_kalman import gain_of, recording_of, run_up
 
 RATE_HZ = 2000.0
-
-
-def run_up(duration_s=10.0, from_rev_per_s=20.0, to_rev_per_s=60.0):
-    t = np.array([0.0, duration_s])
-    mean = (from_rev_per_s + to_rev_per_s) / 2
-    return ShaftAngle("in", t, mean * t, np.array([from_rev_per_s, to_rev_per_s]), "encoder")
-
-
-def recording_of(signal, rate=RATE_HZ):
-    return Recording(np.asarray(signal)[None], rate, (Channel("a", "acceleration", "m/s^2"),))
 
 
 def three_orders(n=10_000):
@@ -130,7 +119,7 @@ def test_settled_parts_follow_the_bandwidth_and_the_gaps():
     angle = run_up(20.0, 10.0, 60.0)
     t = np.arange(round(20 * RATE_HZ)) / RATE_HZ
     y = np.cos(2 * np.pi * 18 * angle.revolutions_at(t))
-    found = track_vold_kalman(recording_of(y), "a", [18.0], bandwidth_orders=0.1, shaft_angle=angle)
+    found = track_vold_kalman(recording_of(y, RATE_HZ), "a", [18.0], bandwidth_orders=0.1, shaft_angle=angle)
     order = found.orders[0]
     assert not order.valid.all()  # the last part lies above 1 kHz
     assert np.all(order.settled <= order.valid)
@@ -149,11 +138,11 @@ def test_a_recording_too_short_to_settle_is_noted():
 
 def test_bandwidth_in_orders_of_a_frequency_track():
     """With an order of its own: of its shaft. Without: of the recording's shaft."""
-    angle = run_up()
+    angle = run_up(10.0, 20.0, 60.0)
     t = np.arange(round(10 * RATE_HZ)) / RATE_HZ
     revolutions = angle.revolutions_at(t)
     speed = angle.speed_rpm_at(t) / 60
-    recording = recording_of(np.cos(2 * np.pi * 3 * revolutions))
+    recording = recording_of(np.cos(2 * np.pi * 3 * revolutions), RATE_HZ)
     own = FrequencyTrack("belt", 3 * speed, order=6.0, shaft="pulley")
     found = track_vold_kalman(recording, "a", [own], bandwidth_orders=0.2).orders[0]
     assert np.allclose(found.bandwidth_hz, 0.2 * speed / 2)
@@ -175,7 +164,7 @@ def over_angle():
     turns = 5.0 + np.arange(n_per_rev * n_rev) / n_per_rev
     level = 1 + 0.3 * np.cos(2 * np.pi * 0.01 * turns)
     samples = level * np.cos(2 * np.pi * 3 * turns + 0.5) + 0.4 * np.cos(2 * np.pi * 7.5 * turns - 1.0)
-    angle = run_up(11.0)
+    angle = run_up(11.0, 20.0, 60.0)
     return AngleSignal(samples[None], n_per_rev, angle, 5.0, ("a",), ("m/s^2",), 25.0), turns, level
 
 
@@ -204,7 +193,7 @@ def test_over_angle_and_over_time_agree():
     angle = run_up(10.0, 30.0, 40.0)
     t = np.arange(round(10 * RATE_HZ)) / RATE_HZ
     turns = angle.revolutions_at(t)
-    recording = recording_of((1 + 0.3 * np.cos(2 * np.pi * 0.02 * turns)) * np.cos(2 * np.pi * 2 * turns))
+    recording = recording_of((1 + 0.3 * np.cos(2 * np.pi * 0.02 * turns)) * np.cos(2 * np.pi * 2 * turns), RATE_HZ)
     over_time = track_vold_kalman(recording, "a", [2.0], bandwidth_orders=0.2, shaft_angle=angle).orders[0]
     signal = resample_to_angle(recording, angle, samples_per_revolution=64)
     over_angle = track_vold_kalman(signal, "a", [2.0], bandwidth_orders=0.2).orders[0]
@@ -226,7 +215,7 @@ def test_bandwidth_in_hz_over_angle(over_angle):
         ({"orders": [("out", 1.0)]}, "ratio of shaft 'out'"),
         ({"orders": []}, "no orders"),
         ({"channel": "b"}, "no channel 'b'"),
-        ({"shaft_angle": run_up()}, "over the angle of shaft"),
+        ({"shaft_angle": run_up(10.0, 20.0, 60.0)}, "over the angle of shaft"),
         ({"bandwidth_orders": 7.0}, "order zero"),
         ({"bandwidth_orders": 0.001}, "400 revolutions only"),
     ],

@@ -1,7 +1,10 @@
+"""Marks at known orders and angles."""
+
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gearsig.plot import PRIORITY, Cursor, n_rows, order_cursors, place
+from gearsig.diagnosis import Finding, Kind, Where
+from gearsig.plot import PRIORITY, AngleMark, Cursor, marks_of, n_rows, order_cursors, place
 from gearsig.rig import GearPair, Rig, Shaft, order_lines
 
 cursors = st.lists(
@@ -70,3 +73,21 @@ def test_cursors_over_frequency_are_orders_times_speed():
     rig = Rig(shafts=(Shaft("in"), Shaft("out")), pairs=(GearPair("p", "in", "out", 20, 41),))
     mesh = [c for c in order_cursors(order_lines(rig), 25.0) if c.kind == "mesh"]
     assert [c.position for c in mesh] == [500.0, 1000.0, 1500.0]
+
+
+def _finding(kind=Kind.FAULT, **where):
+    return Finding("code", kind, "title", Where(**where))
+
+
+def test_angle_wins_and_is_brought_into_one_revolution():
+    assert marks_of([_finding(shaft="in", angle_deg=370.0, tooth=1)], "in", 20) == (AngleMark(10.0, "tooth 1, 10°"),)
+
+
+def test_tooth_without_angle_is_marked_in_its_middle():
+    assert marks_of([_finding(gear="p/in", tooth=3)], "in", 36)[0].angle_deg == 25.0
+    assert marks_of([_finding(gear="p/in", tooth=3)], "in") == ()
+
+
+def test_other_shafts_and_harmless_kinds_are_not_marked():
+    assert marks_of([_finding(shaft="out", angle_deg=1.0)], "in") == ()
+    assert marks_of([_finding(Kind.NOTICE, shaft="in", angle_deg=1.0)], "in") == ()

@@ -1,23 +1,16 @@
 """Figures of a gear's finite elements."""
 
-from io import BytesIO
-
 import numpy as np
 import pytest
-from matplotlib.text import Text
 from scipy.spatial import Delaunay
 
 from gearsig.errors import InputError
 from gearsig.plot import draw_shaded, gear_mesh_figure, gear_modes_figure, gear_stress_figure, new_figure, panels_of
+from tests.plot.drawn import texts_of
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 TRIANGLES = np.array([[0, 1, 2], [0, 2, 3]])
 NEAR = (-0.5, 1.5, -0.5, 1.5)
-
-
-def _texts(figure):
-    figure.savefig(BytesIO(), format="png", dpi=40)
-    return {text.get_text().strip() for text in figure.findobj(Text) if text.get_text()}
 
 
 def test_cells_are_drawn_whole_and_close_with_their_quality():
@@ -28,7 +21,7 @@ def test_cells_are_drawn_whole_and_close_with_their_quality():
         np.testing.assert_array_equal(faces.get_array(), [0.9, 0.4])
         assert faces.get_clim() == (0.0, 1.0)
     assert close.get_xlim() == NEAR[:2]
-    assert {"x (mm)", "y (mm)", "scaled Jacobian (1: undistorted)", "A gear"} <= _texts(figure)
+    assert {"x (mm)", "y (mm)", "scaled Jacobian (1: undistorted)", "A gear"} <= set(texts_of(figure))
     assert bar.get_ylim() == (0.0, 1.0)
 
 
@@ -44,7 +37,7 @@ def test_modes_have_names_a_form_and_a_border():
     assert len(first.collections[0].get_segments()) == 4
     right = max(segment[:, 0].max() for segment in second.collections[0].get_segments())
     assert right == pytest.approx(1.12)
-    assert {"100 Hz, n = 2", "200 Hz, n = 0", "Free"} <= _texts(figure)
+    assert {"100 Hz, n = 2", "200 Hz, n = 0", "Free"} <= set(texts_of(figure))
 
 
 def test_stress_is_drawn_in_mpa_with_its_force():
@@ -55,7 +48,7 @@ def test_stress_is_drawn_in_mpa_with_its_force():
     axes = figure.axes[0]
     assert axes.images[0].get_array().max() == pytest.approx(50.0, rel=0.01)
     assert axes.images[0].get_clim() == (0.0, 10.0)
-    assert {"von Mises stress (MPa)", "500 N"} <= _texts(figure)
+    assert {"von Mises stress (MPa)", "500 N"} <= set(texts_of(figure))
     free = gear_stress_figure(SQUARE, TRIANGLES, stress, near_mm=NEAR)
     assert free.axes[0].images[0].get_clim() == (0.0, 50.0)
     (((panel,),),) = panels_of(free)

@@ -29,9 +29,6 @@ if TYPE_CHECKING:
 
 REPORT = effect_report()
 STANCES = ("for", "further", "against")
-LONG = (
-    "sidebands of the intermediate shaft of the second stage about 3 × mesh, up by 14 dB, nearest lines only, and more"
-)
 
 
 def texts(figure: "Figure") -> list[str]:

@@ -1,10 +1,7 @@
 """Figures of motion in phase space: what is drawn is what was given."""
 
-from io import BytesIO
-
 import numpy as np
 import pytest
-from matplotlib.text import Text
 
 from gearsig.errors import InputError
 from gearsig.phase import (
@@ -26,6 +23,7 @@ from gearsig.plot import (
     phase_portrait_figure,
     recurrence_figure,
 )
+from tests.plot.drawn import texts_of
 
 T = 2 * np.pi * np.arange(2000) / 50.0
 PORTRAIT = PhasePortrait(
@@ -46,11 +44,6 @@ def _section(points):
     )
 
 
-def _texts(figure):
-    figure.savefig(BytesIO(), format="png", dpi=40)
-    return [text.get_text() for text in figure.findobj(Text) if text.get_text()]
-
-
 def test_portrait_with_its_points():
     points = PORTRAIT.points[::50] + 1e-12
     figure = phase_portrait_figure(PORTRAIT, _section(points))
@@ -61,14 +54,14 @@ def test_portrait_with_its_points():
     # One point stays a point: the panel does not shrink to its rounding.
     assert np.ptp(alone.get_xlim()) > 0.05
     assert {"displacement (m)", "velocity (m/s)", "40 points", "once per mesh of stage", "a1 <$x$>"} <= set(
-        _texts(figure)
+        texts_of(figure)
     )
 
 
 def test_long_paths_are_cut_and_say_so():
     figure = phase_portrait_figure(PORTRAIT, n_points=500, axes=(1, 0), title="T")
     np.testing.assert_array_equal(figure.axes[0].lines[0].get_xdata(), PORTRAIT.points[-500:, 1])
-    assert {"last 10 s", "T"} <= set(_texts(figure))
+    assert {"last 10 s", "T"} <= set(texts_of(figure))
 
 
 def test_a_filtered_path_of_few_samples_a_period_is_drawn_as_the_curve_it_is():
@@ -101,7 +94,7 @@ def test_bifurcation_draws_all_points_and_names_periods():
     figure = bifurcation_figure(diagram)
     np.testing.assert_array_equal(figure.axes[0].lines[0].get_xdata(), parameter)
     np.testing.assert_array_equal(figure.axes[0].lines[0].get_ydata(), points)
-    texts = _texts(figure)
+    texts = texts_of(figure)
     assert {"period 1", "period 2", "speed (rpm)", "displacement (m)"} <= set(texts)
     assert "period 0" not in texts
 
@@ -122,7 +115,7 @@ def test_two_branches_shade_where_they_are_apart():
     assert min(box.x0 for box in shaded) == pytest.approx(1000.0)
     assert max(box.x1 for box in shaded) == pytest.approx(1350.0)
     assert {"rising", "falling", "shaded: two motions"} <= {text.get_text() for text in figure.legends[0].get_texts()}
-    assert "two motions at the values tried, step 100 rpm; they may go on beyond the sweep" in _texts(figure)
+    assert "two motions at the values tried, step 100 rpm; they may go on beyond the sweep" in texts_of(figure)
     other_axis = BifurcationDiagram(values, one, "speed", "rpm", "y", "m", values, (1,) * 11, "mesh cycle", one)
     with pytest.raises(InputError, match="branches of x and y"):
         bifurcation_figure(up, other_axis)
@@ -147,7 +140,7 @@ def test_chaos_test_draws_k_and_the_walk():
     figure = chaos_test_figure(test, walk, 1.5)
     np.testing.assert_array_equal(figure.axes[0].lines[0].get_ydata(), [1.0, 0.8])  # in the order of c
     np.testing.assert_array_equal(figure.axes[1].lines[0].get_ydata(), -T)
-    assert {"K = 0.90, irregular, 500 values", "walk at c = 1.500 rad", "p", "q"} <= set(_texts(figure))
+    assert {"K = 0.90, irregular, 500 values", "walk at c = 1.500 rad", "p", "q"} <= set(texts_of(figure))
 
 
 def test_recurrence_shows_the_matrix_over_time_and_the_measures():
@@ -157,7 +150,7 @@ def test_recurrence_shows_the_matrix_over_time_and_the_measures():
     figure = recurrence_figure(plot, measures)
     np.testing.assert_array_equal(figure.axes[0].images[0].get_array(), matrix)
     assert figure.axes[0].images[0].get_extent() == pytest.approx([0.0, 4.9, 0.0, 4.9])
-    assert {"determinism 0.900", "every 7. point", "longest line 2 s"} <= set(_texts(figure))
+    assert {"determinism 0.900", "every 7. point", "longest line 2 s"} <= set(texts_of(figure))
 
 
 @pytest.mark.parametrize(("dimension", "words"), [(3, "dimension 3"), (0, "no dimension: stochastic")])
@@ -179,7 +172,7 @@ def test_embedding_marks_what_was_chosen(dimension, words):
     np.testing.assert_allclose(delays.lines[0].get_xdata(), np.arange(30) * 2.0)
     assert delays.lines[1].get_xdata()[0] == pytest.approx(16.0)
     np.testing.assert_array_equal(dimensions.lines[0].get_ydata(), false.false_fraction)
-    assert {words, "16 ms: first minimum", "false neighbours"} <= set(_texts(figure))
+    assert {words, "16 ms: first minimum", "false neighbours"} <= set(texts_of(figure))
 
 
 def test_divergence_draws_the_fitted_line_on_the_curve():
@@ -189,7 +182,7 @@ def test_divergence_draws_the_fitted_line_on_the_curve():
     line = figure.axes[0].lines[-1]
     np.testing.assert_allclose(line.get_ydata(), -3.0 + 0.5 * line.get_xdata())
     assert line.get_xdata()[[0, -1]] == pytest.approx([0.5, 2.0])
-    assert "λ = 0.5 ± 0.02 1/s, diverging" in _texts(figure)
+    assert "λ = 0.5 ± 0.02 1/s, diverging" in texts_of(figure)
 
 
 def test_small_motion_is_read_in_small_units():
@@ -204,4 +197,4 @@ def test_small_motion_is_read_in_small_units():
     np.testing.assert_allclose(path.lines[0].get_xdata(), PORTRAIT.points[:, 0])
     np.testing.assert_allclose(path.lines[0].get_ydata(), 10.0 * PORTRAIT.points[:, 1])
     np.testing.assert_allclose(alone.lines[-1].get_ydata(), 11.0 * PORTRAIT.points[::50, 1], atol=1e-12)
-    assert {"displacement (µm)", "velocity (mm/s)"} <= set(_texts(figure))
+    assert {"displacement (µm)", "velocity (mm/s)"} <= set(texts_of(figure))

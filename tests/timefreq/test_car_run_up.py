@@ -1,38 +1,18 @@
 """A measured run-up: orders sweep over time and stand still over angle."""
 
-import warnings
-from pathlib import Path
-
 import numpy as np
 import pytest
-from scipy.io import wavfile
 
-from gearsig.angle import ShaftAngle, resample_to_angle
-from gearsig.recording import Channel, Recording
+from gearsig.angle import resample_to_angle
 from gearsig.timefreq import component, ridges, squeezed_cwt_map, stft_map
+from tests.measured import car_run_up, needs_data
 
-FOLDER = Path(__file__).parents[3] / "shared" / "data" / "car_run_up"
-FULL_SCALE_RPM = 4821.4287
-
-pytestmark = pytest.mark.skipif(not FOLDER.is_dir(), reason="the measured recordings are not here")
+pytestmark = needs_data
 
 
 @pytest.fixture(scope="module")
-def run_up():
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", wavfile.WavFileWarning)  # the vendor's own metadata chunk
-        rate, samples = wavfile.read(FOLDER / "accel_with_rpm.wav")
-    rpm = samples[:, 1] / 32768 * FULL_SCALE_RPM
-    t = np.arange(len(rpm)) / rate
-    revolutions = np.concatenate([[0.0], np.cumsum(rpm[1:] + rpm[:-1]) / 120 / rate])
-    angle = ShaftAngle("crankshaft", t, revolutions, rpm / 60, "speed channel")
-    pressure = samples[:, 0] / 32768
-    return Recording(pressure[None, :], float(rate), (Channel("p", "sound_pressure", "Pa"),)), angle
-
-
-@pytest.fixture(scope="module")
-def over_angle(run_up):
-    return resample_to_angle(*run_up, samples_per_revolution=64)
+def over_angle():
+    return resample_to_angle(*car_run_up()[:2], samples_per_revolution=64)
 
 
 def test_firing_order_stands_still_over_angle(over_angle):
@@ -42,8 +22,8 @@ def test_firing_order_stands_still_over_angle(over_angle):
     assert np.mean(np.abs(ridge.positions / 2.0 - 1) < 0.08) > 0.9  # it fades into the noise in between
 
 
-def test_firing_order_follows_the_speed_over_time(run_up):
-    recording, angle = run_up
+def test_firing_order_follows_the_speed_over_time():
+    recording, angle, _ = car_run_up()
     levels = stft_map(recording, "p", window_length=0.25, zero_padding=2, highest=300)
     (ridge,) = ridges(levels, lowest=20, highest=200)
     order = ridge.positions / (angle.speed_rpm_at(ridge.at) / 60)

@@ -1,24 +1,35 @@
-"""Ridges against closed forms, through crossings above all."""
+"""Ridges against closed forms, through crossings above all, and the components along them."""
+
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from gearsig.angle import find_shaft_angle
 from gearsig.errors import InputError, RefusalError
+from gearsig.recording import read_recording
+from gearsig.rig import read_rig
 from gearsig.timefreq import (
     NOT_HIDDEN,
     Morse,
     Ridge,
+    TimeFrequencyMap,
     UniformSignal,
     best_path,
+    component,
     cwt,
     cwt_map,
+    inverse,
+    lowest_possible,
     meetings,
     ridges,
     squeezed_cwt,
     squeezed_cwt_map,
     squeezed_stft,
     squeezed_stft_map,
+    stft,
     stft_map,
+    tops_of_parted_paths,
     untangled,
 )
 from tests.marks import further
@@ -252,3 +263,154 @@ def test_a_squeezed_ridge_follows_the_frequency_of_a_chirp(transform, hz_per_s):
     error = ridge.positions - (100.0 + hz_per_s * ridge.at)
     assert np.sqrt(np.mean(error[inside] ** 2)) < 0.4
     assert np.mean(ridge.amplitude[inside]) == pytest.approx(1.0, abs=0.01)
+
+
+# Ridges stay with their component where it fades or noise covers it, instead of leaping to what is clearer there.
+
+SAMPLES = Path(__file__).parents[2] / "sample_data"
+RATE = 4096.0
+TEETH = 29
+
+
+@pytest.fixture(scope="module")
+def run_up():
+    """Squeezed map of the run-up; mesh frequency over time from the tachometer."""
+    rig = read_rig(SAMPLES / "run_up.toml")
+    recording = read_recording(SAMPLES / "run_up.h5", rig=rig)
+    angle = find_shaft_angle(recording, rig)
+
+    def mesh_hz(at):
+        ends = [np.interp(at + d, angle.time_s, angle.revolutions) for d in (-0.02, 0.02)]
+        return TEETH * (ends[1] - ends[0]) / 0.04
+
+    return squeezed_cwt_map(recording, "a1", wavelet=Morse(82.0)), mesh_hz
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("n_ridges", [1, 2, 3])
+def test_the_mesh_is_followed_from_where_it_is_weak(run_up: tuple[TimeFrequencyMap, object], n_ridges: int):
+    levels, mesh_hz = run_up
+    found = ridges(levels, n_ridges)
+    assert len(found) == n_ridges
+    shares = []
+    for ridge in found:
+        inside = (ridge.at > 0.2) & (ridge.at < 7.7)
+        order = ridge.positions[inside] / mesh_hz(ridge.at[inside])
+        shares.append(max((float(np.mean(np.abs(order / h - 1) < 0.06)), -h) for h in range(1, 7)))
+    assert -shares[0][1] == 1  # below 2 s it is 30 dB under the fourth harmonic
+    assert shares[0][0] > 0.95
+    assert min(share for share, _ in shares) > 0.75
+    assert len({h for _, h in shares}) == n_ridges
+
+
+@pytest.mark.parametrize("transform", [cwt_map, squeezed_cwt_map])
+@pytest.mark.parametrize("seed", [0, further(1), further(2)])
+@pytest.mark.parametrize("course", ["chirp", "step"])
+def test_a_ridge_in_noise_of_more_power_is_followed(transform, seed: int, course: str):
+    t = np.arange(int(8 * RATE)) / RATE
+    hertz = 100.0 * 2 ** (t / 2) if course == "chirp" else np.where(t < 4, 300.0, 900.0)
+    x = np.cos(2 * np.pi * np.cumsum(hertz) / RATE)
+    x += 1.5 * np.random.default_rng(seed).standard_normal(len(t))  # 6.5 dB over the sine
+    (ridge,) = ridges(transform(UniformSignal(x, RATE)))
+    error = ridge.positions / np.interp(ridge.at, t, hertz) - 1
+    assert np.mean(np.abs(error) < 0.1) > 0.85
+
+
+def test_paths_that_would_meet_beyond_the_map_part_at_its_edge():
+    beyond = [np.array([19.0, 20.5, 21.0]), np.array([17.0, 19.5, 20.0])]
+    upper, lower = tops_of_parted_paths(np.ones((18, 3)), beyond, 0)
+    assert np.all((lower >= 0) & (lower <= upper) & (upper <= 17))
+
+
+# Waveforms from ridges, and signals from their coefficients.
+
+T = np.arange(20_001) / 2000.0
+AMPLITUDE = 1 + 0.3 * np.cos(2 * np.pi * 2 * T)
+CHIRP = AMPLITUDE * np.exp(2j * np.pi * (100 * T + 15 * T**2))
+OTHER = np.exp(2j * np.pi * (500 * T + 10 * T**2))
+HIGH = np.exp(2j * np.pi * (750 * T + 5 * T**2))
+INSIDE = slice(500, -500)
+
+
+def _ridge(signal, wavelet):
+    return ridges(cwt_map(signal, wavelet=wavelet, lowest=50, highest=450, n_per_octave=32))[0]
+
+
+@pytest.mark.parametrize(
+    ("beta", "squeezed", "error"), [(20.0, True, 1e-2), (60.0, True, 1e-4), (20.0, False, 2e-2), (60.0, False, 2e-2)]
+)
+def test_modulated_chirp_comes_out_of_its_band(beta, squeezed, error):
+    signal = UniformSignal((CHIRP + HIGH).real, 2000.0, unit="g", source="a")
+    wavelet = Morse(beta)
+    found = component(signal, _ridge(signal, wavelet), squeezed=squeezed, wavelet=wavelet)
+    assert np.abs(found.analytic - CHIRP)[INSIDE].max() < error
+    assert np.abs(found.amplitude - AMPLITUDE)[INSIDE].max() < error
+    assert np.array_equal(found.values, found.analytic.real)
+    assert (found.unit, found.source) == ("g", "a")
+
+
+def test_noise_outside_the_band_is_left_out():
+    noise = 0.5 * np.random.default_rng(0).normal(size=len(T))
+    signal = UniformSignal(CHIRP.real + noise, 2000.0)
+    wavelet = Morse(60.0)
+    ridge = _ridge(signal, wavelet)
+    for squeezed in (True, False):
+        found = component(signal, ridge, squeezed=squeezed, wavelet=wavelet)
+        error = np.sqrt(np.mean((found.values - CHIRP.real)[INSIDE] ** 2))
+        assert error < 0.2
+
+
+def test_whole_signal_from_the_cwt():
+    """The error is that of Σ over lines instead of ∫ over scale, and of lines that are not there."""
+    x = CHIRP.real
+    found = inverse(cwt(UniformSignal(x, 2000.0), lowest=20, highest=990, n_per_octave=12))
+    assert np.abs(found.real - x).max() < 0.02  # at the ends, where frequencies jump in the reflection
+    assert np.abs(found - CHIRP)[INSIDE].max() < 1e-3
+
+
+def test_inverse_between_limits_that_follow_a_component():
+    x = (CHIRP + OTHER).real
+    coefficients = stft(UniformSignal(x, 2000.0), window_length=0.1)
+    low = 100 + 30 * T
+    found = inverse(coefficients, lowest=low - 60, highest=low + 60)
+    assert np.abs(found - CHIRP)[INSIDE].max() < 0.02
+    with pytest.raises(InputError, match="lowest has shape"):
+        inverse(coefficients, lowest=np.zeros(7))
+    with pytest.raises(InputError, match="NaN"):
+        inverse(coefficients, highest=np.nan)
+
+
+def test_order_component(swept_angle_signal):
+    at = np.array([0.0, 200.0])
+    ridge = Ridge(at, np.full(2, 7.0), np.ones(2), np.zeros(2, bool), "order", "g")
+    found = component(swept_angle_signal, ridge, "a")
+    revolutions = np.arange(200 * 64) / 64
+    assert np.abs(found.analytic - np.exp(14j * np.pi * revolutions))[INSIDE].max() < 1e-3
+    with pytest.raises(InputError, match="over order"):
+        component(UniformSignal(np.zeros(1000), 1.0), ridge)
+
+
+def test_a_ridge_at_zero_has_no_waveform():
+    ridge = Ridge(T[[0, -1]], np.array([0.0, 40.0]), np.ones(2), np.zeros(2, bool), "frequency", "")
+    with pytest.raises(InputError, match="touches zero"):
+        component(UniformSignal(CHIRP.real, 2000.0), ridge)
+
+
+def test_half_width_has_limits():
+    signal = UniformSignal(CHIRP.real, 2000.0)
+    ridge = Ridge(T[[0, -1]], np.array([100.0, 400.0]), np.ones(2), np.zeros(2, bool), "frequency", "")
+    with pytest.raises(InputError, match="half_width"):
+        component(signal, ridge, half_width=0.6)
+
+
+def test_a_ridge_at_the_lowest_line_has_a_component():
+    """The band's lower half would need a longer signal; the upper half is there."""
+    n = 1000
+    signal = UniformSignal(np.cos(2 * np.pi * 8.0 * np.arange(n) / 2000.0), 2000.0)
+    lowest = lowest_possible(signal, Morse())
+    at = np.array([0.0, n / 2000.0])
+    ridge = Ridge(at, np.full(2, max(lowest, 8.0)), np.ones(2), np.zeros(2, dtype=bool), "frequency", "")
+    assert np.isfinite(component(signal, ridge).values).all()
+    below = Ridge(at, np.full(2, 0.5 * lowest), np.ones(2), np.zeros(2, dtype=bool), "frequency", "")
+    with pytest.raises(RefusalError, match="shorter than the wavelet"):
+        component(signal, below)

@@ -4,8 +4,9 @@ Without noise the healthy machine is periodic in the mesh: its other lines are t
 means orders of magnitude, and amplitudes are compared with closed forms where there are any.
 """
 
-from dataclasses import replace
-from functools import lru_cache
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import cache, lru_cache
 from math import pi, radians
 
 import numpy as np
@@ -14,11 +15,10 @@ from scipy.signal import hilbert
 
 from gearsig.checks import FloatArray
 from gearsig.recording import Recording
-from sims.cracked import simulate_with_motion
+from sims.cracked import respond, simulate_with_motion
 from sims.effects import EffectSetting, with_effects
 from sims.gear_pair import MeasuredRun
-from sims.machine import Operation
-from tests.sims.cracked.order_lines import OUTPUT_ORDER, Run, healthy, run, run_machine
+from sims.machine import Machine, Operation
 from tests.sims.machines import TEETH, spur_pair_machine
 
 Z = TEETH[0]
@@ -32,6 +32,88 @@ TOOTH_LOCAL = [("root_crack", 3.0), ("tooth_spall", 60.0), ("chipped_tooth", 1.5
 TOOTH = 20  # from 0, as rows of teeth are; effects count from 1
 FLOOR = 1e-5
 """m/s², above the healthy machine's lines off the mesh harmonics."""
+OUTPUT_ORDER = TEETH[0] / TEETH[1]
+"""Revolutions of the output shaft per revolution of the input shaft."""
+HUNTING = 15
+"""Revolutions of the driver after which the same teeth meet again: 15 · 55 = 11 · 75."""
+POINTS_PER_MESH = 64
+SIGNALS = (
+    "driver angle",
+    "driver angle velocity",
+    "transmission_error_m",
+    "mesh_force_n",
+    "driver x",
+    *(f"bearing {b} {axis} acceleration" for b in (1, 3) for axis in "xy"),
+)
+
+
+@dataclass(frozen=True)
+class Run:
+    """Signals at the integrator's steps over a hunting period; tooth 0 of both gears enters at its start.
+
+    Parameters
+    ----------
+    revolutions : array
+        Of the driver, since that start.
+    signals : mapping
+    """
+
+    revolutions: FloatArray
+    signals: dict[str, FloatArray]
+
+    def line(self, signal: str, order: float) -> float:
+        """Amplitude at any order of the driver, by a Hann window over the angle.
+
+        Taken from the integrator's own steps: coarser ones would fold mesh harmonics onto low orders. Over a hunting
+        period, lines 2/15 of an order away do not count.
+        """
+        x, u = self.signals[signal], self.revolutions
+        # Even in time: weights by angle would turn the mesh's own wiggle of the speed into lines at low orders.
+        weight = 1.0 - np.cos(2 * np.pi * u / np.round(u[-1]))
+        weight /= weight.sum()
+        return float(2 * abs(np.sum((x - np.sum(x * weight)) * weight * np.exp(-2j * np.pi * order * u))))
+
+    def lines(self, signal: str, orders: Iterable[float]) -> FloatArray:
+        """Amplitudes at several orders."""
+        return np.array([self.line(signal, order) for order in orders])
+
+    def residual_over_teeth(self, signal: str, teeth: int) -> FloatArray:
+        """Synchronous average of a gear with `teeth`, less what all teeth share: (teeth, POINTS_PER_MESH).
+
+        Row k holds the mesh cycle that begins when tooth k enters. For smooth signals.
+        """
+        n = round(self.revolutions[-1]) * TEETH[0]
+        mesh_cycles = np.arange(n * POINTS_PER_MESH) / POINTS_PER_MESH
+        x = np.interp(mesh_cycles / TEETH[0], self.revolutions, self.signals[signal])
+        over_teeth = x.reshape(-1, teeth, POINTS_PER_MESH).mean(axis=0)
+        residual: FloatArray = over_teeth - over_teeth.mean(axis=0)
+        return residual
+
+
+def run(*settings: EffectSetting, speed_rpm: float = SPEED_RPM, torque_nm: float = TORQUE_NM) -> Run:
+    """Run the machine with effects; the start has died out."""
+    return run_machine(with_effects(spur_pair_machine(), settings, np.random.default_rng(0)), speed_rpm, torque_nm)
+
+
+def run_machine(machine: Machine, speed_rpm: float = SPEED_RPM, torque_nm: float = TORQUE_NM) -> Run:
+    """Run a machine over the second hunting period."""
+    response = respond(
+        machine,
+        Operation.steady(speed_rpm, torque_nm),
+        duration_s=2.1 * HUNTING * 60.0 / speed_rpm + 0.05,
+        rng=np.random.default_rng(1),
+        signals=SIGNALS,
+    )
+    revolutions = response["driver angle"] / (2 * np.pi) - HUNTING
+    inside = (revolutions >= 0.0) & (revolutions < HUNTING)
+    assert revolutions[-1] > HUNTING
+    return Run(revolutions[inside], {name: response[name][inside] for name in SIGNALS})
+
+
+@cache
+def healthy(speed_rpm: float = SPEED_RPM) -> Run:
+    """Run the machine without any effect."""
+    return run(speed_rpm=speed_rpm)
 
 
 @lru_cache(maxsize=8)  # a run keeps some 16 MB
@@ -177,7 +259,7 @@ def test_a_stiff_coupling_bends_the_shaft_beyond_what_torque_does() -> None:
     setting = EffectSetting("misalignment", 1.0, {})
     machine = with_effects(replace(healthy, shafts=(stiff, healthy.shafts[1])), [setting], np.random.default_rng(0))
     force = radians(1.0) * np.hypot(TORQUE_NM, bends) / (2 * 0.1)
-    found = run_machine(machine, SPEED_RPM, TORQUE_NM).line(ACCELERATION, 2.0)
+    found = run_machine(machine).line(ACCELERATION, 2.0)
     assert found == pytest.approx((2 * OMEGA) ** 2 * force / 2e8, rel=0.05)
 
 

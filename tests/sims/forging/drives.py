@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from gearsig.rig import ToothContact
 from sims.forging import (
     PARAMETERS,
     Bristle,
@@ -42,10 +41,6 @@ def impact(made: ForgingDrive, speed_mps: float, **options: object) -> DriveResp
     start = FirstState(0.0, speed_mps / made.path.base_radii_m[0], 0.0, speed_mps)
     lasts_s = 1.5 * made.contact.half_backlash_um * 1e-6 / speed_mps + 0.02
     return respond(made, AT_REST, duration_s=lasts_s, interval_s=1e-5, first=start, **options)  # type: ignore[arg-type]
-
-
-def contact_of(made: ForgingDrive, **changes: object) -> ToothContact:
-    return replace(made.contact, **changes)  # type: ignore[arg-type]  # as named
 
 
 def driven_by(torque_nm: float) -> Schedule:
