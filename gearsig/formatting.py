@@ -285,6 +285,17 @@ def axis_label(axis: str, shaft: str) -> str:
     return {"order": f"order (of {shaft or 'the shaft'})", "quefrency": "quefrency (s)"}.get(axis, "frequency (Hz)")
 
 
+def position_text(axis: str, position: float) -> str:
+    """Name a position on an axis.
+
+    Examples
+    --------
+    >>> position_text("order", 1.5), position_text("frequency", 50.0)
+    ('order 1.5', '50 Hz')
+    """
+    return f"order {position:.7g}" if axis == "order" else f"{position:.7g} {axis_unit(axis)}"
+
+
 def named(what: str, name: str) -> str:
     """Return a name with what it names before it, unless the name says so itself; empty for an empty name."""
     return name if not name or what.rsplit(maxsplit=1)[-1] in name.lower() else f"{what} {name}"

@@ -215,8 +215,9 @@ def _places(keys: Sequence[Any]) -> list[int]:
     return result
 
 
-def _largest(entry: Entry, name: str) -> float:
-    return max((i.value for i in entry.indicators if i.name == name and isfinite(i.value)), default=-inf)
+def _largest(entry: Entry, name: str, unit: str | None = None) -> float:
+    known = (i for i in entry.indicators if i.name == name and unit in (None, i.unit))
+    return max((i.value for i in known if isfinite(i.value)), default=-inf)
 
 
 def write_index(
@@ -272,12 +273,16 @@ def write_index(
 
 
 def write_batch(index: Index, folder: Path, *, failures: Sequence[Failure] = ()) -> None:
-    """Write `batch.csv` and `batch.json`: one row for each recording, worst first; a failed one has a reason."""
-    names = list(dict.fromkeys(i.name for row in index.rows for i in row.entry.indicators))
+    """Write `batch.csv` and `batch.json`: one row for each recording, worst first; a failed one has a reason.
+
+    Indicators are named with their unit: "rms (m/s²)".
+    """
+    # Channels may count in units of their own: the largest value of each unit is a column.
+    columns_of = {(i.name, i.unit): with_unit(i.name, i.unit) for row in index.rows for i in row.entry.indicators}
     records: list[dict[str, Any]] = []
     for row in index.rows:
         entry = row.entry
-        values = {name: _largest(entry, name) for name in names}
+        values = {column: _largest(entry, *key) for key, column in columns_of.items()}
         records.append(
             {
                 "recording": entry.name,
@@ -296,11 +301,11 @@ def write_batch(index: Index, folder: Path, *, failures: Sequence[Failure] = ())
         )
     records += [{"recording": f.name, "outcome": "not analysed", "reason": f.reason} for f in failures]
     write_text(
-        folder / "batch.json", json.dumps({"schema": "gearsig.batch", "version": 1, "recordings": records}, indent=1)
+        folder / "batch.json", json.dumps({"schema": "gearsig.batch", "version": 2, "recordings": records}, indent=1)
     )
-    columns = list(records[0]) if index.rows else ["recording", "outcome", "reason"]
-    cells = ([spreadsheet_cell(record.get(name, "")) for name in columns] for record in records)
-    write_text(folder / "batch.csv", csv_rows(columns, cells))
+    header = list(records[0]) if index.rows else ["recording", "outcome", "reason"]
+    cells = ([spreadsheet_cell(record.get(name, "")) for name in header] for record in records)
+    write_text(folder / "batch.csv", csv_rows(header, cells))
 
 
 LONGEST_IN_PRINT = 170

@@ -3,6 +3,7 @@ import json
 import re
 from dataclasses import replace
 
+import pandas as pd
 import pytest
 
 from gearsig.diagnosis import Outcome
@@ -92,6 +93,15 @@ def test_a_table_and_json_of_all_recordings_stand_beside_it(write, tmp_path):
         rows = list(csv.DictReader(file))
     assert [row["recording"] for row in rows] == ["'=1+1", "b", "c"]
     assert float(rows[0]["FM4"]) == 8.0
+
+
+def test_indicators_of_the_table_end_in_their_unit(write, tmp_path):
+    """Levels of channels that count in other units are not compared."""
+    rms = (Indicator("rms", 3.0, "m/s^2", "a1"), Indicator("rms", 5.0, "m/s^2", "a2"), Indicator("rms", 9.0, "V", "u"))
+    write([replace(_entry("a", Outcome.FAULT), indicators=rms), _entry("b", Outcome.NO_FAULT)])
+    table = pd.read_csv(tmp_path / "batch.csv", index_col="recording")
+    assert table.loc["a", ["rms (m/s²)", "rms (V)"]].tolist() == [5.0, 9.0]
+    assert table["FM4"].isna().tolist() == [True, False]
 
 
 def test_the_index_as_pdf(write, tmp_path):
