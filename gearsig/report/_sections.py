@@ -50,6 +50,7 @@ class FindingCard:
     strength: str
     floor_percent: float | None
     confidence_percent: int | None
+    sure_of: str
     confidence_basis: str
     evidence: tuple[str, ...]
     surer: str
@@ -66,6 +67,7 @@ def finding_card(finding: Finding) -> FindingCard:
         strength_text(finding.strength),
         _floor_percent(finding.strength),
         round(100 * finding.confidence) if is_confidence_stated(finding) else None,
+        sure_of(finding),
         sureness_text(finding),
         finding.evidence,
         finding.surer,
@@ -95,6 +97,11 @@ def sureness_text(finding: Finding) -> str:
     if not basis or basis.startswith("at most") or not is_confidence_stated(finding):
         return basis
     return f"at most {percent(finding.confidence)}: {basis}"
+
+
+def sure_of(finding: Finding) -> str:
+    """Return what a claim is sure of where that need not be a fault; empty for one that names its cause."""
+    return {"non-synchronous-impacts": "impacts", CHANGED: "a change"}.get(finding.code, "")
 
 
 def css_class(kind: Kind | Outcome) -> str:

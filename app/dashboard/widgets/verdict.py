@@ -208,7 +208,8 @@ def _show_card(finding: Finding) -> None:
         with st.container(horizontal=True, vertical_alignment="center"):
             show_kind(finding.kind)
             if card.confidence_percent is not None:
-                st.markdown(f"≤ **{card.confidence_percent} %** sure", width="content")
+                of = f" of {card.sure_of}" if card.sure_of else ""
+                st.markdown(f"≤ **{card.confidence_percent} %** sure{of}", width="content")
             if card.where:
                 st.caption(_places(card), width="content")
         st.markdown(f"**{as_typed(in_page_words(card.title))}**")
