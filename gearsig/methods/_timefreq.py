@@ -268,8 +268,7 @@ def _packets(
     low, shares = table[f"from ({unit})"], table["share of the energy (%)"]
     edges = np.append(low, packets.limits_of(packets.n_bands - 1)[1])
     steps = ChartLine(np.repeat(edges, 2)[1:-1], np.repeat(shares, 2), "share")
-    label = "frequency of the nodes (Hz)" if unit == "Hz" else "order of the nodes"
-    panel = LinePanel([steps], label, "share of the energy (%)", (0.0, 1.06 * shares.max()))
+    panel = LinePanel([steps], levels.axis_label, "share of the energy (%)", (0.0, 1.06 * shares.max()))
     rms = f"{np.sqrt(packets.energies.sum() / packets.n_samples):.4g} {unit_text(packets.unit)}".strip()
     return replace(
         answer,

@@ -50,6 +50,8 @@ class Picture:
         What the picture shows, for those who do not see it.
     svg : str
         An <svg> element that stands in the page itself instead of an address.
+    title : str
+        What is drawn; empty where the figure itself says it.
     """
 
     uri: str
@@ -58,13 +60,14 @@ class Picture:
     caption: str
     alternative: str
     svg: str = ""
+    title: str = ""
 
     @classmethod
-    def of_svg(cls, svg: str, caption: str, alternative: str) -> Picture:
+    def of_svg(cls, svg: str, caption: str, alternative: str, title: str = "") -> Picture:
         """Return a picture of an <svg> element with a viewBox from 0 0."""
         width, height = re.findall(r'viewBox="0 0 (\d+)[\d.]* (\d+)', svg)[0]
         inline = svg.replace(' xmlns="http://www.w3.org/2000/svg"', "", 1)  # within HTML the namespace is known
-        return cls("", int(width), int(height), caption, alternative, inline)
+        return cls("", int(width), int(height), caption, alternative, inline, title)
 
 
 @dataclass(frozen=True)

@@ -287,7 +287,10 @@ def crack_picture(analysis: Analysis) -> Picture | None:
         x_limits=((entry - reach) * 360.0, (entry + reach) * 360.0),
     )
     return Picture.of_svg(
-        plot.svg_panel(panel), caption, f"Average of {name} over {crack.shaft}{reference}; marked: {crack.text}"
+        plot.svg_panel(panel),
+        caption,
+        f"Average of {name} over {crack.shaft}{reference}; marked: {crack.text}",
+        f"Average of {name} over {crack.shaft}{reference}",
     )
 
 
@@ -463,14 +466,17 @@ def _recording_pictures(analysis: Analysis) -> Iterator[Picture]:
         last = name == names[-1]
         caption = f"Steps and clipped tops are the recording's; spikes may be impacts.{more}" if last else ""
         yield Picture.of_svg(
-            plot.svg_panel(panel, height=100), caption, f"Signal of {name} over {recording.duration_s:.4g} s."
+            plot.svg_panel(panel, height=100),
+            caption,
+            f"Signal of {name} over {recording.duration_s:.4g} s.",
+            f"Waveform of {name}",
         )
     angle = analysis.shaft_angle
     if isinstance(angle, ShaftAngle):
         low, high = angle.speed_range_rpm
         svg = plot.svg_panel(plot.speed_panel(angle), height=70)
         caption = "Look whether the speed held still: where it changes, only orders keep their lines sharp."
-        yield Picture.of_svg(svg, caption, f"Speed over time, {low:.6g} to {high:.6g} rpm.")
+        yield Picture.of_svg(svg, caption, f"Speed over time, {low:.6g} to {high:.6g} rpm.", "Speed")
 
 
 def _channel_group(analysis: Analysis, channel: ChannelAnalysis, *, detailed: bool) -> PictureGroup:
@@ -534,6 +540,7 @@ def _spectrum(analysis: Analysis, channel: ChannelAnalysis) -> Picture:
         if any(cursor.kind == "mesh" for cursor in cursors)
         else "Look which orders stand out: what keeps its order turns with the shaft.",
         f"Order spectrum of {channel.channel} up to order {highest:.4g}, with the orders that the rig implies.",
+        f"Order spectrum of {channel.channel}",
     )
 
 
@@ -545,6 +552,7 @@ def _meshes(analysis: Analysis, channel: ChannelAnalysis, spectrum: Spectrum) ->
             spectrum_svg(spectrum, cursors, (low, high), marked, height=130),
             "Look at the spacing of the sidebands: it names the shaft that modulates the mesh, hence the gear.",
             f"Order spectrum of {channel.channel} from order {low:.4g} to {high:.4g}, around the mesh of {pair}.",
+            f"Order spectrum of {channel.channel} around the mesh of {pair}",
         )
 
 
@@ -560,6 +568,7 @@ def _frequency_picture(analysis: Analysis, channel: ChannelAnalysis) -> Picture:
         spectrum_svg(channel.spectrum, cursors, limits, marked, height=120),
         f"Look for broad humps: resonances of the structure, where impacts ring.{smeared}",
         f"Amplitude spectrum of {channel.channel} over frequency.",
+        f"Spectrum of {channel.channel}",
     )
 
 
@@ -577,6 +586,7 @@ def envelope_picture(analysis: Analysis, channel: ChannelAnalysis, spectrum: Spe
         spectrum_svg(spectrum, cursors, limits, marked, linear=True, height=130),
         "Equally spaced lines at a shaft's order mean one impact per turn; at a bearing's, a damaged race.",
         f"Envelope spectrum of {channel.channel}{where} with shaft and bearing lines.",
+        f"Envelope spectrum of {channel.channel}{where}",
     )
 
 
@@ -608,6 +618,7 @@ def _order_levels(analysis: Analysis, channel: ChannelAnalysis) -> Picture:
         "A peak is a speed at which that order excites something; orders that peak at one frequency show a resonance. "
         f"Largest: {'; '.join(largest)}.",
         f"Amplitudes of {len(levels)} orders of {channel.channel} over speed.",
+        f"Orders of {channel.channel} over speed",
     )
 
 
@@ -627,6 +638,7 @@ def _map(analysis: Analysis, channel: ChannelAnalysis, order_map: OrderMap) -> P
         plot.svg_panel(panel),
         "Upright lines turn with the shaft; bent bands are resonances that stay at their frequency.",
         f"Levels of {channel.channel} over {order_map.axis} and time.",
+        f"{order_map.axis.capitalize()} map of {channel.channel}",
     )
 
 

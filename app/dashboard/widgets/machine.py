@@ -82,10 +82,10 @@ SHORT_LABELS = {
     "rolling_element_diameter_mm": "d (mm)",
     "pitch_diameter_mm": "D (mm)",
     "contact_angle_deg": "α (°)",
-    "bpfo_order": "BPFO (×)",
-    "bpfi_order": "BPFI (×)",
-    "bsf_order": "BSF (×)",
-    "ftf_order": "FTF (×)",
+    "bpfo_order": "BPFO",
+    "bpfi_order": "BPFI",
+    "bsf_order": "BSF",
+    "ftf_order": "FTF",
 }
 """Of narrow columns, which tell their whole names under the pointer."""
 WIDEST_PX = 330
