@@ -263,7 +263,8 @@ def svg_ring(
 ) -> str:
     """Draw one mean revolution around the circle, with the gear's teeth; marked ones in the colour of faults.
 
-    Angle runs clockwise from the top, where the average starts; tooth 1 begins there. Outwards is positive.
+    Angle runs clockwise from the top, where the average starts; tooth 1 begins there, and without numbers of teeth the
+    quarters are marked. Outwards is positive.
 
     Parameters
     ----------
@@ -303,6 +304,10 @@ def svg_ring(
             x, y = _round(rim + 24, middle)
             bold = f'fill="{style.FAULT}" font-weight="700" font-size="15"' if fault else 'font-size="12" opacity="0.7"'
             parts.append(f'<text x="{x:.1f}" y="{y + 4.3:.1f}" text-anchor="middle" {bold}>{tooth + 1}</text>')
+    for quarter in range(0 if n_teeth and numbered else 4):
+        x, y = _round(rim + 24, quarter * np.pi / 2)
+        looks = 'text-anchor="middle" font-size="12" opacity="0.7"'
+        parts.append(f'<text x="{x:.1f}" y="{y + 4.3:.1f}" {looks}>{90 * quarter}°</text>')
     parts.append(f'<circle r="{rim}" fill="none" stroke="currentColor" stroke-opacity="0.45"/>')
     for mark in marks:
         half = step / 2 or 0.05

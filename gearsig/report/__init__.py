@@ -84,6 +84,7 @@ from gearsig.report._page import (
     start_stop_figures,
     verdict_picture,
     write_page,
+    zero_text,
 )
 from gearsig.report._sections import (
     FindingCard,
@@ -190,4 +191,5 @@ __all__ = [
     "write_json",
     "write_page",
     "write_pdf",
+    "zero_text",
 ]

@@ -40,7 +40,7 @@ from gearsig.plot import (
     value_limits,
     with_unit,
 )
-from gearsig.report import verdict_picture
+from gearsig.report import verdict_picture, zero_text
 from gearsig.spectra import LARGEST_SLIP, Spectrum
 
 SCALES: dict[str, Scale] = {"Logarithmic": "log", "Linear": "linear", "dB": "decibel"}
@@ -258,6 +258,7 @@ def _show(analysis: Analysis, average: SynchronousAverage, n_teeth: int | None, 
             numbered = analysis.has_mark(average.shaft)
             ring = show_ring(average, n_teeth, marks, words, state.view_key(key, analysis), numbered=numbered)
             offer_ring(ring, average, n_teeth, marks, numbered=numbered)
+            st.caption(as_typed(zero_text(analysis, average.shaft)))
         with unrolled:
             _show_unrolled(analysis, average, n_teeth, cursors)
 

@@ -29,6 +29,7 @@ from gearsig.report import (
     reference_text,
     sidebands_of,
     verdict_picture,
+    zero_text,
 )
 from gearsig.spectra import LARGEST_SLIP
 
@@ -145,6 +146,8 @@ def show_verdict_picture(analysis: Analysis) -> None:
         ring = show_ring(average, teeth, marks, words, state.view_key(place, analysis), numbered=numbered)
         with st.container(key="verdict-files"):
             offer_ring(ring, average, teeth, marks, numbered=numbered)
+        if not numbered:
+            st.caption(as_typed(zero_text(analysis, picture.shaft)))
         return
     if picture.about == "resonance":
         panel, marked_points = level_panel(analysis, channel)
@@ -152,7 +155,7 @@ def show_verdict_picture(analysis: Analysis) -> None:
         panel = replace(panel, lines=lines)
         show_lines(panel, state.view_key(place, analysis), marked=marked_points, legend=True, height_px=260)
         if picture.finding is not None:
-            st.caption(as_typed(picture.finding.title))
+            st.caption(as_typed(f"{picture.finding.title} Circled: where an order crosses it."))
         return
     if picture.about == "bearing":
         spectrum = channel.envelope_spectrum
