@@ -244,6 +244,8 @@ def test_a_small_window_shows_the_verdict_above_its_picture(page: playwright.Pag
     words, picture = page.locator(".st-key-verdict h3"), page.locator(".st-key-verdict img")
     assert words.bounding_box()["y"] < picture.bounding_box()["y"]
     assert page.evaluate("document.documentElement.scrollWidth") <= 800
+    for measure in ("how strong:", "how sure:"):
+        assert page.locator(".st-key-verdict").get_by_text(measure).is_visible()
 
 
 @pytest.mark.parametrize("query", ["analysis?sample=two_stage&view=Modes", "compare?sample=root_crack_3mm", "gap"])
