@@ -1,5 +1,6 @@
 """The dashboard's pages, run without a browser."""
 
+import json
 import re
 import tomllib
 from base64 import b64decode
@@ -219,6 +220,18 @@ def test_a_machine_is_described_by_the_form_alone() -> None:
         "operating_point": {"speed_rpm": 1490.0, "speed_tolerance_percent": 4.0},
         "machine": {"power_kw": 22.0, "mounting": "rigid"},
     }
+
+
+def test_a_speed_that_is_stated_later_draws_the_pictures_of_the_views() -> None:
+    page = opened_file("bare.csv.gz", SAMPLES["damaged_tooth"].recording.read_bytes(), tab="Machine")
+
+    def drawn() -> set[str]:
+        strip = next(part.proto for part in page.get("bidi_component") if part.proto.component_name == "gearsig.strip")
+        return {item["name"] for item in json.loads(strip.json)["items"] if item.get("path") or item.get("picture")}
+
+    assert not {"Speed", "Order spectrum"} & drawn()
+    labelled(page, "number_input", "Constant speed (rpm)").set_value(1497.0).run()
+    assert {"Speed", "Order spectrum"} <= drawn()
 
 
 def test_a_speed_that_nobody_stated_is_not_made_up() -> None:

@@ -102,6 +102,8 @@ SPEED_SOURCES: dict[str, tuple[str, ...]] = {
 }
 DEFAULTS: Table = {"pulses_per_revolution": 1, "units_per_revolution": 360.0, "rpm_per_unit": 1.0}
 LARGEST, MOST_ROWS = 2.0**53, 1000
+NUMBER = "%.10g"
+"""A number in a field as somebody would type it."""
 _CHANGED = "machine changed"
 
 
@@ -199,6 +201,7 @@ def show_stated(file: ChosenFile) -> None:
             label,
             value=stated(file, name),
             placeholder="from the file or the machine",
+            format=NUMBER,
             help=about,
             key=state.source_key(f"asked {name}", file.sha256),
             on_change=_state,
@@ -301,7 +304,7 @@ def _edit_facts(kind: str, known: Table, choices: Sequence[str], key: Callable[[
         if _is_number(name):
             before = None if value is None else float(value)
             empty = EMPTY.get(name, "not known")
-            chosen = place.number_input(label, value=before, step=1.0, format="%g", placeholder=empty, key=own)
+            chosen = place.number_input(label, value=before, step=1.0, format=NUMBER, placeholder=empty, key=own)
         else:
             chosen = _choose(place, name, choices, value, own)
         if chosen is not None:
@@ -384,7 +387,7 @@ def _config(kind: str, rows: Sequence[Table], rig: Table, channels: Sequence[str
 
 def _width_px(label: str, texts: Sequence[str]) -> int:
     """Return the width at which neither a heading with its icon nor a text of the column is clipped."""
-    longest = max(map(len, texts), default=0)
+    longest = max(map(len, texts), default=12 if label == "name" else 0)
     return min(max(48 + 7 * len(label), 20 + 7 * longest), WIDEST_PX)
 
 

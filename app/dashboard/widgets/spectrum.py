@@ -148,7 +148,8 @@ def show_spectrum(
     many = len(spectra) == 1 and first.index_of(high) - first.index_of(low) > 2 * N_COLUMNS
     st.caption(
         f"Resolution {first.resolution:.4g} {first.axis_unit}, {capitalised(first.window)} window{averages}."
-        f"{joined if many else ''} Drag to zoom, double click for all."
+        f"{joined if many else ''}{' Circled: what a finding names.' if len(marked) else ''} "
+        "Drag to zoom, double click for all."
     )
     return low, high
 

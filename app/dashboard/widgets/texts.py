@@ -123,6 +123,7 @@ _PLACES = {
     "[machine] in the rig file": "size and mounting under Machine",
     "[machine] of the rig file": "size and mounting under Machine",
     "operating_point.": "nominal ",
+    "Give the bearings in the rig file": "Describe the bearings under Machine",
     "/s^2": "/s²",
 }
 """What the page calls the options of the command line, of functions and of rig files that messages name."""
