@@ -130,8 +130,10 @@ def test_order_map_keeps_a_single_tall_cell():
     order_map = OrderMap(
         values, np.arange(3000.0), np.arange(900.0), np.ones(900), "order", "amplitude peak", "g", 1.0, "a1", "in"
     )
-    mesh = order_map_figure(order_map).axes[1].collections[0]
-    assert mesh.get_array().max() == pytest.approx(0.0)
+    figure = order_map_figure(order_map)
+    assert figure.axes[1].collections[0].get_array().max() == pytest.approx(0.0)
+    assert "order map of a1" in {text.get_text() for text in figure.texts}
+    assert figure.axes[1].get_xlabel() == "order of in"
 
 
 @pytest.mark.parametrize("n", [1, 2, 100, 5000])
