@@ -24,6 +24,7 @@ from tests.app.pages import (
     figures,
     key_of,
     labelled,
+    machine,
     numbers,
     opened,
     opened_file,
@@ -232,6 +233,14 @@ def test_a_speed_that_is_stated_later_draws_the_pictures_of_the_views() -> None:
     assert not {"Speed", "Order spectrum"} & drawn()
     labelled(page, "number_input", "Constant speed (rpm)").set_value(1497.0).run()
     assert {"Speed", "Order spectrum"} <= drawn()
+
+
+def test_a_shaft_without_a_name_and_a_mark_is_explained() -> None:
+    content, _ = machine()
+    rig = '[speed]\nsource = "constant"\nspeed_rpm = 600\n'
+    page = opened_file("orders.csv", content, rig, tab="Average")
+    assert next(w for w in page.main.selectbox if w.label == "Shaft").options == ["the shaft"]
+    assert "The shaft has no mark" in shown_text(page)
 
 
 def test_a_speed_that_nobody_stated_is_not_made_up() -> None:

@@ -208,7 +208,8 @@ def show_average(analysis: Analysis, channel: ChannelAnalysis) -> None:
         return
     left, right = st.columns((1, 2), vertical_alignment="bottom")
     key, first = state.view_key("average shaft", analysis), shown.shaft if shown is not None else shafts[0]
-    shaft = address.ask_one(left.selectbox, "Shaft", shafts, first=first, key=key, name="shaft")
+    looks = {"key": key, "name": "shaft", "format_func": lambda name: name or "the shaft"}
+    shaft = address.ask_one(left.selectbox, "Shaft", shafts, first=first, **looks)
     kinds = [kind for kind in KINDS if (shaft, kind) in averages]
     key = state.view_key(f"average kind {kinds}", analysis)
     looks = {"key": key, "name": "signal", "format_func": str.capitalize}
