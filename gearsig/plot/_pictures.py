@@ -191,7 +191,8 @@ def svg_panel(
     shown = [_columns(line, limits) for line in panel.lines]
     low, high = panel.limits or _padded_range([y for _, y in shown], logarithmic=panel.logarithmic)
     labels, n_rows = _placed(panel.cursors, limits, width)
-    top, height = 8 + ROW * n_rows + (16 if len(panel.lines) > 1 else 0), height or 170
+    names, names_height = _names(panel.lines, width) if len(panel.lines) > 1 else ([], 0)
+    top, height = 8 + ROW * n_rows + names_height, height or 170
     frame = _Panel(LEFT, top, width - LEFT - RIGHT, height, limits, (low, high), panel.logarithmic)
     parts = [frame.axes(panel.x, panel.y), frame.cursors(panel.cursors, labels)]
     parts += [frame.line(line, *places) for line, places in zip(panel.lines, shown, strict=True)]
@@ -201,8 +202,7 @@ def svg_panel(
         for at, value in marked
         if limits[0] <= at <= limits[1]
     ]
-    parts += _names(panel.lines) if len(panel.lines) > 1 else []
-    return _svg(width, top + height + BOTTOM, parts)
+    return _svg(width, top + height + BOTTOM, [*parts, *names])
 
 
 def _image_of_levels(panel: LevelPanel, n_columns: int, n_rows: int) -> bytes:
@@ -436,16 +436,20 @@ def _placed(cursors: Sequence[Cursor], limits: tuple[float, float], width: int) 
     return placed, sum(bool(row) for row in rows)
 
 
-def _names(lines: Sequence[ChartLine]) -> list[str]:
-    parts, x = [], float(LEFT)
+def _names(lines: Sequence[ChartLine], width: int) -> tuple[list[str], int]:
+    """Return the names of lines in rows, and the height of these."""
+    parts, x, y = [], float(LEFT), 10
     for line in lines:
         if name := style.cut(line.name, 40):
+            reach = 21 + LETTER * len(name)
+            if x > LEFT and x + reach > width - RIGHT:
+                x, y = float(LEFT), y + 16
             parts.append(
-                f'<path d="M{x} 10h16" stroke="{line_colour(line.colour)}" stroke-width="3"/>'
-                f'<text x="{x + 21}" y="14">{escape(name)}</text>'
+                f'<path d="M{x} {y}h16" stroke="{line_colour(line.colour)}" stroke-width="3"/>'
+                f'<text x="{x + 21}" y="{y + 4}">{escape(name)}</text>'
             )
-            x += 21 + LETTER * len(name) + 18
-    return parts
+            x += reach + 18
+    return parts, y + 6
 
 
 def _columns(line: ChartLine, limits: tuple[float, float], n_columns: int = N_COLUMNS) -> tuple[FloatArray, FloatArray]:

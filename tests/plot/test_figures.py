@@ -210,6 +210,15 @@ def test_a_panel_as_svg_breaks_lines_at_gaps_and_keeps_the_largest_level() -> No
     assert np.sum(picture < picture.max()) == 1
 
 
+def test_many_names_of_lines_stand_in_rows_within_the_drawing():
+    x = np.arange(3.0)
+    svg = svg_panel(LinePanel([ChartLine(x, x, f"mode {k}, {1000 + k} Hz") for k in range(9)], "x", "y"))
+    places = [tuple(map(float, at)) for at in re.findall(r'<text x="([\d.]+)" y="([\d.]+)">mode', svg)]
+    assert len(places) == 9
+    assert len({y for _, y in places}) == 2
+    assert max(x for x, _ in places) < 760 - 6 * len("mode 0, 1000 Hz")
+
+
 def test_a_figure_is_taken_apart_into_panels_that_zoom(average_of) -> None:
 
     figure = new_figure(3.0)
