@@ -72,6 +72,7 @@ from gearsig.report._motion import (
 )
 from gearsig.report._page import (
     bearing_cursors,
+    circled_text,
     highest_order_of_interest,
     is_of_sidebands,
     level_panel,
@@ -120,6 +121,7 @@ __all__ = [
     "channel_rows",
     "check_pdf",
     "check_writable",
+    "circled_text",
     "comparison_page",
     "comparison_text",
     "comparison_to_json",

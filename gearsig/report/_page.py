@@ -540,7 +540,7 @@ def _spectrum(analysis: Analysis, channel: ChannelAnalysis) -> Picture:
         )
     return Picture.of_svg(
         spectrum_svg(spectrum, cursors, (0.0, highest), marked),
-        f"{look}{_circled(marked)}",
+        f"{look}{circled_text(marked)}",
         f"Order spectrum of {channel.channel} up to order {highest:.4g}, with the orders that the rig implies.",
         f"Order spectrum of {channel.channel}",
     )
@@ -553,7 +553,7 @@ def _meshes(analysis: Analysis, channel: ChannelAnalysis, spectrum: Spectrum) ->
         yield Picture.of_svg(
             spectrum_svg(spectrum, cursors, (low, high), marked, height=130),
             "Look at the spacing of the sidebands: it names the shaft that modulates the mesh, hence the gear."
-            f"{_circled([order for order in marked if low <= order <= high])}",
+            f"{circled_text([order for order in marked if low <= order <= high])}",
             f"Order spectrum of {channel.channel} from order {low:.4g} to {high:.4g}, around the mesh of {pair}.",
             f"Order spectrum of {channel.channel} around the mesh of {pair}",
         )
@@ -569,7 +569,7 @@ def _frequency_picture(analysis: Analysis, channel: ChannelAnalysis) -> Picture:
     limits = (0.0, float(channel.spectrum.positions[-1]))
     return Picture.of_svg(
         spectrum_svg(channel.spectrum, cursors, limits, marked, height=120),
-        f"Look for broad humps: resonances of the structure, where impacts ring.{smeared}{_circled(marked)}",
+        f"Look for broad humps: resonances of the structure, where impacts ring.{smeared}{circled_text(marked)}",
         f"Amplitude spectrum of {channel.channel} over frequency.",
         f"Spectrum of {channel.channel}",
     )
@@ -588,13 +588,13 @@ def envelope_picture(analysis: Analysis, channel: ChannelAnalysis, spectrum: Spe
     return Picture.of_svg(
         spectrum_svg(spectrum, cursors, limits, marked, linear=True, height=130),
         "Equally spaced lines at a shaft's order mean one impact per turn; at a bearing's, a damaged race."
-        f"{_circled(marked)}",
+        f"{circled_text(marked)}",
         f"Envelope spectrum of {channel.channel}{where} with shaft and bearing lines.",
         f"Envelope spectrum of {channel.channel}{where}",
     )
 
 
-def _circled(marked: Sequence[float]) -> str:
+def circled_text(marked: Sequence[float]) -> str:
     """Say what circles are, where there are any."""
     return " Circled: what a finding names." if len(marked) else ""
 

@@ -374,7 +374,7 @@ def _config(kind: str, rows: Sequence[Table], rig: Table, channels: Sequence[str
         looks: dict[str, Any] = {"label": label, "width": _width_px(label, texts)}
         looks |= {"help": whole} if name in SHORT_LABELS else {}
         looks |= {"pinned": True} if (kind, name) == ("bearing", "name") else {}  # the widest table, which scrolls
-        if name in choices:  # what the file says is shown, although a shaft or bearing may be called otherwise here
+        if name in choices:  # and what the file says besides, such as a bearing with its maker's name
             made[name] = column.SelectboxColumn(**looks, options=list(dict.fromkeys([*choices[name], *texts])))
         elif name.endswith(("_teeth", "elements")):
             made[name] = column.NumberColumn(**looks, step=1, format="%d")

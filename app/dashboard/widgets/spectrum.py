@@ -40,7 +40,7 @@ from gearsig.plot import (
     value_limits,
     with_unit,
 )
-from gearsig.report import verdict_picture, zero_text
+from gearsig.report import circled_text, verdict_picture, zero_text
 from gearsig.spectra import LARGEST_SLIP, Spectrum
 
 SCALES: dict[str, Scale] = {"Logarithmic": "log", "Linear": "linear", "dB": "decibel"}
@@ -148,7 +148,7 @@ def show_spectrum(
     many = len(spectra) == 1 and first.index_of(high) - first.index_of(low) > 2 * N_COLUMNS
     st.caption(
         f"Resolution {first.resolution:.4g} {first.axis_unit}, {capitalised(first.window)} window{averages}."
-        f"{joined if many else ''}{' Circled: what a finding names.' if len(marked) else ''} "
+        f"{joined if many else ''}{circled_text(marked)} "
         "Drag to zoom, double click for all."
     )
     return low, high
