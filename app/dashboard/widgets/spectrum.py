@@ -134,7 +134,7 @@ def show_spectrum(
         panel,
         chart,
         marked=[(p, float(values[start : start + 5].max())) for p, start in places],
-        height_px=270 if plain else 340,
+        height_px=258 if plain else 340,
         legend=bool(names),
         front_first=True,
         whole=whole,
