@@ -226,7 +226,9 @@ def _made_of() -> Callable[[_Job], str]:
             files = [state(path) for path in (job.path, beside, reference, then) if path is not None]
         except OSError:
             return ""
-        parts = [__version__, files, job.name, repr(job.options), job.is_reference, job.methods]
+        rig = job.options.rig and vars(job.options.rig)  # its repr is a summary
+        options = repr(vars(job.options) | {"rig": rig})
+        parts = [__version__, files, job.name, options, job.is_reference, job.methods]
         return hashlib.sha256(json.dumps(parts).encode("utf-8", "surrogateescape")).hexdigest()
 
     return made_of

@@ -106,6 +106,22 @@ def listed_numbers(values: Iterable[float], name: str, *, remedy: str = "") -> t
     return tuple(_number(value, f"{name}[{place}]", "", remedy=remedy) for place, value in enumerate(several))
 
 
+def limits(values: Iterable[float], name: str, unit: str = "") -> tuple[float, float]:
+    """Return a lower and an upper limit as floats if they are two numbers; how they lie is for the caller to say.
+
+    Examples
+    --------
+    >>> limits([1000, 2e3], "band_hz", "Hz")
+    (1000.0, 2000.0)
+    """
+    allowed = f"two numbers, (lower, upper){f' in {unit}' if unit else ''}"
+    pair = _several(values, name, allowed, object, "give both") if not isinstance(values, dict) else ()
+    if len(pair) != 2:
+        raise InputError(f"{name} is {short(values)}", allowed=allowed, remedy="give both")
+    low, high = (_number(value, f"{name}[{place}]", "", remedy="") for place, value in enumerate(pair))
+    return low, high
+
+
 def _several(values: Iterable[T], name: str, allowed: str, of: type | UnionType, remedy: str) -> tuple[T, ...]:
     if not isinstance(values, str | bytes):  # which would be taken letter by letter
         with suppress(TypeError):

@@ -282,7 +282,19 @@ def axis_unit(axis: str) -> str:
 
 def axis_label(axis: str, shaft: str) -> str:
     """Name an axis of frequencies, of orders, that is cycles per revolution of a shaft, or of quefrencies."""
-    return {"order": f"order (of {shaft or 'the shaft'})", "quefrency": "quefrency (s)"}.get(axis, "frequency (Hz)")
+    return {"order": f"order of {shaft or 'the shaft'}", "quefrency": "quefrency (s)"}.get(axis, "frequency (Hz)")
+
+
+def position_text(axis: str, position: float, n_digits: int = 7) -> str:
+    """Name a position on an axis.
+
+    Examples
+    --------
+    >>> position_text("order", 1.5), position_text("frequency", 50.0)
+    ('order 1.5', '50 Hz')
+    """
+    text = f"{position:.{n_digits}g}"
+    return f"order {text}" if axis == "order" else f"{text} {axis_unit(axis)}"
 
 
 def named(what: str, name: str) -> str:

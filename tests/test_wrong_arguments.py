@@ -142,6 +142,42 @@ CASES = {
         lambda: gearsig.track_vold_kalman(RECORD, "a1", [("s", 2, 3)], bandwidth_hz=5.0),
         r"allowed: a number, or \(shaft, number\)",
     ),
+    "envelope, band text": (
+        lambda: gearsig.envelope_spectrum(RECORD, "a1", band_hz="1k..2k"),
+        r"band_hz is '1k\.\.2k' \(allowed: two numbers, \(lower, upper\) in Hz\); give both",
+    ),
+    "envelope, band texts": (
+        lambda: gearsig.envelope_spectrum(RECORD, "a1", band_hz=("9", 2e3)),
+        r"band_hz\[0\] is '9'",
+    ),
+    "envelope, half a band": (
+        lambda: gearsig.envelope_spectrum(RECORD, "a1", band_hz=(None, 2e3)),
+        r"band_hz\[0\] is None",
+    ),
+    "envelope, one number": (lambda: gearsig.envelope_spectrum(RECORD, "a1", band_hz=2e3), r"band_hz is 2000\.0"),
+    "envelope, highest": (lambda: gearsig.envelope_spectrum(RECORD, "a1", highest_hz="9"), r"highest_hz is '9'"),
+    "window a number": (
+        lambda: gearsig.amplitude_spectrum(RECORD, "a1", window=5),
+        r"window is 5 \(allowed: rectangular, hann",
+    ),
+    "window a list": (lambda: gearsig.order_spectrum(RECORD, "a1", window=["hann"]), r"window is \['hann'\] \(allowed"),
+    "unit a number": (lambda: gearsig.power_density(RECORD, "a1", unit=5), r"unit is 5 \(allowed: text\)"),
+    "rate None": (lambda: gearsig.amplitude_spectrum(ARRAY[0], None), r"an array.s sampling rate, is None"),
+    "shaft a list": (lambda: gearsig.synchronous_average(RECORD, "a1", shaft=["in"]), r"shaft is \['in'\]"),
+    "order_map, highest": (lambda: gearsig.order_map(RECORD, "a1", highest_order="9"), r"highest_order is '9'"),
+    "stft, lowest": (lambda: gearsig.stft(ARRAY[0], 1e4, lowest="9"), r"lowest is '9' \(allowed: a number\)"),
+    "cwt, wavelet": (
+        lambda: gearsig.cwt(ARRAY[0], 1e4, wavelet="morse"),
+        r"wavelet is 'morse' \(allowed: Morse, Morlet",
+    ),
+    "ridges": (lambda: gearsig.ridges(ARRAY), r"transform is an array .*gearsig\.cwt"),
+    "vmd, block": (lambda: gearsig.vmd(ARRAY[0], 1e4, 3, n_per_block="9"), r"n_per_block is '9'"),
+    "denoise, settings": (lambda: gearsig.denoise(RECORD, "a1", settings=5), r"settings is 5 \(allowed: Denoise"),
+    "suggest_modes": (lambda: gearsig.suggest_modes(ARRAY[0], 1e4, penalties=5), r"penalties is 5"),
+    "phase_plane": (
+        lambda: gearsig.phase_plane(RECORD, "a1", quantity=5),
+        r"quantity is 5 \(allowed: text, None\)",
+    ),
     # Averages.
     "separate": (lambda: separate(ARRAY[0], 29), r"average is an array .*gearsig\.synchronous_average\("),
     "separate, teeth": (lambda: separate(AVERAGE, 29.5), r"teeth is 29\.5 \(allowed: a whole number"),

@@ -80,7 +80,9 @@ def choose_view(analysis: Analysis, names: Sequence[str]) -> str:
         # The form asks for the speed, of a machine that is described too.
         first = "Machine" if analysis.rig is None or not analysis.rig.shafts else "Spectrum"
     chosen = address.chosen(state.TAB, "view", names, first if first in names else names[0])
-    items = _tiles(state.view_key(f"tiles {is_dark()}", analysis), tuple(names), analysis)
+    angle = analysis.shaft_angle
+    speed_rpm = None if isinstance(angle, CannotTell) else angle.mean_speed_rpm  # stated later, it makes more of them
+    items = _tiles(state.view_key(f"tiles {is_dark()} {speed_rpm} {analysis.rig!r}", analysis), tuple(names), analysis)
     _strip(
         key="strip",
         data={"items": items, "chosen": chosen},

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gearsig.checks import FloatArray, count, positive
+from gearsig.checks import FloatArray, count, listed_numbers, positive
 from gearsig.decompose._vmd import (
     SAMPLES_PER_MODE,
     ModeAxis,
@@ -154,7 +154,7 @@ def suggest_modes(
     """
     x = uniform(signal, channel)
     count(max_modes, "max_modes")
-    alphas = sorted({positive(p, "penalties") for p in penalties})
+    alphas = sorted({positive(p, "penalties") for p in listed_numbers(penalties, "penalties")})
     if not alphas:
         raise InputError("penalties is empty", allowed="one or more values above zero")
     part = replace(x, values=_middle(x.values, count(longest, "longest", minimum=64)))

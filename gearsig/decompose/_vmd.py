@@ -706,7 +706,7 @@ def vmd(
     chosen = settings if isinstance(settings, VmdSettings) else VmdSettings(settings)
     if engine is not None:
         chosen = replace(chosen, engine=engine)
-    if x.n_samples <= n_per_block:
+    if x.n_samples <= count(n_per_block, "n_per_block"):
         return modes_of_whole(x, chosen, rng)
     waveforms: FloatArray = np.empty((chosen.n_modes, x.n_samples))
     segments: list[ModeSegment] = []

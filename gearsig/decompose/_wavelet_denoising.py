@@ -7,7 +7,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from gearsig.checks import FloatArray, count, freeze, one_of, positive
+from gearsig.checks import FloatArray, count, freeze, instance_of, one_of, positive
 from gearsig.errors import InputError
 from gearsig.recording import Recording
 from gearsig.results import Result
@@ -261,6 +261,7 @@ def denoise(
     """
     values, fs, unit, source = named_signal(signal, channel_or_rate_hz, unit, source, minimum=8)
     x = values.astype(np.float64)
+    instance_of(settings, DenoiseSettings | None, "settings")
     settings = _with_levels(settings or DenoiseSettings(), x)
     n_levels, n_shifts = settings.n_levels or 1, settings.n_shifts
     totals = np.zeros((n_levels, 3))  # noise, threshold, kept share

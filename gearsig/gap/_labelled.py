@@ -160,7 +160,9 @@ def _key(
     healthy = [labelled.reference] if labelled.reference is not None else [s.recording.recording for s in shared]
     for recording in (labelled.recording, *healthy):
         digest.update(np.ascontiguousarray(recording.samples).tobytes())
-        digest.update(repr((recording.sampling_rate_hz, recording.channels, recording.rig)).encode())
+        digest.update(
+            repr((recording.sampling_rate_hz, recording.channels, recording.rig and vars(recording.rig))).encode()
+        )
     return digest.hexdigest()[:32]
 
 

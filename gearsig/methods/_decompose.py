@@ -12,7 +12,7 @@ from gearsig import plot
 from gearsig.checks import FloatArray
 from gearsig.decompose import DenoiseSettings, Modes, VmdEngine, VmdSettings, denoise, mode_spectra, suggest_modes, vmd
 from gearsig.errors import InputError
-from gearsig.formatting import axis_unit, readable, unit_text
+from gearsig.formatting import axis_unit, position_text, readable, unit_text
 from gearsig.indicators import kurtosis
 from gearsig.methods._table import (
     LINES,
@@ -80,7 +80,6 @@ def _modes(
     chosen = int(np.argmax(impulses)) if mode is None else mode - 1
     if not 0 <= chosen < modes.n_modes:
         raise InputError(f"mode is {mode}", allowed=f"1 to {modes.n_modes}, by rising centre")
-    unit = axis_unit(modes.axis)
     numbers = {
         "centres": list(modes.centres),
         "bandwidths": list(modes.bandwidths),
@@ -90,13 +89,14 @@ def _modes(
         "reasons": list(reasons),
         "warnings": list(modes.notes),
     }
-    names = [f"mode {k}, {centre:.5g} {unit}" for k, centre in enumerate(modes.centres, start=1)]
+    names = [f"mode {k}, {position_text(modes.axis, f, 5)}" for k, f in enumerate(modes.centres, start=1)]
     columns = dict(zip(names, modes.waveforms, strict=True)) | {"residual": modes.residual}
     step = f"{modes.n_modes} variational modes, penalty {settings.penalty:g}, of {modes.source} less {offset:g}"
     waveforms = waveforms_of(
         prepared, channel, signal, {"signal": signal.values, **columns}, step,
         residual="residual", shown_first=names[chosen],
     )  # fmt: skip
+    unit = axis_unit(modes.axis)
     about = {
         "mode": np.arange(1, modes.n_modes + 1),
         f"centre ({unit})": modes.centres,
@@ -121,7 +121,7 @@ def _modes(
             (
                 f"**{modes.n_modes} modes** at penalty **{settings.penalty:g}**, started from **{settings.start}**. "
                 f"Mode **{chosen + 1}** is {'the most impulsive' if mode is None else 'chosen'}: kurtosis "
-                f"{impulses[chosen]:.3g}, centre {modes.centres[chosen]:.5g} {unit}."
+                f"{impulses[chosen]:.3g}, centre {position_text(modes.axis, modes.centres[chosen], 5)}."
             ),
         ),
         notes=(*reasons, f"{end} after {modes.n_iterations} iterations. Upright lines: the modes' centres."),
@@ -140,7 +140,7 @@ def _modes(
     on = levels_answer(channel, levels, numbers)
     return replace(
         on,
-        caption=f"mode {chosen + 1} of {modes.n_modes}, centre {centre:.5g} {unit}: {on.caption}",
+        caption=f"mode {chosen + 1} of {modes.n_modes}, centre {position_text(modes.axis, centre, 5)}: {on.caption}",
         tables=answer.tables,
         panels=(*on.panels, *answer.panels),
         facts=answer.facts,

@@ -10,7 +10,7 @@ import numpy as np
 from gearsig import plot
 from gearsig.diagnosis import RecordBlocks
 from gearsig.errors import GearsigError
-from gearsig.formatting import counted, power_of_ten, readable, unit_text
+from gearsig.formatting import counted, position_text, power_of_ten, readable, unit_text
 from gearsig.methods._spectra import cursors_of
 from gearsig.methods._table import (
     HIGHEST,
@@ -45,7 +45,7 @@ def _map_answer(prepared: PreparedRecording, channel: str, levels: OrderMap, hig
     kept = levels.positions <= (np.inf if highest is None else highest)
     values, positions = levels.values[:, kept], levels.positions[kept]
     table = {"time (s)": levels.time_s, "speed (rpm)": levels.speed_rpm}
-    lines = {f"order {p:.7g}" if over == "order" else f"{p:.7g} Hz": values[:, i] for i, p in enumerate(positions)}
+    lines = {with_unit(position_text(over, p), levels.unit): values[:, i] for i, p in enumerate(positions)}
     panel = LevelPanel(
         decibels(values, levels.scaling, levels.unit),
         positions,

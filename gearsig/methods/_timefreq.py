@@ -11,7 +11,7 @@ import numpy as np
 from gearsig import plot, timefreq
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
-from gearsig.formatting import axis_label, axis_unit, unit_text
+from gearsig.formatting import axis_label, axis_unit, position_text, unit_text
 from gearsig.methods._spectra import cursors_of
 from gearsig.methods._table import (
     LINES,
@@ -102,10 +102,10 @@ def levels_answer(
     channel: str, levels: TimeFrequencyMap, numbers: Mapping[str, Any], ridges: Sequence[Ridge] = ()
 ) -> MethodAnswer:
     """Return a map as an answer."""
-    unit = axis_unit(levels.axis)
     caption = f"{levels.axis_label} over {levels.at_label}, {levels.method}"
     table: dict[str, Any] = {levels.at_label: levels.at}
-    table |= {f"{p:.7g} {unit}": levels.values[:, i] for i, p in enumerate(levels.positions)}
+    names = [with_unit(position_text(levels.axis, p), levels.unit) for p in levels.positions]
+    table |= {name: levels.values[:, i] for i, name in enumerate(names)}
     lines = [ChartLine(ridge.at, ridge.positions, f"ridge {k}", 1) for k, ridge in enumerate(ridges, start=1)]
     panel = LevelPanel(
         decibels(levels.values.T, levels.scaling, levels.unit),
@@ -268,8 +268,7 @@ def _packets(
     low, shares = table[f"from ({unit})"], table["share of the energy (%)"]
     edges = np.append(low, packets.limits_of(packets.n_bands - 1)[1])
     steps = ChartLine(np.repeat(edges, 2)[1:-1], np.repeat(shares, 2), "share")
-    label = "frequency of the nodes (Hz)" if unit == "Hz" else "order of the nodes"
-    panel = LinePanel([steps], label, "share of the energy (%)", (0.0, 1.06 * shares.max()))
+    panel = LinePanel([steps], levels.axis_label, "share of the energy (%)", (0.0, 1.06 * shares.max()))
     rms = f"{np.sqrt(packets.energies.sum() / packets.n_samples):.4g} {unit_text(packets.unit)}".strip()
     return replace(
         answer,

@@ -19,7 +19,7 @@ from gearsig.angle import (
     speed_channel_angle,
     times_of_revolutions,
 )
-from gearsig.checks import FloatArray, count, freeze, listed, not_negative, one_of
+from gearsig.checks import FloatArray, count, freeze, instance_of, listed, not_negative, one_of
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import counted
 from gearsig.recording import Channel, Recording
@@ -197,6 +197,7 @@ def over_angle(
 ) -> tuple[AngleSignal, str]:
     """Return (a channel over a shaft's angle, its name) of what `synchronous_average` and its neighbours accept."""
     check_signal(signal, AngleSignal | Recording)
+    instance_of(shaft, str, "shaft")
     if isinstance(signal, AngleSignal):
         if shaft not in ("", signal.shaft_angle.shaft) or shaft_angle is not None or speed_rpm is not None:
             raise InputError(

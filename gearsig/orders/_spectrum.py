@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from gearsig.angle import AngleSignal, ShaftAngle, check_shaft_angle
-from gearsig.checks import FloatArray, count, freeze, one_of, positive
+from gearsig.checks import FloatArray, count, freeze, not_negative, one_of, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import axis_label
 from gearsig.orders._average import block_times, first_whole_sample, over_angle, unit_of, whole_revolutions
@@ -217,7 +217,9 @@ def order_map(
     n_per_block = revolutions_per_block * signal.samples_per_revolution
     plan = _plan(len(x), n_per_block, overlap, window, n_blocks_max, "revolutions_per_block")
     resolution = 1.0 / revolutions_per_block
-    highest = signal.highest_order if highest_order is None else min(highest_order, signal.highest_order)
+    highest = signal.highest_order
+    if highest_order is not None:
+        highest = min(not_negative(highest_order, "highest_order"), highest)
     values = _block_spectra(x, plan, scaling, resolution, highest)
     time_s, speed_rpm = block_times(signal, start, plan.n_per_block, plan.step, plan.n_blocks)
     return OrderMap(

@@ -7,7 +7,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from gearsig.checks import FloatArray, count, freeze, one_of
+from gearsig.checks import FloatArray, count, freeze, limits, one_of
 from gearsig.compiled import njit
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import percent
@@ -294,6 +294,7 @@ def fit_limits(curve: Divergence, memory: int, n_min: int) -> tuple[int, int]:
 
 
 def _requested_limits(fit_s: tuple[float, float], rate: float, n_steps: int) -> tuple[int, int]:
+    fit_s = limits(fit_s, "fit_s", "s")
     first, stop = round(fit_s[0] * rate), round(fit_s[1] * rate) + 1
     if first < 0 or not first + MIN_STEPS <= stop <= n_steps:
         raise InputError(

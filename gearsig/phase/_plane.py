@@ -300,6 +300,7 @@ def phase_plane(
     Source: L. Meirovitch, *Elements of Vibration Analysis* (1986), for the phase plane; integration: the property of
     the Fourier transform.
     """
+    instance_of(quantity, str | None, "quantity")
     if isinstance(signal, Recording) and quantity is None:
         measured: str = signal.channels[signal.index(str(channel_or_rate_hz))].quantity
     else:

@@ -18,7 +18,7 @@ from gearsig.angle import (
     interpolate,
     times_of_revolutions,
 )
-from gearsig.checks import FloatArray, count, freeze, frozen_array, instance_of, positive, read_only
+from gearsig.checks import FloatArray, count, freeze, frozen_array, instance_of, number, positive, read_only
 from gearsig.errors import InputError, RefusalError
 from gearsig.phase._plane import PhasePortrait, check_portrait
 from gearsig.recording import Recording, check_recording
@@ -256,7 +256,7 @@ def _geometric_section(
     n = np.eye(portrait.n_axes)[-1] if normal is None else frozen_array(normal, "normal", ndim=1)
     if len(n) != portrait.n_axes or not n.any():
         raise InputError(f"normal is {n.tolist()}", allowed=f"{portrait.n_axes} numbers, not all zero")
-    distance = np.asarray(portrait.points @ n, dtype=np.float64) - offset
+    distance = np.asarray(portrait.points @ n, dtype=np.float64) - number(offset, "offset")
     # The samples before a change of sign that have one more on either side.
     change = np.diff((distance >= 0.0).astype(np.int8))
     before = np.flatnonzero(change != 0 if direction == 0 else change == direction)

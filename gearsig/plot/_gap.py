@@ -152,7 +152,7 @@ def gap_lines_figure(curves: SpectrumCurves, order: float | None = None, *, titl
     keys += _floor_key(axes, "noise floor")
     axes.set_xlim(float(x[0]), float(x[-1]))
     axes.set_ylim(0.0, top)
-    style.label_axes(axes, "order", with_unit("peak amplitude", curves.unit))
+    style.label_axes(axes, "order of the reference shaft", with_unit("peak amplitude", curves.unit))
     style.no_offset(axes)
     style.head(figure, title or curves.label, keys)
     return figure

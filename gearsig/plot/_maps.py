@@ -66,7 +66,7 @@ def order_map_figure(
     draw(axes, place(cursors, limits, style.size_in(axes)[0]), through=False)
     style.label_axes(axes, order_map.axis_label)
     style.label_axes(speed, "speed (rpm)", "time (s)")
-    style.head(figure, order_map.source)
+    style.head(figure, f"{order_map.axis} map of {order_map.source}" if order_map.source else f"{order_map.axis} map")
     style.no_offset(speed)
     return figure
 

@@ -50,6 +50,8 @@ class Picture:
         What the picture shows, for those who do not see it.
     svg : str
         An <svg> element that stands in the page itself instead of an address.
+    title : str
+        What is drawn; empty where the figure itself says it.
     """
 
     uri: str
@@ -58,13 +60,14 @@ class Picture:
     caption: str
     alternative: str
     svg: str = ""
+    title: str = ""
 
     @classmethod
-    def of_svg(cls, svg: str, caption: str, alternative: str) -> Picture:
+    def of_svg(cls, svg: str, caption: str, alternative: str, title: str = "") -> Picture:
         """Return a picture of an <svg> element with a viewBox from 0 0."""
         width, height = re.findall(r'viewBox="0 0 (\d+)[\d.]* (\d+)', svg)[0]
         inline = svg.replace(' xmlns="http://www.w3.org/2000/svg"', "", 1)  # within HTML the namespace is known
-        return cls("", int(width), int(height), caption, alternative, inline)
+        return cls("", int(width), int(height), caption, alternative, inline, title)
 
 
 @dataclass(frozen=True)
@@ -188,7 +191,8 @@ def svg_panel(
     shown = [_columns(line, limits) for line in panel.lines]
     low, high = panel.limits or _padded_range([y for _, y in shown], logarithmic=panel.logarithmic)
     labels, n_rows = _placed(panel.cursors, limits, width)
-    top, height = 8 + ROW * n_rows + (16 if len(panel.lines) > 1 else 0), height or 170
+    names, names_height = _names(panel.lines, width) if len(panel.lines) > 1 else ([], 0)
+    top, height = 8 + ROW * n_rows + names_height, height or 170
     frame = _Panel(LEFT, top, width - LEFT - RIGHT, height, limits, (low, high), panel.logarithmic)
     parts = [frame.axes(panel.x, panel.y), frame.cursors(panel.cursors, labels)]
     parts += [frame.line(line, *places) for line, places in zip(panel.lines, shown, strict=True)]
@@ -198,8 +202,7 @@ def svg_panel(
         for at, value in marked
         if limits[0] <= at <= limits[1]
     ]
-    parts += _names(panel.lines) if len(panel.lines) > 1 else []
-    return _svg(width, top + height + BOTTOM, parts)
+    return _svg(width, top + height + BOTTOM, [*parts, *names])
 
 
 def _image_of_levels(panel: LevelPanel, n_columns: int, n_rows: int) -> bytes:
@@ -260,7 +263,8 @@ def svg_ring(
 ) -> str:
     """Draw one mean revolution around the circle, with the gear's teeth; marked ones in the colour of faults.
 
-    Angle runs clockwise from the top, where the average starts; tooth 1 begins there. Outwards is positive.
+    Angle runs clockwise from the top, where the average starts; tooth 1 begins there, and without numbers of teeth the
+    quarters are marked. Outwards is positive.
 
     Parameters
     ----------
@@ -300,6 +304,10 @@ def svg_ring(
             x, y = _round(rim + 24, middle)
             bold = f'fill="{style.FAULT}" font-weight="700" font-size="15"' if fault else 'font-size="12" opacity="0.7"'
             parts.append(f'<text x="{x:.1f}" y="{y + 4.3:.1f}" text-anchor="middle" {bold}>{tooth + 1}</text>')
+    for quarter in range(0 if n_teeth and numbered else 4):
+        x, y = _round(rim + 24, quarter * np.pi / 2)
+        looks = 'text-anchor="middle" font-size="12" opacity="0.7"'
+        parts.append(f'<text x="{x:.1f}" y="{y + 4.3:.1f}" {looks}>{90 * quarter}°</text>')
     parts.append(f'<circle r="{rim}" fill="none" stroke="currentColor" stroke-opacity="0.45"/>')
     for mark in marks:
         half = step / 2 or 0.05
@@ -428,16 +436,20 @@ def _placed(cursors: Sequence[Cursor], limits: tuple[float, float], width: int) 
     return placed, sum(bool(row) for row in rows)
 
 
-def _names(lines: Sequence[ChartLine]) -> list[str]:
-    parts, x = [], float(LEFT)
+def _names(lines: Sequence[ChartLine], width: int) -> tuple[list[str], int]:
+    """Return the names of lines in rows, and the height of these."""
+    parts, x, y = [], float(LEFT), 10
     for line in lines:
         if name := style.cut(line.name, 40):
+            reach = 21 + LETTER * len(name)
+            if x > LEFT and x + reach > width - RIGHT:
+                x, y = float(LEFT), y + 16
             parts.append(
-                f'<path d="M{x} 10h16" stroke="{line_colour(line.colour)}" stroke-width="3"/>'
-                f'<text x="{x + 21}" y="14">{escape(name)}</text>'
+                f'<path d="M{x} {y}h16" stroke="{line_colour(line.colour)}" stroke-width="3"/>'
+                f'<text x="{x + 21}" y="{y + 4}">{escape(name)}</text>'
             )
-            x += 21 + LETTER * len(name) + 18
-    return parts
+            x += reach + 18
+    return parts, y + 6
 
 
 def _columns(line: ChartLine, limits: tuple[float, float], n_columns: int = N_COLUMNS) -> tuple[FloatArray, FloatArray]:

@@ -314,8 +314,9 @@ def modes_figure(
 def _mode_title(modes: Modes, k: int) -> str:
     if k == modes.n_modes:
         return f"residual, {100 * modes.reconstruction_error:.2g} % of the rms"
-    unit = axis_unit(modes.axis)
-    text = f"mode {k + 1}: {_digits(modes.centres[k], 4)} ± {_digits(modes.bandwidths[k], 2)} {unit}"
+    middle, width = _digits(modes.centres[k], 4), _digits(modes.bandwidths[k], 2)
+    where = f"order {middle} ± {width}" if modes.axis == "order" else f"{middle} ± {width} {axis_unit(modes.axis)}"
+    text = f"mode {k + 1}: {where}"
     return f"{text}, {plain(modes.source, 40)}" if modes.source else text
 
 

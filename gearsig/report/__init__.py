@@ -72,6 +72,7 @@ from gearsig.report._motion import (
 )
 from gearsig.report._page import (
     bearing_cursors,
+    circled_text,
     highest_order_of_interest,
     is_of_sidebands,
     level_panel,
@@ -84,6 +85,7 @@ from gearsig.report._page import (
     start_stop_figures,
     verdict_picture,
     write_page,
+    zero_text,
 )
 from gearsig.report._sections import (
     FindingCard,
@@ -119,6 +121,7 @@ __all__ = [
     "channel_rows",
     "check_pdf",
     "check_writable",
+    "circled_text",
     "comparison_page",
     "comparison_text",
     "comparison_to_json",
@@ -190,4 +193,5 @@ __all__ = [
     "write_json",
     "write_page",
     "write_pdf",
+    "zero_text",
 ]

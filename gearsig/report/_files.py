@@ -207,7 +207,8 @@ def put_picture(picture: Picture, pictures: dict[str, bytes]) -> dict[str, objec
         name = f"picture{len(pictures)}.{'svg' if 'svg' in kind else 'png'}"
         pictures[name] = b64decode(content)
     square = picture.width_px == picture.height_px
-    return {"file": name, "caption": picture.caption, "alternative": picture.alternative, "square": square}
+    words = {"title": picture.title, "caption": picture.caption, "alternative": picture.alternative}
+    return {"file": name, "square": square, **words}
 
 
 # --------------------

@@ -517,8 +517,10 @@ def _lines(report: GapReport, curves: SpectrumCurves) -> GapFigure:
 
 
 def _teeth(report: GapReport) -> Iterator[GapFigure]:
+    """Draw the rings of the shafts that a place names, and of all where none names any."""
+    named = {place.shaft for place in report.places if place.shaft}
     for curves in report.angles:
-        if not len(curves.angle_deg) or not is_finite(curves):
+        if not len(curves.angle_deg) or not is_finite(curves) or (named and curves.shaft not in named):
             continue
         numbers = (
             "" if curves.has_mark else " The shaft has no mark: teeth have no numbers, and the start is arbitrary."

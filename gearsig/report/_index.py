@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from datetime import datetime
 from math import inf, isfinite
 from pathlib import Path
-from textwrap import shorten
 from typing import Any
 from urllib.parse import quote
 
@@ -21,7 +20,7 @@ from gearsig.formatting import csv_rows, percent, readable, spreadsheet_cell, un
 from gearsig.indicators import Indicator
 from gearsig.plot import with_unit
 from gearsig.report._files import compiled, date_text, render, write_pdf
-from gearsig.report._sections import css_class, headline_of
+from gearsig.report._sections import css_class, headline_of, sure_of
 from gearsig.severity import CrackEstimate
 
 
@@ -41,6 +40,8 @@ class Entry:
         The verdict without what has changed: what the index shows.
     confidence : float or None
         Of the fault or suspicion in the verdict; None without one.
+    sure_of : str
+        What that confidence is of where it need not be a fault: "impacts" whose cause is not known, "a change".
     ratio_db : float or None
         Of that finding over its floor.
     indicators : tuple of Indicator
@@ -58,6 +59,7 @@ class Entry:
     verdict: str
     conclusion: str = ""
     confidence: float | None = None
+    sure_of: str = ""
     ratio_db: float | None = None
     indicators: tuple[Indicator, ...] = ()
     crack_mm: float | None = None
@@ -92,6 +94,7 @@ def entry_of(analysis: Analysis, name: str, page: str) -> Entry:
         analysis.verdict,
         " ".join(headline_of(analysis, with_remedy=True)).strip(),
         top.confidence if top is not None else None,
+        sure_of(top) if top is not None else "",
         top.strength.ratio_db if top is not None and top.strength is not None else None,
         analysis.indicators,
         crack_mm,
@@ -215,8 +218,9 @@ def _places(keys: Sequence[Any]) -> list[int]:
     return result
 
 
-def _largest(entry: Entry, name: str) -> float:
-    return max((i.value for i in entry.indicators if i.name == name and isfinite(i.value)), default=-inf)
+def _largest(entry: Entry, name: str, unit: str | None = None) -> float:
+    known = (i for i in entry.indicators if i.name == name and unit in (None, i.unit))
+    return max((i.value for i in known if isfinite(i.value)), default=-inf)
 
 
 def write_index(
@@ -262,6 +266,7 @@ def write_index(
         command=command,
         version=__version__,
         date=made,
+        legend=LEGEND,
         n_missing=n_missing,
     )
     if not n_missing:
@@ -272,12 +277,16 @@ def write_index(
 
 
 def write_batch(index: Index, folder: Path, *, failures: Sequence[Failure] = ()) -> None:
-    """Write `batch.csv` and `batch.json`: one row for each recording, worst first; a failed one has a reason."""
-    names = list(dict.fromkeys(i.name for row in index.rows for i in row.entry.indicators))
+    """Write `batch.csv` and `batch.json`: one row for each recording, worst first; a failed one has a reason.
+
+    Indicators are named with their unit: "rms (m/s²)".
+    """
+    # Channels may count in units of their own: the largest value of each unit is a column.
+    columns_of = {(i.name, i.unit): with_unit(i.name, i.unit) for row in index.rows for i in row.entry.indicators}
     records: list[dict[str, Any]] = []
     for row in index.rows:
         entry = row.entry
-        values = {name: _largest(entry, name) for name in names}
+        values = {column: _largest(entry, *key) for key, column in columns_of.items()}
         records.append(
             {
                 "recording": entry.name,
@@ -286,6 +295,7 @@ def write_batch(index: Index, folder: Path, *, failures: Sequence[Failure] = ())
                 "outcome": entry.outcome.value,
                 "verdict": entry.verdict,
                 "confidence": entry.confidence,
+                "confidence_of": entry.sure_of or ("" if entry.confidence is None else "a fault"),
                 "ratio_db": entry.ratio_db,
                 "crack_mm": entry.crack_mm,
                 "is_reference": entry.is_reference,
@@ -296,15 +306,18 @@ def write_batch(index: Index, folder: Path, *, failures: Sequence[Failure] = ())
         )
     records += [{"recording": f.name, "outcome": "not analysed", "reason": f.reason} for f in failures]
     write_text(
-        folder / "batch.json", json.dumps({"schema": "gearsig.batch", "version": 1, "recordings": records}, indent=1)
+        folder / "batch.json", json.dumps({"schema": "gearsig.batch", "version": 2, "recordings": records}, indent=1)
     )
-    columns = list(records[0]) if index.rows else ["recording", "outcome", "reason"]
-    cells = ([spreadsheet_cell(record.get(name, "")) for name in columns] for record in records)
-    write_text(folder / "batch.csv", csv_rows(columns, cells))
+    header = list(records[0]) if index.rows else ["recording", "outcome", "reason"]
+    cells = ([spreadsheet_cell(record.get(name, "")) for name in header] for record in records)
+    write_text(folder / "batch.csv", csv_rows(header, cells))
 
 
-LONGEST_IN_PRINT = 170
-"""Letters of a verdict in the printed table: about the two lines that the index shows. Its page says all of it."""
+LEGEND = (
+    "Sure: at most, that the finding is right; of impacts or a change, that they are there: their cause is not known "
+    "and need not be a fault. Size: how far the finding is over its floor, in dB, or the depth of a crack, in mm. "
+    "Indicators: the largest value over channels and gears."
+)
 
 
 def _index_pdf(index: Index, failures: Sequence[Failure], date: str) -> bytes:
@@ -315,8 +328,9 @@ def _index_pdf(index: Index, failures: Sequence[Failure], date: str) -> bytes:
             "date": row.date,
             "outcome": row.entry.outcome.value,
             "css_class": row.css_class,
-            "conclusion": shorten(row.entry.conclusion, LONGEST_IN_PRINT, placeholder=" …"),
+            "conclusion": row.entry.conclusion,
             "confidence": row.confidence,
+            "sure_of": row.entry.sure_of,
             "ratio": row.ratio,
             "cells": [cell.text for cell in row.cells],
         }
@@ -328,6 +342,7 @@ def _index_pdf(index: Index, failures: Sequence[Failure], date: str) -> bytes:
         "has_dates": index.has_dates,
         "rows": rows,
         "failures": [[failure.name, failure.reason] for failure in failures],
+        "legend": LEGEND,
         "date": f"{date}, gearsig {__version__}",
     }
     return compiled("index.typ", data, {})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from typing import IO, Any
@@ -143,10 +144,10 @@ def method_pictures(
         except RefusalError as refusal:
             reasons.append(f"{text}: {refusal}")
             continue
-        about = f"{answer.caption[0].upper()}{answer.caption[1:]} (channel {answer.channel})."
+        title = f"{answer.caption[0].upper()}{answer.caption[1:]} (channel {answer.channel})"
         if not answer.panels:
-            pictures.append(embed(answer.draw(), about, about))
+            pictures.append(replace(embed(answer.draw(), "", title), title=title))
         for panel in answer.panels:
-            caption = about if panel is answer.panels[-1] else ""
-            pictures.append(Picture.of_svg(svg_panel(panel), caption, f"{panel.y} over {panel.x}, {answer.channel}."))
+            shows = f"{panel.y} over {panel.x}, {answer.channel}."
+            pictures.append(Picture.of_svg(svg_panel(panel), "", shows, title if panel is answer.panels[0] else ""))
     return tuple(pictures), tuple(reasons)

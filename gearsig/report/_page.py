@@ -30,7 +30,6 @@ from gearsig.report._sections import (
     finding_cards,
     headline_of,
     indicator_tables,
-    machine_rows,
     provenance_rows,
     reference_text,
     speed_rows,
@@ -287,7 +286,10 @@ def crack_picture(analysis: Analysis) -> Picture | None:
         x_limits=((entry - reach) * 360.0, (entry + reach) * 360.0),
     )
     return Picture.of_svg(
-        plot.svg_panel(panel), caption, f"Average of {name} over {crack.shaft}{reference}; marked: {crack.text}"
+        plot.svg_panel(panel),
+        caption,
+        f"Average of {name} over {crack.shaft}{reference}; marked: {crack.text}",
+        f"Average of {name} over {crack.shaft}{reference}",
     )
 
 
@@ -463,14 +465,17 @@ def _recording_pictures(analysis: Analysis) -> Iterator[Picture]:
         last = name == names[-1]
         caption = f"Steps and clipped tops are the recording's; spikes may be impacts.{more}" if last else ""
         yield Picture.of_svg(
-            plot.svg_panel(panel, height=100), caption, f"Signal of {name} over {recording.duration_s:.4g} s."
+            plot.svg_panel(panel, height=100),
+            caption,
+            f"Signal of {name} over {recording.duration_s:.4g} s.",
+            f"Waveform of {name}",
         )
     angle = analysis.shaft_angle
     if isinstance(angle, ShaftAngle):
         low, high = angle.speed_range_rpm
         svg = plot.svg_panel(plot.speed_panel(angle), height=70)
         caption = "Look whether the speed held still: where it changes, only orders keep their lines sharp."
-        yield Picture.of_svg(svg, caption, f"Speed over time, {low:.6g} to {high:.6g} rpm.")
+        yield Picture.of_svg(svg, caption, f"Speed over time, {low:.6g} to {high:.6g} rpm.", "Speed")
 
 
 def _channel_group(analysis: Analysis, channel: ChannelAnalysis, *, detailed: bool) -> PictureGroup:
@@ -528,12 +533,16 @@ def _spectrum(analysis: Analysis, channel: ChannelAnalysis) -> Picture:
     highest = highest_order_of_interest(analysis, spectrum)
     cursors = line_cursors(analysis, spectrum, n_sidebands=0)
     marked = marked_positions(analysis, spectrum, channel.channel)
+    look = "Look which orders stand out: what keeps its order turns with the shaft."
+    if any(cursor.kind == "mesh" for cursor in cursors):
+        look = (
+            "Look whether mesh harmonics stand alone or carry sidebands, and whether a tall line lies off every mark."
+        )
     return Picture.of_svg(
         spectrum_svg(spectrum, cursors, (0.0, highest), marked),
-        "Look whether the mesh harmonics stand alone or carry sidebands, and whether a tall line lies off every mark."
-        if any(cursor.kind == "mesh" for cursor in cursors)
-        else "Look which orders stand out: what keeps its order turns with the shaft.",
+        f"{look}{circled_text(marked)}",
         f"Order spectrum of {channel.channel} up to order {highest:.4g}, with the orders that the rig implies.",
+        f"Order spectrum of {channel.channel}",
     )
 
 
@@ -543,8 +552,10 @@ def _meshes(analysis: Analysis, channel: ChannelAnalysis, spectrum: Spectrum) ->
         marked = marked_positions(analysis, spectrum, channel.channel)
         yield Picture.of_svg(
             spectrum_svg(spectrum, cursors, (low, high), marked, height=130),
-            "Look at the spacing of the sidebands: it names the shaft that modulates the mesh, hence the gear.",
+            "Look at the spacing of the sidebands: it names the shaft that modulates the mesh, hence the gear."
+            f"{circled_text([order for order in marked if low <= order <= high])}",
             f"Order spectrum of {channel.channel} from order {low:.4g} to {high:.4g}, around the mesh of {pair}.",
+            f"Order spectrum of {channel.channel} around the mesh of {pair}",
         )
 
 
@@ -558,8 +569,9 @@ def _frequency_picture(analysis: Analysis, channel: ChannelAnalysis) -> Picture:
     limits = (0.0, float(channel.spectrum.positions[-1]))
     return Picture.of_svg(
         spectrum_svg(channel.spectrum, cursors, limits, marked, height=120),
-        f"Look for broad humps: resonances of the structure, where impacts ring.{smeared}",
+        f"Look for broad humps: resonances of the structure, where impacts ring.{smeared}{circled_text(marked)}",
         f"Amplitude spectrum of {channel.channel} over frequency.",
+        f"Spectrum of {channel.channel}",
     )
 
 
@@ -575,9 +587,16 @@ def envelope_picture(analysis: Analysis, channel: ChannelAnalysis, spectrum: Spe
     marked = marked_positions(analysis, spectrum, channel.channel, of_bearings=True)
     return Picture.of_svg(
         spectrum_svg(spectrum, cursors, limits, marked, linear=True, height=130),
-        "Equally spaced lines at a shaft's order mean one impact per turn; at a bearing's, a damaged race.",
+        "Equally spaced lines at a shaft's order mean one impact per turn; at a bearing's, a damaged race."
+        f"{circled_text(marked)}",
         f"Envelope spectrum of {channel.channel}{where} with shaft and bearing lines.",
+        f"Envelope spectrum of {channel.channel}{where}",
     )
+
+
+def circled_text(marked: Sequence[float]) -> str:
+    """Say what circles are, where there are any."""
+    return " Circled: what a finding names." if len(marked) else ""
 
 
 def level_panel(analysis: Analysis, channel: ChannelAnalysis) -> tuple[LinePanel, list[tuple[float, float]]]:
@@ -606,8 +625,10 @@ def _order_levels(analysis: Analysis, channel: ChannelAnalysis) -> Picture:
     return Picture.of_svg(
         plot.svg_panel(panel, marked=marked),
         "A peak is a speed at which that order excites something; orders that peak at one frequency show a resonance. "
+        f"{'Circled: where an order crosses a resonance that a finding names. ' if marked else ''}"
         f"Largest: {'; '.join(largest)}.",
         f"Amplitudes of {len(levels)} orders of {channel.channel} over speed.",
+        f"Orders of {channel.channel} over speed",
     )
 
 
@@ -627,7 +648,15 @@ def _map(analysis: Analysis, channel: ChannelAnalysis, order_map: OrderMap) -> P
         plot.svg_panel(panel),
         "Upright lines turn with the shaft; bent bands are resonances that stay at their frequency.",
         f"Levels of {channel.channel} over {order_map.axis} and time.",
+        f"{order_map.axis.capitalize()} map of {channel.channel}",
     )
+
+
+def zero_text(analysis: Analysis, shaft: str) -> str:
+    """Say where on a shaft angle 0 of its average is."""
+    if analysis.has_mark(shaft):
+        return "Angles run clockwise from the mark on the shaft, at the top."
+    return "The shaft has no mark: 0°, at the top, is where the recording begins, and is elsewhere in another."
 
 
 def ring_picture(analysis: Analysis, picture: VerdictPicture) -> Picture:
@@ -636,11 +665,11 @@ def ring_picture(analysis: Analysis, picture: VerdictPicture) -> Picture:
     teeth = analysis.teeth_on(shaft)
     marks = plot.marks_of(analysis.findings, shaft, teeth)
     seen = f"; marked: {', '.join(mark.label for mark in marks)}" if marks else ""
+    look = "healthy teeth draw an even ring, a damaged one swings out"
+    look = look if teeth else "what leaves the ring comes back at that angle every turn"
     return Picture.of_svg(
         plot.svg_ring(average, n_teeth=teeth, marks=marks, numbered=analysis.has_mark(shaft)),
-        f"{shaft or 'The shaft'}: healthy teeth draw an even ring, a damaged one swings out."
-        if teeth
-        else f"{shaft or 'The shaft'}: what leaves the ring comes back at that angle every turn.",
+        f"{shaft or 'The shaft'}: {look}. {zero_text(analysis, shaft)}",
         f"Polar picture of the {average.kind} of {average.channel} over one revolution of {shaft or 'the shaft'}"
         f"{seen}.",
     )
@@ -736,7 +765,7 @@ def page_parts(
         "outcome": analysis.outcome.value,
         "findings": [card for finding, card in cards if finding.kind in CLAIMED],
         "further": [card for finding, card in cards if finding.kind not in CLAIMED],
-        "machine": machine_rows(analysis.rig),
+        "machine": () if analysis.rig is None else analysis.rig.rows(),
         "warnings": [text for text in recording.warnings if text not in {f.title for f in analysis.findings}],
         "speed": speed_rows(analysis.shaft_angle),
         "gallery": gallery(analysis, methods),

@@ -34,7 +34,6 @@ from gearsig.diagnosis import (
 from gearsig.formatting import counted, named, percent, readable, signed, unit_text, with_minus
 from gearsig.indicators import Indicator
 from gearsig.report._files import date_text
-from gearsig.rig import Bearing, GearPair, Rig
 
 Rows = tuple[tuple[str, str], ...]
 
@@ -50,6 +49,7 @@ class FindingCard:
     strength: str
     floor_percent: float | None
     confidence_percent: int | None
+    sure_of: str
     confidence_basis: str
     evidence: tuple[str, ...]
     surer: str
@@ -66,6 +66,7 @@ def finding_card(finding: Finding) -> FindingCard:
         strength_text(finding.strength),
         _floor_percent(finding.strength),
         round(100 * finding.confidence) if is_confidence_stated(finding) else None,
+        sure_of(finding),
         sureness_text(finding),
         finding.evidence,
         finding.surer,
@@ -95,6 +96,11 @@ def sureness_text(finding: Finding) -> str:
     if not basis or basis.startswith("at most") or not is_confidence_stated(finding):
         return basis
     return f"at most {percent(finding.confidence)}: {basis}"
+
+
+def sure_of(finding: Finding) -> str:
+    """Return what a claim is sure of where that need not be a fault; empty for one that names its cause."""
+    return {"non-synchronous-impacts": "impacts", CHANGED: "a change"}.get(finding.code, "")
 
 
 def css_class(kind: Kind | Outcome) -> str:
@@ -220,38 +226,6 @@ def split_verdict(verdict: str) -> tuple[str, str]:
         return verdict, ""
     match = re.match(r"(.+?\.) +(.+)", verdict)
     return (match[1], match[2].strip()) if match else (verdict, "")
-
-
-def machine_rows(rig: Rig | None) -> Rows:
-    """Return what is known of the machine."""
-    if rig is None:
-        return ()
-    rows = [("machine", rig.name), ("shafts", ", ".join(rig.shaft_names))]
-    rows += [(named("gear pair", pair.name), _pair_text(pair)) for pair in rig.pairs]
-    rows += [(named("bearing", bearing.name), _bearing_text(bearing)) for bearing in rig.bearings]
-    nominal = rig.nominal_speed_rpm()
-    rows += [
-        ("nominal speed", f"{readable(nominal, 6)} rpm of {rig.reference_shaft}" if nominal is not None else ""),
-        ("sources", "; ".join(rig.sources)),
-        ("assumed, not known", ", ".join(rig.assumed)),
-    ]
-    return tuple((name, text) for name, text in rows if text)
-
-
-def _pair_text(pair: GearPair) -> str:
-    driver, driven = (str(teeth) if teeth is not None else "?" for teeth in (pair.driver_teeth, pair.driven_teeth))
-    text = f"{driver} teeth on {pair.driver} drive {driven} on {pair.driven}"
-    extra = [
-        f"module {readable(pair.module_mm)} mm" if pair.module_mm is not None else "",
-        f"pressure angle {readable(pair.pressure_angle_deg)}°" if pair.pressure_angle_deg is not None else "",
-        f"face width {readable(pair.face_width_mm)} mm" if pair.face_width_mm is not None else "",
-    ]
-    return ", ".join([text, *(item for item in extra if item)])
-
-
-def _bearing_text(bearing: Bearing) -> str:
-    orders = ", ".join(f"{name} {readable(order)}" for name, order in bearing.orders().items())
-    return f"on {bearing.shaft}" + (f"; orders {orders}" if orders else "")
 
 
 def speed_rows(angle: ShaftAngle | CannotTell) -> Rows:

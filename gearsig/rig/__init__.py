@@ -23,6 +23,7 @@ from gearsig.rig._toml import (
     write_rig,
 )
 from gearsig.rig._types import (
+    MOUNTINGS,
     QUANTITIES,
     SIDES,
     STATED_SPEED_TOLERANCE_PERCENT,
@@ -48,6 +49,7 @@ from gearsig.rig._types import (
 
 __all__ = [
     "DAMPING_LAWS",
+    "MOUNTINGS",
     "QUANTITIES",
     "SIDES",
     "STATED_SPEED_TOLERANCE_PERCENT",

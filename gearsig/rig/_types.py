@@ -23,6 +23,8 @@ from gearsig.checks import (
     within,
 )
 from gearsig.errors import InputError, RefusalError
+from gearsig.formatting import counted, named, readable
+from gearsig.results import verdict_html
 from gearsig.rig._bearing import Bearing
 from gearsig.rig._contact import PathOfContact, ToothContact, standard_path
 
@@ -478,6 +480,39 @@ class Rig:
             self.pair(self.contact.pair)  # says so where there is no such pair
         shaft_ratios(self)  # raises where the pairs do not connect or contradict each other
 
+    def __repr__(self) -> str:
+        """Return a summary; in a key that tells rigs apart stands `vars`."""
+        return "\n".join([f"Rig {self.name!r}", *(f"  {name}: {text}" for name, text in self._facts())])
+
+    def _repr_html_(self) -> str:
+        """Return the same as a table, for notebooks; names may come from files."""
+        return verdict_html([f"Rig {self.name!r}"], ("known", "what"), self._facts())
+
+    def _facts(self) -> tuple[tuple[str, str], ...]:
+        sensors = ("sensors", ", ".join(sensor.channel for sensor in self.sensors))
+        return tuple(row for row in (*self.rows(), sensors) if row[0] != "machine" and row[1])
+
+    def rows(self) -> tuple[tuple[str, str], ...]:
+        """Return what is known of the machine: names, and texts as a person would write them."""
+        nominal, size = self.nominal_speed_rpm(), self.machine or MachineSize()
+        facts = [
+            f"{readable(size.power_kw)} kW" if size.power_kw is not None else "",
+            f"shaft height {readable(size.shaft_height_mm)} mm" if size.shaft_height_mm is not None else "",
+            f"{size.mounting} mounting" if size.mounting else "",
+        ]
+        rows = [
+            ("machine", self.name),
+            ("shafts", ", ".join(self.shaft_names)),
+            *((named("gear pair", pair.name), _pair_text(pair)) for pair in self.pairs),
+            *((named("bearing", bearing.name), _bearing_text(bearing)) for bearing in self.bearings),
+            ("nominal speed", f"{readable(nominal, 6)} rpm of {self.reference_shaft}" if nominal is not None else ""),
+            ("speed from", _source_text(self.speed)),
+            ("size", ", ".join(filter(None, facts))),
+            ("sources", "; ".join(self.sources)),
+            ("assumed, not known", ", ".join(self.assumed)),
+        ]
+        return tuple((name, text) for name, text in rows if text)
+
     def _check_kinds(self) -> None:
         """Raise on parts that are of another kind; make lists tuples."""
         check_texts(self, "name")
@@ -660,3 +695,39 @@ def path_of_contact(rig: Rig) -> PathOfContact:
         contact_ratio=contact.contact_ratio,
         ramp=contact.mesh_ramp,
     )
+
+
+# --------------------
+# A rig in words.
+# --------------------
+
+
+def _pair_text(pair: GearPair) -> str:
+    driver, driven = (str(teeth) if teeth is not None else "?" for teeth in (pair.driver_teeth, pair.driven_teeth))
+    text = f"{driver} teeth on {pair.driver} drive {driven} on {pair.driven}"
+    extra = [
+        f"module {readable(pair.module_mm)} mm" if pair.module_mm is not None else "",
+        f"pressure angle {readable(pair.pressure_angle_deg)}°" if pair.pressure_angle_deg is not None else "",
+        f"face width {readable(pair.face_width_mm)} mm" if pair.face_width_mm is not None else "",
+    ]
+    return ", ".join([text, *(item for item in extra if item)])
+
+
+def _bearing_text(bearing: Bearing) -> str:
+    orders = ", ".join(f"{name} {readable(order)}" for name, order in bearing.orders().items())
+    name = f"{bearing.bearing} " if bearing.bearing else ""
+    return f"{name}on {bearing.shaft}" + (f"; orders {orders}" if orders else "")
+
+
+def _source_text(source: SpeedSource | None) -> str:
+    if source is None:
+        return ""
+    of = f", of {source.shaft}" if source.shaft else ""
+    if isinstance(source, ConstantSpeed):
+        return f"{readable(source.speed_rpm, 6)} rpm, constant{of}"
+    if isinstance(source, SpeedChannel):
+        return f"channel {source.channel}{of}"
+    if isinstance(source, EncoderChannel):
+        return f"encoder, channel {source.channel}, {readable(source.units_per_revolution)} per revolution{of}"
+    channel = f", channel {source.channel}" if isinstance(source, TachometerChannel) else ""
+    return f"tachometer{channel}, {counted(source.pulses_per_revolution, 'pulse')} per revolution{of}"

@@ -11,7 +11,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.checks import FloatArray, count, freeze, one_of, positive, within
+from gearsig.checks import FloatArray, count, freeze, limits, one_of, positive, within
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Channel, Recording
 from gearsig.results import Result
@@ -163,6 +163,8 @@ def envelope_spectrum(
     Spectrum
         Over modulation frequency.
     """
+    if highest_hz is not None:
+        positive(highest_hz, "highest_hz", "Hz")
     if isinstance(signal, Envelope):
         envelope = signal
     else:
@@ -234,7 +236,7 @@ def envelope_recording(
 
 
 def _band_lines(band_hz: tuple[float, float], fs: float, n: int) -> tuple[int, int]:
-    low, high = float(band_hz[0]), float(band_hz[1])
+    low, high = limits(band_hz, "band_hz", "Hz")
     if not 0.0 <= low < high <= fs / 2:
         raise InputError(
             f"band is {low:g} to {high:g} Hz", allowed=f"0 <= lower < upper <= {fs / 2:g} Hz (half the sampling rate)"

@@ -17,9 +17,11 @@ from gearsig.checks import (
     count,
     freeze,
     frozen_array,
+    instance_of,
     not_negative,
     positive,
     read_only,
+    short,
     within,
 )
 from gearsig.compiled import njit
@@ -183,13 +185,15 @@ def make_window(name: str, n_samples: int) -> Window:
 
 def checked_window_name(name: str) -> str:
     """Return `name` if there is such a window."""
-    if name in COSINE_SUMS:
-        return name
-    if name.startswith("kaiser "):
-        not_negative(_kaiser_beta(name), "beta of the Kaiser window")
-        return name
-    hint = closest_match_hint(name, WINDOW_NAMES) if name != "kaiser" else "give its beta: 'kaiser 9'"
-    raise InputError(f"window is {name!r}", allowed=", ".join(WINDOW_NAMES), remedy=hint)
+    hint = ""
+    if isinstance(name, str):
+        if name in COSINE_SUMS:
+            return name
+        if name.startswith("kaiser "):
+            not_negative(_kaiser_beta(name), "beta of the Kaiser window")
+            return name
+        hint = closest_match_hint(name, WINDOW_NAMES) if name != "kaiser" else "give its beta: 'kaiser 9'"
+    raise InputError(f"window is {short(name)}", allowed=", ".join(WINDOW_NAMES), remedy=hint)
 
 
 @lru_cache(maxsize=8)
@@ -294,6 +298,8 @@ def named_signal(
 ) -> tuple[FloatArray, float, str, str]:
     """Return (values, sampling rate in Hz, unit, source) of a recording's channel, or of an array with its rate."""
     check_signal(signal)
+    instance_of(unit, str, "unit")
+    instance_of(source, str, "source")
     if isinstance(signal, Recording):
         if not isinstance(channel_or_rate_hz, str):
             raise InputError(

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.checks import FloatArray, count, not_negative, positive
+from gearsig.checks import FloatArray, count, instance_of, not_negative, number, positive
 from gearsig.compiled import njit
 from gearsig.errors import InputError, RefusalError
 from gearsig.peaks import parabola_vertex
@@ -326,6 +326,8 @@ def ridges(
     Transactions on Signal Processing 47 (1999), for ridges as penalised paths; the state with slope and the
     exchange of tails are this package's own.
     """
+    remedy = "transform the signal first: gearsig.cwt, stft, squeezed_cwt or squeezed_stft"
+    instance_of(transform, Coefficients | TimeFrequencyMap, "transform", remedy=remedy)
     count(n_ridges, "n_ridges")
     positive(steepest, "steepest")
     not_negative(stiffness, "stiffness")
@@ -344,8 +346,10 @@ def ridges(
 
 
 def _lines_between(positions: FloatArray, lowest: float | None, highest: float | None) -> slice:
-    low = 0 if lowest is None else int(np.searchsorted(positions, lowest))
-    high = len(positions) if highest is None else int(np.searchsorted(positions, highest, side="right"))
+    low = 0 if lowest is None else int(np.searchsorted(positions, number(lowest, "lowest")))
+    high = (
+        len(positions) if highest is None else int(np.searchsorted(positions, number(highest, "highest"), side="right"))
+    )
     if high - low < 3:
         raise RefusalError(
             f"fewer than three of the transform's {len(positions)} lines are looked at",

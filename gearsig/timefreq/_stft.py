@@ -9,7 +9,7 @@ from typing import get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.checks import FloatArray, count, one_of, positive
+from gearsig.checks import FloatArray, count, number, one_of, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.timefreq._squeezing import (
     MIN_SHARE,
@@ -350,7 +350,7 @@ def _frames(
     n_fft = int(next_fast_len(n * count(zero_padding, "zero_padding"), real=True))
     n_fft += n_fft % 2
     resolution = x.rate / n_fft
-    low = 0.0 if lowest is None else lowest
+    low = 0.0 if lowest is None else number(lowest, "lowest")
     high = x.highest_valid if highest is None else positive(highest, "highest")
     if not 0.0 <= low < high <= x.highest_valid * (1 + 1e-9):
         raise InputError(

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import ifft, rfft
 
-from gearsig.checks import FloatArray, count, frozen_array, positive, within
+from gearsig.checks import FloatArray, count, frozen_array, instance_of, positive, within
 from gearsig.compiled import njit
 from gearsig.errors import InputError, RefusalError
 from gearsig.timefreq._types import ComplexArray, Edges, Spacing, UniformSignal, segment_of
@@ -179,6 +179,7 @@ def lines_of(
     RefusalError
         If the signal is too short for the lowest line.
     """
+    instance_of(wavelet, Wavelet, "wavelet", remedy="e.g. gearsig.timefreq.Morse()")
     fits, unit = lowest_possible(x, wavelet), x.position_unit
     if positions is None:
         count(n_per_octave, "n_per_octave")

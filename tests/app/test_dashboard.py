@@ -1,6 +1,8 @@
 """The dashboard's pages, run without a browser."""
 
+import json
 import re
+import tomllib
 from base64 import b64decode
 
 import numpy as np
@@ -22,6 +24,7 @@ from tests.app.pages import (
     figures,
     key_of,
     labelled,
+    machine,
     numbers,
     opened,
     opened_file,
@@ -135,6 +138,117 @@ def test_the_form_of_the_machine_makes_the_rig_of_its_file() -> None:
     assert "from tachometer pulses" not in shown_text(page.run())
 
 
+WHOLE_RIG = """
+name = ""
+sources = ["nameplate"]
+assumed = ["teeth"]
+sampling_rate_hz = 12800
+[[shaft]]
+name = "input"
+[[shaft]]
+name = "output"
+direction = "cw"
+[[pair]]
+name = "stage 1"
+driver = "input"
+driven = "output"
+driver_teeth = 29
+driven_teeth = 47
+pressure_angle_deg = 20
+[[bearing]]
+name = "by name"
+shaft = "input"
+bearing = "SKF 6205-2RS/C3"
+[[bearing]]
+name = "by geometry"
+shaft = "output"
+n_rolling_elements = 12
+rolling_element_diameter_mm = 9.5
+pitch_diameter_mm = 52
+contact_angle_deg = 40
+[[bearing]]
+name = "by orders"
+shaft = "output"
+bpfo_order = 5.2
+bpfi_order = 7.8
+[[sensor]]
+channel = "a1"
+quantity = "acceleration"
+unit = "m/s^2"
+scale = 9.81
+offset = -0.5
+wraps = false
+[operating_point]
+shaft = "output"
+speed_rpm = 1480
+speed_tolerance_percent = 2
+torque_nm = -50
+[machine]
+power_kw = 55
+mounting = "flexible"
+[contact]
+pair = "stage 1"
+half_backlash_um = 100
+[speed]
+source = "tachometer"
+channel = "tacho"
+threshold = 2.5
+edge = "falling"
+"""
+
+
+@pytest.mark.slow
+def test_a_rig_file_survives_the_form() -> None:
+    """One field is changed: all others stay, those too that the form does not show."""
+    content = SAMPLES["damaged_tooth"].recording.read_bytes()
+    page = opened_file("a.csv.gz", content, WHOLE_RIG, tab="Machine")
+    assert not [b for b in page.button if b.label.startswith("Analyse")]
+    labelled(page, "number_input", "Rated power (kW)").set_value(75.0).run()
+    text = page.text_area[0].value
+    assert tomllib.loads(text) == tomllib.loads(WHOLE_RIG.replace("power_kw = 55", "power_kw = 75"))
+    assert "speed_rpm = 1480\n" in text
+
+
+def test_a_machine_is_described_by_the_form_alone() -> None:
+    """Without a tachometer: nominal speed with its tolerance; for the zones of ISO 20816-3: power and mounting."""
+    page = opened_file("a.csv.gz", SAMPLES["damaged_tooth"].recording.read_bytes(), tab="Machine")
+    labelled(page, "selectbox", "Mounting").set_value("rigid")
+    for label, value in (("Rated power", 22.0), ("Speed tolerance", 4.0), ("Speed (rpm)", 1490.0)):
+        labelled(page, "number_input", label).set_value(value)
+    page.run()
+    assert not page.exception
+    assert tomllib.loads(page.text_area[0].value) == {
+        "operating_point": {"speed_rpm": 1490.0, "speed_tolerance_percent": 4.0},
+        "machine": {"power_kw": 22.0, "mounting": "rigid"},
+    }
+
+
+def test_a_speed_that_is_stated_later_draws_the_pictures_of_the_views() -> None:
+    page = opened_file("bare.csv.gz", SAMPLES["damaged_tooth"].recording.read_bytes(), tab="Machine")
+
+    def drawn() -> set[str]:
+        strip = next(part.proto for part in page.get("bidi_component") if part.proto.component_name == "gearsig.strip")
+        return {item["name"] for item in json.loads(strip.json)["items"] if item.get("path") or item.get("picture")}
+
+    assert not {"Speed", "Order spectrum"} & drawn()
+    labelled(page, "number_input", "Constant speed (rpm)").set_value(1497.0).run()
+    assert {"Speed", "Order spectrum"} <= drawn()
+
+
+def test_a_shaft_without_a_name_and_a_mark_is_explained() -> None:
+    content, _ = machine()
+    rig = '[speed]\nsource = "constant"\nspeed_rpm = 600\n'
+    page = opened_file("orders.csv", content, rig, tab="Average")
+    assert next(w for w in page.main.selectbox if w.label == "Shaft").options == ["the shaft"]
+    assert "The shaft has no mark" in shown_text(page)
+
+
+def test_a_speed_that_nobody_stated_is_not_made_up() -> None:
+    page = opened_file("a.csv.gz", SAMPLES["damaged_tooth"].recording.read_bytes(), tab="Machine")
+    labelled(page, "selectbox", "Speed from").set_value("constant").run()
+    assert "Speed (rpm) must be given" in shown_text(page)
+
+
 def test_a_machine_without_a_name_is_described_all_the_same() -> None:
     sample = SAMPLES["damaged_tooth"]
     nameless = sample.rig.read_text("utf-8").partition("\n")[2]
@@ -153,6 +267,9 @@ def test_a_machine_without_a_name_is_described_all_the_same() -> None:
         ('[[sensor]]\nchannel = "a1"\nscale = 0\n', ("Sensors, row 1",)),
         ('[speed]\nsource = "constant"\nspeed_rpm = -3\n', ("Speed", "Speed (rpm)")),
         ("[[pair]]\nmodule_mm = -1\n", ("Gear pairs, row 1",)),
+        ("[operating_point]\nspeed_rpm = -3\n", ("Nominal operating point", "nominal Speed (rpm)")),
+        ('[machine]\nmounting = "soft"\n', ("Size and mounting", "rigid, flexible")),
+        ('[[bearing]]\nname = "b"\nshaft = "input"\ncontact_angle_deg = 95\n', ("Bearings, row 1", "contact angle")),
     ],
 )
 def test_the_form_is_corrected_in_its_own_words(table: str, said: tuple[str, ...]) -> None:

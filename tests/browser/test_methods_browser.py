@@ -91,6 +91,7 @@ def test_readouts_have_true_minus_signs(page: playwright.Page) -> None:
     said = figure.locator(".words").inner_text() + figure.locator(".tip").inner_text()
     said += figure.locator(".peaks").inner_text()
     assert "−" in said
+    assert re.search(r"\border \d", said)
     assert not re.search(r"(?<![\w^])-\d", said)
 
 

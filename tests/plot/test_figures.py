@@ -133,8 +133,10 @@ def test_order_map_keeps_a_single_tall_cell():
     order_map = OrderMap(
         values, np.arange(3000.0), np.arange(900.0), np.ones(900), "order", "amplitude peak", "g", 1.0, "a1", "in"
     )
-    mesh = order_map_figure(order_map).axes[1].collections[0]
-    assert mesh.get_array().max() == pytest.approx(0.0)
+    figure = order_map_figure(order_map)
+    assert figure.axes[1].collections[0].get_array().max() == pytest.approx(0.0)
+    assert "order map of a1" in {text.get_text() for text in figure.texts}
+    assert figure.axes[1].get_xlabel() == "order of in"
 
 
 @pytest.mark.parametrize("n", [1, 2, 100, 5000])
@@ -207,6 +209,15 @@ def test_a_panel_as_svg_breaks_lines_at_gaps_and_keeps_the_largest_level() -> No
     assert (1 - (row + 0.5) / picture.shape[0]) * 400 == pytest.approx(100, abs=3)
     assert (column + 0.5) / picture.shape[1] * 3000 == pytest.approx(1500, abs=8)
     assert np.sum(picture < picture.max()) == 1
+
+
+def test_many_names_of_lines_stand_in_rows_within_the_drawing():
+    x = np.arange(3.0)
+    svg = svg_panel(LinePanel([ChartLine(x, x, f"mode {k}, {1000 + k} Hz") for k in range(9)], "x", "y"))
+    places = [tuple(map(float, at)) for at in re.findall(r'<text x="([\d.]+)" y="([\d.]+)">mode', svg)]
+    assert len(places) == 9
+    assert len({y for _, y in places}) == 2
+    assert max(x for x, _ in places) < 760 - 6 * len("mode 0, 1000 Hz")
 
 
 def test_a_figure_is_taken_apart_into_panels_that_zoom(average_of) -> None:

@@ -39,7 +39,7 @@ def test_any_shape_is_drawn_and_thinned(levels_of, spacing, shape):
 
 def test_orders_and_largest_values_are_named(levels_of):
     texts = texts_of(time_frequency_figure(levels_of(np.ones((20, 9)), axis="order", reduction="max")))
-    assert {"angle (revolutions of input)", "order (of input)", "CWT; largest per column"} <= set(texts)
+    assert {"angle (revolutions of input)", "order of input", "CWT; largest per column"} <= set(texts)
 
 
 def test_axis_of_frequencies_follows_the_lines(levels_of):

@@ -258,6 +258,15 @@ def captions(report):
     return [one.look for one in gap_figures(report)]
 
 
+def test_rings_are_of_the_shafts_that_the_gap_names():
+    report = effect_report()
+    drawn = [
+        [f.data.shaft for f in gap_figures(replace(report, places=places), curves=False) if f.is_small]
+        for places in ((replace(report.places[0], shaft="input"),), (replace(report.places[0], shaft=""),), ())
+    ]
+    assert drawn == [["input"], ["input", "output"], ["input", "output"]]
+
+
 def test_recording_and_reference_are_drawn_where_there_is_one(pages):
     text = text_of(pages["effect"])
     assert "what has changed since the reference, line by line" in text

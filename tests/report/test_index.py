@@ -3,11 +3,12 @@ import json
 import re
 from dataclasses import replace
 
+import pandas as pd
 import pytest
 
-from gearsig.diagnosis import Outcome
+from gearsig.diagnosis import Finding, Kind, Outcome
 from gearsig.indicators import Indicator
-from gearsig.report import Entry, Failure, entry_of, write_index
+from gearsig.report import Entry, Failure, entry_of, finding_card, write_index
 
 
 def _entry(name, outcome, fm4=3.0, **more):
@@ -94,17 +95,39 @@ def test_a_table_and_json_of_all_recordings_stand_beside_it(write, tmp_path):
     assert float(rows[0]["FM4"]) == 8.0
 
 
+def test_indicators_of_the_table_end_in_their_unit(write, tmp_path):
+    """Levels of channels that count in other units are not compared."""
+    rms = (Indicator("rms", 3.0, "m/s^2", "a1"), Indicator("rms", 5.0, "m/s^2", "a2"), Indicator("rms", 9.0, "V", "u"))
+    write([replace(_entry("a", Outcome.FAULT), indicators=rms), _entry("b", Outcome.NO_FAULT)])
+    table = pd.read_csv(tmp_path / "batch.csv", index_col="recording")
+    assert table.loc["a", ["rms (m/s²)", "rms (V)"]].tolist() == [5.0, 9.0]
+    assert table["FM4"].isna().tolist() == [True, False]
+
+
 def test_the_index_as_pdf(write, tmp_path):
     pytest.importorskip("typst")
     write([_entry("#[*evil*] $x$", Outcome.FAULT)], failures=[Failure("c", "why")], pdf=True)
     assert (tmp_path / "index.pdf").read_bytes().startswith(b"%PDF-")
 
 
-def test_a_dozen_long_verdicts_fit_a_printed_page(write, tmp_path):
+def test_no_verdict_is_cut_in_print(write, tmp_path):
+    """A longer verdict takes more room: of two lines a dozen fit a page, of ten lines they do not."""
     pytest.importorskip("typst")
-    long = replace(_entry(45 * "w", Outcome.CANNOT_TELL), conclusion="Nothing shows, but noise would hide it. " * 20)
-    write([long] * 12, pdf=True)
-    assert re.findall(rb"/Count (\d+)", (tmp_path / "index.pdf").read_bytes()) == [b"1"]
+    entry = _entry(45 * "w", Outcome.CANNOT_TELL)
+    for n_sentences, n_pages in ((4, b"1"), (20, b"3")):
+        write([replace(entry, conclusion="Nothing shows, but noise would hide it. " * n_sentences)] * 12, pdf=True)
+        assert re.findall(rb"/Count (\d+)", (tmp_path / "index.pdf").read_bytes()) == [n_pages]
+
+
+def test_an_entry_says_what_it_is_sure_of(write, tmp_path):
+    """Impacts whose cause is not known are sure to be there; that is no sure fault."""
+    of_impacts = finding_card(Finding("non-synchronous-impacts", Kind.SUSPICION, "Impacts at order 4.7."))
+    of_race = finding_card(Finding("bearing-inner-race", Kind.FAULT, "Damage at the inner race."))
+    assert (of_impacts.sure_of, of_race.sure_of) == ("impacts", "")
+    html = write([replace(_entry("a", Outcome.SUSPICION), confidence=0.99, sure_of=of_impacts.sure_of)])
+    assert re.search(r"99 % <span[^>]*>of impacts</span>", html)
+    (row,) = json.loads((tmp_path / "batch.json").read_text(encoding="utf-8"))["recordings"]
+    assert (row["confidence"], row["confidence_of"]) == (0.99, "impacts")
 
 
 def test_dates_of_names_are_a_column_and_an_order(write, tmp_path):

@@ -26,8 +26,9 @@ from gearsig.report import (
     page_pdf,
     verdict_picture,
     write_page,
+    zero_text,
 )
-from gearsig.rig import read_rig
+from gearsig.rig import PulseTimes, read_rig
 
 EVIL = "<script>alert(1)</script>"
 QUOTES = "\"rig\" onload='x' & <b>"
@@ -211,6 +212,24 @@ def test_a_strength_without_unit_says_that_it_is_unknown():
 def test_the_average_of_a_shaft_without_a_name_is_of_the_shaft(gearbox):
     average = next(iter(gearbox.channels[0].averages.values()))
     assert "average of the shaft, a1" in svg_ring(replace(average, shaft="", kind="average", channel="a1"))
+
+
+def test_a_ring_says_where_its_angle_begins(gearbox, html):
+    """The quarters are marked where no numbers of teeth tell the angle; the words tell whether 0° is a mark."""
+    average = next(iter(gearbox.channels[0].averages.values()))
+    assert [f">{angle}°<" in svg_ring(average) for angle in (0, 90, 180, 270)] == [True] * 4
+    assert ">90°<" in svg_ring(average, n_teeth=23, numbered=False)
+    assert ">90°<" not in svg_ring(average, n_teeth=23)
+    assert zero_text(gearbox, average.shaft) in html
+    marked = replace(gearbox, recording=replace(gearbox.recording, speed=PulseTimes(np.arange(9.0))))
+    assert zero_text(marked, average.shaft) != zero_text(gearbox, average.shaft)
+
+
+def test_figures_have_titles_and_circles_are_explained(html):
+    assert '<p class="title">Order spectrum of a1</p>' in html
+    captions = re.findall(r'<circle cx[^>]*r="6".*?<figcaption>(.*?)</figcaption>', html, re.DOTALL)
+    assert captions
+    assert all("Circled:" in caption for caption in captions)
 
 
 def test_most_important_finding_comes_first(html):

@@ -7,7 +7,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gearsig.errors import InputError, RefusalError
-from gearsig.rig import Bearing, GearPair, OperatingPoint, Rig, Shaft, hunting_tooth_order, known_ratio, order_lines
+from gearsig.rig import (
+    Bearing,
+    GearPair,
+    MachineSize,
+    OperatingPoint,
+    Rig,
+    Shaft,
+    TachometerChannel,
+    hunting_tooth_order,
+    known_ratio,
+    order_lines,
+)
 
 TEETH = st.integers(3, 200)
 
@@ -134,3 +145,26 @@ def test_bearing_identities(n: int, ball: float, pitch: float, angle: float) -> 
 def test_nonsense_is_refused_by_name(make, text: str) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(InputError, match=text):
         make()
+
+
+def test_a_rig_is_shown_as_a_person_would_write_it() -> None:
+    rig = Rig(
+        "pump <4>",
+        (Shaft("in"), Shaft("out")),
+        (GearPair("stage 1", "in", "out", 23, 46),),
+        (Bearing("b1", "in", bearing="6205"),),
+        operating_point=OperatingPoint("in", 1480.0),
+        speed=TachometerChannel("tacho", 60),
+        machine=MachineSize(55.0, mounting="rigid"),
+    )
+    head, *lines = repr(rig).splitlines()
+    assert head == "Rig 'pump <4>'"
+    facts = dict(line.strip().split(": ", 1) for line in lines)
+    assert facts["gear pair stage 1"] == "23 teeth on in drive 46 on out"
+    assert facts["bearing b1"].startswith("6205 on in; orders BPFO 3.58")
+    assert facts["nominal speed"] == "1480 rpm of in"
+    assert facts["speed from"] == "tachometer, channel tacho, 60 pulses per revolution"
+    assert facts["size"] == "55 kW, rigid mounting"
+    assert "pump &lt;4&gt;" in rig._repr_html_()
+    assert all(text in rig._repr_html_() for text in facts.values())
+    assert repr(Rig()) == "Rig ''"

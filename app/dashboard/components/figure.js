@@ -342,7 +342,7 @@ class Figure {
   }
 
   named(x) {
-    return this.data.dates ? date(x) : `${figure(x)} ${this.data.x_unit}`;
+    return this.data.dates ? date(x) : measure(x, this.data.x_unit);
   }
 
   drawLine(inside, line) {
@@ -398,7 +398,7 @@ class Figure {
     const say = [this.named(this.at)];
     if (value) say.push(`${figure(value[1])} ${this.data.y_unit}`);
     if (this.tool === "sidebands") say.push(`sidebands every ${figure(this.step)} ${this.data.x_unit}`);
-    if (this.data.per_unit) say.push(`${figure(this.at * this.data.per_unit[0])} ${this.data.per_unit[1]}`);
+    if (this.data.per_unit) say.push(measure(this.at * this.data.per_unit[0], this.data.per_unit[1]));
     this.words.textContent = `${TOOLS[this.tool]}: ${say.join(" · ")}`;
   }
 
@@ -488,7 +488,7 @@ class Figure {
     const step = this.levels[row * map.columns + column], level = map.low + (step / 255) * (map.high - map.low);
     const y = this.ofShare(share), isBlank = map.blank && !step;
     const also = map.also ? `, ${figure(map.also[row])} ${map.also_unit}` : "";
-    return `${figure(x)} ${this.data.x_unit}, ${figure(y)} ${this.data.y_unit}${also}${this.hasScale && !isBlank ? `: ${withMinus(level.toFixed(digits(map)))} ${map.unit}` : ""}`;
+    return `${measure(x, this.data.x_unit)}, ${measure(y, this.data.y_unit)}${also}${this.hasScale && !isBlank ? `: ${withMinus(level.toFixed(digits(map)))} ${map.unit}` : ""}`;
   }
 
   showTip(lines, event) {
@@ -626,6 +626,8 @@ const same = (a, b) => a.length === b.length && a.every((value, i) => Math.abs(v
 // A number as files have it, and as it is read: with the sign of minus that axes have.
 const exact = (value) => String(Number(value.toPrecision(6)));
 const figure = (value) => withMinus(exact(value));
+// A place on an axis: a distance on one of orders has these as its unit.
+const measure = (value, unit) => (unit === "orders" ? `order ${figure(value)}` : `${figure(value)} ${unit}`);
 // Decimals that tell a map's colours apart.
 const digits = ({ low, high }) => Math.min(Math.max(Math.ceil(2 - Math.log10(high - low)), 1), 9);
 // A number beside a logarithmic axis; as a power of ten where some of them are far from one, then all of them.

@@ -23,7 +23,7 @@ from app.dashboard.components import component_of, element_key
 from app.dashboard.theme import DARK_PAPER, DASHES, Palette, is_dark, palette
 from app.dashboard.widgets.texts import as_typed, one_line
 from gearsig.checks import FloatArray
-from gearsig.formatting import csv_text
+from gearsig.formatting import axis_unit, csv_text
 from gearsig.plot import (
     LONGEST,
     ChartLine,
@@ -401,6 +401,8 @@ def _described(
 
 
 def _unit_of(label: str) -> str:
+    if label.startswith("order of "):  # whose name may hold brackets
+        return axis_unit("order")
     _, bracket, unit = label.rpartition(" (")
     return one_line(unit.removesuffix(")") if bracket else "")
 

@@ -14,48 +14,85 @@ from app.dashboard import state
 from app.dashboard.state import ChosenFile
 from app.dashboard.theme import palette
 from app.dashboard.widgets.charts import download
-from app.dashboard.widgets.texts import FORM_LABELS, FORM_TABLES, one_line, show_error, show_table
+from app.dashboard.widgets.texts import FORM_LABELS, FORM_TABLES, capitalised, one_line, show_error, show_table
 from gearsig.errors import GearsigError, InputError
 from gearsig.formatting import unit_text
-from gearsig.rig import QUANTITIES, Rig, bearing_catalogue, order_lines, parse_toml, rig_from_dict
+from gearsig.rig import (
+    MOUNTINGS,
+    QUANTITIES,
+    OperatingPoint,
+    Rig,
+    bearing_catalogue,
+    order_lines,
+    parse_toml,
+    rig_from_dict,
+)
 
 if TYPE_CHECKING:
     from pandas import DataFrame
     from streamlit.delta_generator import DeltaGenerator
 
 Table = dict[str, Any]
-COLUMNS: dict[str, dict[str, int]] = {
-    "shaft": {"name": 120, "direction": 90},
-    "pair": {
-        "name": 64,
-        "driver": 80,
-        "driver_teeth": 70,
-        "driven": 80,
-        "driven_teeth": 70,
-        "module_mm": 54,
-        "face_width_mm": 60,
-    },
-    "bearing": {
-        "name": 80,
-        "shaft": 82,
-        "bearing": 88,
-        "n_rolling_elements": 84,
-        "rolling_element_diameter_mm": 68,
-        "pitch_diameter_mm": 76,
-    },
-    "sensor": {"channel": 84, "quantity": 96, "unit": 64, "position": 166, "scale": 70},
+COLUMNS: dict[str, tuple[str, ...]] = {
+    "shaft": ("name", "direction"),
+    "pair": (
+        "name",
+        "driver",
+        "driver_teeth",
+        "driven",
+        "driven_teeth",
+        "module_mm",
+        "face_width_mm",
+        "pressure_angle_deg",
+    ),
+    "bearing": (
+        "name",
+        "shaft",
+        "bearing",
+        "n_rolling_elements",
+        "rolling_element_diameter_mm",
+        "pitch_diameter_mm",
+        "contact_angle_deg",
+        "bpfo_order",
+        "bpfi_order",
+        "bsf_order",
+        "ftf_order",
+    ),
+    "sensor": ("channel", "quantity", "unit", "position", "scale", "offset"),
 }
-"""Least width of each column, in pixels: together they fit a window of 800, beside the sidebar; with more room they
-grow."""
+FACTS: dict[str, tuple[str, ...]] = {
+    "operating_point": ("speed_rpm", "speed_tolerance_percent", "torque_nm", "shaft"),
+    "machine": ("power_kw", "shaft_height_mm", "mounting"),
+}
+"""Tables of a rig file that are one row of fields; an empty field is not in the file."""
+ABOUT = {
+    "bearing": "A name of the catalogue; or number n, diameter d, pitch diameter D and contact angle α of the rolling "
+    "elements; or the orders that its maker states, which go before both.",
+    "operating_point": "Guides the search for the true speed, and stands for it where neither a tachometer nor gears "
+    "tell it: then within ± 6 %.",
+    "machine": "For zones A to D of ISO 20816-3: rated power, or of a motor or generator its shaft height.",
+}
 SHORT_LABELS = {
     "driver_teeth": "teeth",
     "driven_teeth": "teeth",
-    "module_mm": "m",
-    "face_width_mm": "b",
-    "rolling_element_diameter_mm": "d",
-    "pitch_diameter_mm": "D",
+    "module_mm": "m (mm)",
+    "face_width_mm": "b (mm)",
+    "pressure_angle_deg": "α (°)",
+    "n_rolling_elements": "n",
+    "rolling_element_diameter_mm": "d (mm)",
+    "pitch_diameter_mm": "D (mm)",
+    "contact_angle_deg": "α (°)",
+    "bpfo_order": "BPFO",
+    "bpfi_order": "BPFI",
+    "bsf_order": "BSF",
+    "ftf_order": "FTF",
 }
-"""Of narrow columns, which tell their whole names under the pointer and the unit of a length in the cell."""
+"""Of narrow columns, which tell their whole names under the pointer."""
+WIDEST_PX = 330
+"""No column is wider by itself, however long its texts."""
+SHAFT_KEYS = ("shaft", "driver", "driven")
+EMPTY = {"speed_tolerance_percent": f"{OperatingPoint.speed_tolerance_percent:g}", "shaft": "reference shaft"}
+"""What holds where a field is empty; elsewhere it is not known."""
 SPEED_SOURCES: dict[str, tuple[str, ...]] = {
     "none": (),
     "constant": ("speed_rpm",),
@@ -63,8 +100,10 @@ SPEED_SOURCES: dict[str, tuple[str, ...]] = {
     "encoder": ("channel", "units_per_revolution"),
     "speed channel": ("channel", "rpm_per_unit"),
 }
-FIRST: Table = {"pulses_per_revolution": 1, "units_per_revolution": 360.0, "rpm_per_unit": 1.0, "speed_rpm": 1500.0}
+DEFAULTS: Table = {"pulses_per_revolution": 1, "units_per_revolution": 360.0, "rpm_per_unit": 1.0}
 LARGEST, MOST_ROWS = 2.0**53, 1000
+NUMBER = "%.10g"
+"""A number in a field as somebody would type it."""
 _CHANGED = "machine changed"
 
 
@@ -162,6 +201,7 @@ def show_stated(file: ChosenFile) -> None:
             label,
             value=stated(file, name),
             placeholder="from the file or the machine",
+            format=NUMBER,
             help=about,
             key=state.source_key(f"asked {name}", file.sha256),
             on_change=_state,
@@ -193,15 +233,24 @@ def _take(file: ChosenFile, text: str) -> None:
     st.session_state[_CHANGED] = True
 
 
+def _is_number(name: str) -> bool:
+    return name.endswith(("_teeth", "_mm", "_deg", "_order", "_rpm", "_percent", "_nm", "_kw", "elements")) or name in {
+        "scale",
+        "offset",
+        *DEFAULTS,
+    }
+
+
 def _fits_form(table: Table) -> bool:
     """Whether what the form shows are tables of texts and numbers as its fields take them; a file may hold anything."""
-    groups = {kind: table.get(kind, []) for kind in COLUMNS} | {"speed": [table.get("speed", {})]}
-    numbers = {*FIRST, *(name for kind in COLUMNS for name in _numbers(kind))}
-    shown = {name for names in (*COLUMNS.values(), *SPEED_SOURCES.values()) for name in names} | {"source"}
+    single = ("speed", *FACTS)
+    groups = {kind: table.get(kind, []) for kind in COLUMNS} | {kind: [table.get(kind, {})] for kind in single}
+    names = (*COLUMNS.values(), *SPEED_SOURCES.values(), *FACTS.values())
+    shown = {name for group in names for name in group} | {"source"}
 
     def fits(name: str, value: object) -> bool:
         is_number = isinstance(value, int | float) and abs(value) <= LARGEST
-        return name not in shown or (is_number if name in numbers else isinstance(value, str))
+        return name not in shown or (is_number if _is_number(name) else isinstance(value, str))
 
     return isinstance(table.get("name", ""), str) and all(
         isinstance(rows, list)
@@ -223,15 +272,51 @@ def _form(file: ChosenFile, table: Table, text: str, channels: Sequence[str], fi
 
     edited: Table = dict(table)
     name = first.text_input("Machine", table.get("name", ""), key=key("machine name"))
-    edited |= {"name": name} if name else {}
+    edited |= {"name": name} if name or "name" in table else {}
     for kind in COLUMNS:
         with first if kind == "shaft" else st.container():
-            st.markdown(f"**{FORM_TABLES[kind]}**")
+            st.markdown(f"**{FORM_TABLES[kind]}**", help=ABOUT.get(kind))
             edited[kind] = _edit(kind, list(table.get(kind, [])), edited, key(kind), channels)
-    speed = _edit_speed(dict(table.get("speed", {})), edited, key, channels)
-    edited = {name: value for name, value in edited.items() if value not in ([], {})}
+    shafts = _shafts(edited)
+    with st.container(key="machine-facts"):
+        speed = _edit_speed(dict(table.get("speed", {})), shafts, key, channels)
+        for kind, choices in (("operating_point", shafts), ("machine", MOUNTINGS)):
+            st.markdown(f"**{FORM_TABLES[kind]}**", help=ABOUT[kind])
+            edited[kind] = _edit_facts(kind, dict(table.get(kind, {})), choices, key)
+    edited = {name: value for name, value in edited.items() if value not in ([], {}) or table.get(name) == value}
     edited.pop("speed", None)
     return edited | ({"speed": speed} if speed else {})
+
+
+def _shafts(rig: Table) -> list[str]:
+    """Return the shafts of a rig's table: those that are listed, else those that pairs and bearings name."""
+    listed = [row.get("name") for row in rig.get("shaft", [])]
+    users = [row.get(key) for kind in ("pair", "bearing") for row in rig.get(kind, []) for key in SHAFT_KEYS]
+    return list(dict.fromkeys(str(name) for name in listed or users if name))
+
+
+def _edit_facts(kind: str, known: Table, choices: Sequence[str], key: Callable[[str], str]) -> Table:
+    """Show a row of fields, and return what they say together with what they do not show."""
+    edited = {name: value for name, value in known.items() if name not in FACTS[kind]}
+    for place, name in zip(st.columns(len(FACTS[kind])), FACTS[kind], strict=True):
+        label, value, own = capitalised(FORM_LABELS.get(name, name)), known.get(name), key(f"{kind} {name}")
+        chosen: float | str | None
+        if _is_number(name):
+            before = None if value is None else float(value)
+            empty = EMPTY.get(name, "not known")
+            chosen = place.number_input(label, value=before, step=1.0, format=NUMBER, placeholder=empty, key=own)
+        else:
+            chosen = _choose(place, name, choices, value, own)
+        if chosen is not None:
+            edited[name] = value if chosen == value else chosen  # whole numbers stay as the file has them
+    return edited
+
+
+def _choose(place: DeltaGenerator, name: str, offered: Sequence[str], known: str | None, key: str) -> str | None:
+    """Ask for one of some names, or none; what the file says is among them, right or wrong."""
+    names = list(dict.fromkeys([*offered, *([known] if known is not None else [])]))
+    at = None if known is None else names.index(known)
+    return place.selectbox(capitalised(name), names, at, placeholder=EMPTY.get(name, "not known"), key=key)
 
 
 def _edit(kind: str, rows: list[Table], rig: Table, key: str, channels: Sequence[str]) -> list[Table]:
@@ -240,8 +325,7 @@ def _edit(kind: str, rows: list[Table], rig: Table, key: str, channels: Sequence
     columns = COLUMNS[kind]
     shown = [row | {"unit": unit_text(str(row["unit"]))} if "unit" in row else row for row in rows]
     frame = DataFrame([[row.get(name) for name in columns] for row in shown], columns=list(columns))
-    numbers = _numbers(kind)
-    frame = frame.astype(dict.fromkeys(numbers, "float64") | {c: "object" for c in columns if c not in numbers})
+    frame = frame.astype({name: "float64" if _is_number(name) else "object" for name in columns})
     result = st.data_editor(
         frame,
         key=key,
@@ -249,13 +333,9 @@ def _edit(kind: str, rows: list[Table], rig: Table, key: str, channels: Sequence
         hide_index=True,
         width="stretch",
         placeholder="",
-        column_config=_config(kind, rig, channels),
+        column_config=_config(kind, shown, rig, channels),
     )
     return [row for row in _rows(result, rows) if row]
-
-
-def _numbers(kind: str) -> list[str]:
-    return [name for name in COLUMNS[kind] if name.endswith(("_teeth", "_mm", "elements")) or name == "scale"]
 
 
 def _rows(frame: DataFrame, before: list[Table]) -> list[Table]:
@@ -277,36 +357,45 @@ def _rows(frame: DataFrame, before: list[Table]) -> list[Table]:
     return rows
 
 
-def _config(kind: str, rig: Table, channels: Sequence[str]) -> dict[str, Any]:
+def _config(kind: str, rows: Sequence[Table], rig: Table, channels: Sequence[str]) -> dict[str, Any]:
     column = st.column_config
-    shafts = [str(row["name"]) for row in rig.get("shaft", []) if row.get("name")]
-    choices: dict[str, dict[str, Sequence[str]]] = {
-        "shaft": {"direction": ("ccw", "cw")},
-        "pair": {"driver": shafts, "driven": shafts},
-        "bearing": {"shaft": shafts, "bearing": sorted(bearing_catalogue())},
-        "sensor": {"quantity": QUANTITIES} | ({"channel": channels} if channels else {}),
+    choices: dict[str, Sequence[str]] = {
+        "direction": ("ccw", "cw"),
+        **dict.fromkeys(SHAFT_KEYS, _shafts(rig)),
+        "bearing": sorted(bearing_catalogue()),
+        "quantity": QUANTITIES,
+        **({"channel": channels} if channels else {}),
     }
     made: dict[str, Any] = {}
-    for name, width in COLUMNS[kind].items():
+    for name in COLUMNS[kind]:
         whole = FORM_LABELS.get(name, name)
-        looks: dict[str, Any] = {"label": SHORT_LABELS.get(name, whole), "width": width}
+        label = SHORT_LABELS.get(name, whole)
+        texts = [str(row[name]) for row in rows if name in row]
+        looks: dict[str, Any] = {"label": label, "width": _width_px(label, texts)}
         looks |= {"help": whole} if name in SHORT_LABELS else {}
-        if name in choices[kind]:
-            made[name] = column.SelectboxColumn(**looks, options=list(choices[kind][name]))
+        looks |= {"pinned": True} if (kind, name) == ("bearing", "name") else {}  # the widest table, which scrolls
+        if name in choices:  # and what the file says besides, such as a bearing with its maker's name
+            made[name] = column.SelectboxColumn(**looks, options=list(dict.fromkeys([*choices[name], *texts])))
         elif name.endswith(("_teeth", "elements")):
             made[name] = column.NumberColumn(**looks, step=1, format="%d")
-        elif name in _numbers(kind):
-            made[name] = column.NumberColumn(**looks, format="%g mm" if name.endswith("_mm") else None)
+        elif _is_number(name):
+            made[name] = column.NumberColumn(**looks, format="%g")
         else:
             made[name] = column.Column(**looks)
     return made
+
+
+def _width_px(label: str, texts: Sequence[str]) -> int:
+    """Return the width at which neither a heading with its icon nor a text of the column is clipped."""
+    longest = max(map(len, texts), default=12 if label == "name" else 0)
+    return min(max(48 + 7 * len(label), 20 + 7 * longest), WIDEST_PX)
 
 
 SPEED_NAMES = re.compile(r"tach|keyphas|trig|enc|speed|rpm", re.IGNORECASE)
 """What channels that tell a speed are usually called."""
 
 
-def _edit_speed(speed: Table, rig: Table, key: Callable[[str], str], channels: Sequence[str]) -> Table:
+def _edit_speed(speed: Table, shafts: Sequence[str], key: Callable[[str], str], channels: Sequence[str]) -> Table:
     source = str(speed.get("source", "none"))
     columns = st.columns(4)
     known = list(SPEED_SOURCES)
@@ -318,14 +407,24 @@ def _edit_speed(speed: Table, rig: Table, key: Callable[[str], str], channels: S
             likely = sorted(channels, key=lambda channel: not SPEED_NAMES.search(channel))
             offered = list(dict.fromkeys([*([speed["channel"]] if "channel" in speed else []), *likely])) or ["tacho"]
             edited[name] = place.selectbox("Channel", offered, key=key("speed channel"))
-        else:
-            step = 1 if name == "pulses_per_revolution" else 0.1
-            value = type(step)(float(speed.get(name) or FIRST[name]))
-            edited[name] = place.number_input(FORM_LABELS[name], value=value, step=step, key=key(f"speed {name}"))
-    shafts = [str(row["name"]) for row in rig.get("shaft", []) if row.get("name")]
-    if chosen != "none" and shafts:
-        at = shafts.index(speed["shaft"]) if speed.get("shaft") in shafts else 0
-        edited["shaft"] = columns[3].selectbox("Of shaft", shafts, at, key=key("speed shaft"))
+            continue
+        step = 1 if name == "pulses_per_revolution" else 0.1
+        before = edited.get(name, DEFAULTS.get(name))
+        value = place.number_input(
+            FORM_LABELS[name],
+            value=None if before is None else type(step)(before),
+            step=step,
+            placeholder="not known",
+            key=key(f"speed {name}"),
+        )
+        if value is None:
+            edited.pop(name, None)
+        elif value != before:
+            edited[name] = value
+    if chosen != "none":
+        shaft = _choose(columns[3], "shaft", shafts, speed.get("shaft"), key("speed shaft"))
+        edited.pop("shaft", None)
+        edited |= {"shaft": shaft} if shaft is not None else {}
     return {} if chosen == "none" and "source" not in speed else edited
 
 

@@ -40,7 +40,7 @@ from gearsig.plot import (
     value_limits,
     with_unit,
 )
-from gearsig.report import verdict_picture
+from gearsig.report import circled_text, verdict_picture, zero_text
 from gearsig.spectra import LARGEST_SLIP, Spectrum
 
 SCALES: dict[str, Scale] = {"Logarithmic": "log", "Linear": "linear", "dB": "decibel"}
@@ -134,7 +134,7 @@ def show_spectrum(
         panel,
         chart,
         marked=[(p, float(values[start : start + 5].max())) for p, start in places],
-        height_px=270 if plain else 340,
+        height_px=258 if plain else 340,
         legend=bool(names),
         front_first=True,
         whole=whole,
@@ -148,7 +148,8 @@ def show_spectrum(
     many = len(spectra) == 1 and first.index_of(high) - first.index_of(low) > 2 * N_COLUMNS
     st.caption(
         f"Resolution {first.resolution:.4g} {first.axis_unit}, {capitalised(first.window)} window{averages}."
-        f"{joined if many else ''} Drag to zoom, double click for all."
+        f"{joined if many else ''}{circled_text(marked)} "
+        "Drag to zoom, double click for all."
     )
     return low, high
 
@@ -207,7 +208,8 @@ def show_average(analysis: Analysis, channel: ChannelAnalysis) -> None:
         return
     left, right = st.columns((1, 2), vertical_alignment="bottom")
     key, first = state.view_key("average shaft", analysis), shown.shaft if shown is not None else shafts[0]
-    shaft = address.ask_one(left.selectbox, "Shaft", shafts, first=first, key=key, name="shaft")
+    looks = {"key": key, "name": "shaft", "format_func": lambda name: name or "the shaft"}
+    shaft = address.ask_one(left.selectbox, "Shaft", shafts, first=first, **looks)
     kinds = [kind for kind in KINDS if (shaft, kind) in averages]
     key = state.view_key(f"average kind {kinds}", analysis)
     looks = {"key": key, "name": "signal", "format_func": str.capitalize}
@@ -258,6 +260,7 @@ def _show(analysis: Analysis, average: SynchronousAverage, n_teeth: int | None, 
             numbered = analysis.has_mark(average.shaft)
             ring = show_ring(average, n_teeth, marks, words, state.view_key(key, analysis), numbered=numbered)
             offer_ring(ring, average, n_teeth, marks, numbered=numbered)
+            st.caption(as_typed(zero_text(analysis, average.shaft)))
         with unrolled:
             _show_unrolled(analysis, average, n_teeth, cursors)
 

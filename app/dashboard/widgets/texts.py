@@ -60,19 +60,37 @@ def capitalised(text: str) -> str:
 # --------------------
 
 
-FORM_TABLES = {"shaft": "Shafts", "pair": "Gear pairs", "bearing": "Bearings", "sensor": "Sensors"}
-"""What the form of the machine calls the lists of a rig file."""
+FORM_TABLES = {
+    "shaft": "Shafts",
+    "pair": "Gear pairs",
+    "bearing": "Bearings",
+    "sensor": "Sensors",
+    "speed": "Speed",
+    "operating_point": "Nominal operating point",
+    "machine": "Size and mounting",
+}
+"""What the form of the machine calls the tables of a rig file."""
 FORM_LABELS = {
     "direction": "turns",
     "driver_teeth": "driver teeth",
     "driven_teeth": "driven teeth",
     "module_mm": "module (mm)",
     "face_width_mm": "width (mm)",
+    "pressure_angle_deg": "pressure angle (°)",
     "n_rolling_elements": "elements",
     "rolling_element_diameter_mm": "Ø element (mm)",
     "pitch_diameter_mm": "Ø pitch (mm)",
+    "contact_angle_deg": "contact angle (°)",
+    "bpfo_order": "BPFO (order of its shaft)",
+    "bpfi_order": "BPFI (order of its shaft)",
+    "bsf_order": "BSF (order of its shaft)",
+    "ftf_order": "FTF (order of its shaft)",
     "bearing": "catalogue",
     "speed_rpm": "Speed (rpm)",
+    "speed_tolerance_percent": "Speed tolerance (± %)",
+    "torque_nm": "Torque (N·m)",
+    "power_kw": "Rated power (kW)",
+    "shaft_height_mm": "Shaft height (mm)",
     "pulses_per_revolution": "Pulses per revolution",
     "units_per_revolution": "Units per revolution",
     "rpm_per_unit": "rpm per unit",
@@ -102,14 +120,17 @@ _PLACES = {
     "`gearsig rig bearings` lists them": "the column catalogue lists them",
     "set lowest to": "set the lowest line shown to",
     "[speed] in the rig file": "the speed under Machine",
-    "[machine] in the rig file": "the group of the machine in its rig file",
+    "[machine] in the rig file": "size and mounting under Machine",
+    "[machine] of the rig file": "size and mounting under Machine",
+    "operating_point.": "nominal ",
+    "Give the bearings in the rig file": "Describe the bearings under Machine",
     "/s^2": "/s²",
 }
 """What the page calls the options of the command line, of functions and of rig files that messages name."""
 _ROW = re.compile(r"(?:[^\[\]]*: )?\[\[(\w+)\]\] (\d+)(?:: (\w+))?")
 _TABLE = re.compile(r"(?:(an?)|(?:the rig(?: file)?'s|its)) \[\[(\w+)\]\](?: tables?)?(?: in the rig file)?")
 _KEY = re.compile(rf"\b(?:{'|'.join(key for key in FORM_LABELS if '_' in key)})\b")
-_SPEED = re.compile(r"(?:[^\[\]]*: )?\[speed\](?:: (\w+))?")
+_SINGLE = re.compile(r"(?:[^\[\]]*: )?\[(speed|operating_point|machine)\](?:: (\w+))?")
 _FILE = re.compile(r"(?:rig|rig\.toml)|[^\[\]]*: (\w+)")
 """The name that a machine without a rig file has, or a key of the file itself."""
 
@@ -139,9 +160,9 @@ def place_in_form(where: str) -> str:
     row = _ROW.fullmatch(where)
     if row is not None and row[1] in FORM_TABLES:
         return ", ".join(filter(None, (FORM_TABLES[row[1]], f"row {row[2]}", FORM_LABELS.get(row[3], row[3]))))
-    speed, whole = _SPEED.fullmatch(where), _FILE.fullmatch(where)
-    if speed is not None:
-        return ", ".join(filter(None, ("Speed", FORM_LABELS.get(speed[1], speed[1]))))
+    single, whole = _SINGLE.fullmatch(where), _FILE.fullmatch(where)
+    if single is not None:
+        return ", ".join(filter(None, (FORM_TABLES[single[1]], FORM_LABELS.get(single[2], single[2]))))
     key = whole[1] if whole is not None else None
     if whole is not None and (key is None or key in FORM_LABELS):
         return FORM_LABELS[key] if key is not None else "Machine"

@@ -13,7 +13,7 @@ from app.dashboard.widgets.charts import show_lines
 from app.dashboard.widgets.spectrum import offer_ring, show_ring, show_spectrum
 from app.dashboard.widgets.texts import as_typed, in_page_words, one_line
 from gearsig.diagnosis import BEARING_PARTS, CHANGED, Analysis, Finding, Kind, Outcome
-from gearsig.formatting import counted, enumerated, signed
+from gearsig.formatting import counted, enumerated, readable, signed
 from gearsig.plot import marks_of
 from gearsig.report import (
     FindingCard,
@@ -29,6 +29,7 @@ from gearsig.report import (
     reference_text,
     sidebands_of,
     verdict_picture,
+    zero_text,
 )
 from gearsig.spectra import LARGEST_SLIP
 
@@ -107,10 +108,15 @@ def _show_grounds(analysis: Analysis) -> None:
         card = finding_card(finding)
         if card.title.rstrip(".") not in analysis.verdict:
             st.markdown(f"**{as_typed(card.title)}**")
-        if card.where:
-            st.caption(_places(card))
+        places = _places(card)
         with st.container(key="verdict-measures"):
+            if places:
+                st.caption(places)
             _show_measures(card)
+        ratio_db = finding.strength.ratio_db if finding.strength is not None else None
+        strong = f"**{readable(ratio_db, 3)} dB** over its floor" if ratio_db is not None else ""
+        with st.container(key="verdict-brief"):  # the same in a line or two, for a small window
+            st.caption(" · ".join(filter(None, (places, strong, _sureness(card)))))
 
 
 def _show_changes(analysis: Analysis, reference: Analysis) -> None:
@@ -145,6 +151,8 @@ def show_verdict_picture(analysis: Analysis) -> None:
         ring = show_ring(average, teeth, marks, words, state.view_key(place, analysis), numbered=numbered)
         with st.container(key="verdict-files"):
             offer_ring(ring, average, teeth, marks, numbered=numbered)
+        if not numbered:
+            st.caption(as_typed(zero_text(analysis, picture.shaft)))
         return
     if picture.about == "resonance":
         panel, marked_points = level_panel(analysis, channel)
@@ -152,7 +160,7 @@ def show_verdict_picture(analysis: Analysis) -> None:
         panel = replace(panel, lines=lines)
         show_lines(panel, state.view_key(place, analysis), marked=marked_points, legend=True, height_px=260)
         if picture.finding is not None:
-            st.caption(as_typed(picture.finding.title))
+            st.caption(as_typed(f"{picture.finding.title} Circled: where an order crosses it."))
         return
     if picture.about == "bearing":
         spectrum = channel.envelope_spectrum
@@ -207,14 +215,19 @@ def _show_card(finding: Finding) -> None:
     with st.container(border=True):
         with st.container(horizontal=True, vertical_alignment="center"):
             show_kind(finding.kind)
-            if card.confidence_percent is not None:
-                st.markdown(f"≤ **{card.confidence_percent} %** sure", width="content")
+            if sureness := _sureness(card):
+                st.markdown(sureness, width="content")
             if card.where:
                 st.caption(_places(card), width="content")
         st.markdown(f"**{as_typed(in_page_words(card.title))}**")
         _show_measures(card)
         if card.evidence:
             st.caption("\n".join(f"- {as_typed(in_page_words(sentence))}" for sentence in card.evidence))
+
+
+def _sureness(card: FindingCard) -> str:
+    of = f" of {card.sure_of}" if card.sure_of else ""
+    return "" if card.confidence_percent is None else f"≤ **{card.confidence_percent} %** sure{of}"
 
 
 def _places(card: FindingCard) -> str:
