@@ -32,7 +32,7 @@ from gearsig.diagnosis._signals import (
     kurtogram_bands,
 )
 from gearsig.diagnosis._start_stop import start_stop_analysis
-from gearsig.diagnosis._tooth import detect_tooth_damage, with_changed_teeth
+from gearsig.diagnosis._tooth import ChangedAverages, detect_tooth_damage, with_changed_teeth
 from gearsig.diagnosis._types import (
     Analysis,
     AnalysisSettings,
@@ -191,8 +191,9 @@ def _examined(
 
     # Against the reference, findings that it shows as well step down before what has changed adds findings of its own.
     compared: tuple[LevelChange, ...] = ()
+    changes: ChangedAverages = {}
     if beside is not None and reference_analysis is not None:
-        findings, compared = _against(findings, reference_analysis, beside)
+        findings, compared, changes = _against(findings, reference_analysis, beside)
     # Doubts come last, when all that they could lower is there; the crack's depth takes no channel that they spoil.
     findings, unfit = lowered(findings, names), dead | spoiled(findings, names)
     crack: Answer | None = withheld_crack(findings, is_asked=healthy is not None and bool(known.pairs))
@@ -203,7 +204,10 @@ def _examined(
         recording=recording,
         rig=recording.rig,
         shaft_angle=angle,
-        channels=tuple(channel_analysis(signals, n, envelopes, own_bands, levels.get(n, ()), order) for n in names),
+        channels=tuple(
+            channel_analysis(signals, name, envelopes, own_bands, levels.get(name, ()), order, changes)
+            for name in names
+        ),
         indicators=found,
         findings=order,
         verdict=verdict_of(order, has_reference=healthy is not None),
@@ -231,8 +235,8 @@ Beside = tuple[AnalysisSignals, Sequence[BandEnvelope], AnalysisSignals, Sequenc
 
 def _against(
     findings: list[Finding], reference: Analysis, beside: Beside
-) -> tuple[list[Finding], tuple[LevelChange, ...]]:
-    """Return the findings beside those of the reference, with what has changed, and the levels compared."""
+) -> tuple[list[Finding], tuple[LevelChange, ...], ChangedAverages]:
+    """Return the findings beside those of the reference, with what has changed, and levels and averages compared."""
     signals, _, then, _ = beside
 
     def measured(finding: Finding) -> LevelChange | None:
@@ -240,14 +244,14 @@ def _against(
 
     not_healthy = reference_not_healthy(reference, measured, shows_fault=outcome_of(findings) is Outcome.FAULT)
     findings = beside_reference(findings, reference, measured)
-    findings = with_changed_teeth(with_clearest_band(findings, signals, then), signals, then)
+    findings, changes = with_changed_teeth(with_clearest_band(findings, signals, then), signals, then)
     compared = level_changes(*beside)
     changed = change_findings(compared, signals, then, findings)
     # What the comparison names of a shaft is not named again from the recording alone.
     again = {HALF_ORDERS: {"looseness", "rub"}, OIL_WHIRL: {OIL_WHIRL}}
     named = {(f.code, f.where.shaft) for f in changed if f.is_claim}
     findings = [f for f in findings if not any((code, f.where.shaft) in named for code in again.get(f.code, ()))]
-    return [*findings, *changed, *not_healthy], compared
+    return [*findings, *changed, *not_healthy], compared, changes
 
 
 def _of_machine(

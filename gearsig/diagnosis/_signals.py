@@ -505,11 +505,13 @@ def channel_analysis(
     kurtogram_bands: Sequence[KurtogramBand],
     levels: Sequence[OrderLevel],
     findings: Sequence[Finding],
+    changes: Mapping[tuple[str, str], SynchronousAverage],
 ) -> ChannelAnalysis:
     """Return the signals and spectra of one channel: those that were looked at, and the bands that told most.
 
     The envelope shown is the one in which the surest family of impacts was found, else the one whose lines stand out
-    most; the channel's own band is shown where it bears out a damage that is claimed of a bearing.
+    most; the channel's own band is shown where it bears out a damage that is claimed of a bearing. `changes` are
+    differences from a reference's averages, by shaft and channel.
     """
     kurtogram_band = next((band for band in kurtogram_bands if band.envelope.channel == name), None)
     candidates = [e for e in (*envelopes, *([kurtogram_band.envelope] if kurtogram_band else [])) if e.channel == name]
@@ -525,6 +527,8 @@ def channel_analysis(
         if name in shaft.separated:
             parts = shaft.separated[name]
             averages |= {(shaft.shaft, p.kind): p for p in (parts.residual, parts.difference, parts.regular)}
+        if (change := changes.get((shaft.shaft, name))) is not None:
+            averages[shaft.shaft, change.kind] = change
     return ChannelAnalysis(
         channel=name,
         spectrum=signals.spectra[name],

@@ -25,7 +25,7 @@ from gearsig.diagnosis._types import (
 )
 from gearsig.errors import RefusalError
 from gearsig.formatting import enumerated, percent, unit_text
-from gearsig.orders import separate, whole_revolutions
+from gearsig.orders import SynchronousAverage, separate, whole_revolutions
 from gearsig.prepared import chance_of_any, has_mark, sliding_mean, strongest_window
 from gearsig.severity import ShaftLines, difference_lines, reversed_channels
 from gearsig.spectra import ComplexArray
@@ -464,7 +464,7 @@ def detect_tooth_damage(signals: AnalysisSignals) -> list[Finding]:
 
 def with_changed_teeth(
     findings: Sequence[Finding], signals: AnalysisSignals, healthy: AnalysisSignals
-) -> list[Finding]:
+) -> tuple[list[Finding], ChangedAverages]:
     r"""Return the findings with what has changed at the teeth since the reference, where both averages compare.
 
     What teeth are made with cancels in the difference of two averages at one speed, turned so that the same teeth meet:
@@ -473,7 +473,8 @@ def with_changed_teeth(
 
     with the shift s and each mesh harmonic's gain g of `gearsig.severity.difference_lines`. A local event of it is
     tested as one of the average itself is. It takes the place of what the recording alone tells of teeth; where there
-    is none, "no damage shows" does so on shafts where a change of a useful size would have shown.
+    is none, "no damage shows" does so on shafts where a change of a useful size would have shown. The differences, by
+    shaft and channel, are those of shafts with such a tooth.
     """
     able = _able(signals)
     pairs = [(c, largest_event(c.since, signals)) for c in (_compared(signals, s, healthy) for s in able) if c]
@@ -484,13 +485,20 @@ def with_changed_teeth(
         if not c.is_healthys(event)
     ]
     new = _findings(signals, compared)
-    if any(f.is_claim for f in new):
-        return [*(f for f in findings if f.code not in _OF_TEETH), *new]
+    if damaged := {f.where.shaft for f in new if f.is_claim}:
+        since = [(e.shaft.shaft, e.shaft.separated) for e in compared if e.shaft.shaft in damaged]
+        changes = {
+            (shaft, name): replace(of.difference, kind="change") for shaft, parts in since for name, of in parts.items()
+        }
+        return [*(f for f in findings if f.code not in _OF_TEETH), *new], changes
     if len(compared) < len(able) or any(f.is_claim and f.code in _OF_TEETH for f in findings):
-        return list(findings)
+        return list(findings), {}
     new = [f for f in new if f.code in _STATEMENTS]
-    return [*(f for f in findings if f.code not in _STATEMENTS), *new] if new else list(findings)
+    return [*(f for f in findings if f.code not in _STATEMENTS), *new] if new else list(findings), {}
 
+
+ChangedAverages = Mapping[tuple[str, str], SynchronousAverage]
+"""Shaft and channel → what its average differs by from the reference's."""
 
 _STATEMENTS = ("no-tooth-local-damage", "tooth-damage-undecided")
 _OF_TEETH = (*_STATEMENTS, "tooth-local-damage")

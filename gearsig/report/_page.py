@@ -200,7 +200,8 @@ class VerdictPicture:
         """Of a tooth: the mean revolution in which a single tooth stands out most."""
         if self.change is not None:
             return self.change
-        kinds = [kind for kind in ("residual", "difference", "average") if (self.shaft, kind) in self.channel.averages]
+        told = ("change", "residual", "difference", "average")
+        kinds = [kind for kind in told if (self.shaft, kind) in self.channel.averages]
         return self.channel.averages[self.shaft, kinds[0]]
 
 

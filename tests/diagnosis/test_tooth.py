@@ -187,9 +187,13 @@ PLACE_DEG = 360.0 * ((0.01 * SHAFT_HZ + 11 / 27) % 1.0)
 def test_beside_a_reference_a_tooth_is_told_that_is_one_of_many_unequal_ones(sign: float) -> None:
     recording, reference = knocking_teeth(DAMAGED), knocking_teeth(UNEQUAL, seed=1, sign=sign)
     assert "tooth-local-damage" not in codes(analyze(recording))
-    told = finding(analyze(recording, reference=reference), "tooth-local-damage")
+    beside = analyze(recording, reference=reference)
+    told = finding(beside, "tooth-local-damage")
     assert (told.kind, told.where.shaft) == (Kind.FAULT, "in")
     assert told.where.angle_deg == pytest.approx(PLACE_DEG, abs=360 / 27)
+    change = beside.channels[0].averages["in", "change"]
+    largest_deg = 360.0 * change.revolutions[np.argmax(np.abs(change.values))]
+    assert largest_deg == pytest.approx(PLACE_DEG, abs=360 / 27)
 
 
 def test_unequal_teeth_that_are_as_they_were_are_no_damage() -> None:
