@@ -456,6 +456,10 @@ def _kurtogram_band(signals: AnalysisSignals, channel: str, narrowest_hz: float)
 
 def _without_tones(signals: AnalysisSignals, channel: str) -> tuple[Recording, NDArray[np.complexfloating]] | None:
     """Return a channel without its steady tones, and its `rfft`; None where they are all there is."""
+    return signals.prepared.keep(("diagnosis", "without tones", channel), lambda: _tones_removed(signals, channel))
+
+
+def _tones_removed(signals: AnalysisSignals, channel: str) -> tuple[Recording, NDArray[np.complexfloating]] | None:
     from scipy.fft import irfft
 
     from gearsig.spectra import prepared_lines
