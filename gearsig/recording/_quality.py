@@ -427,11 +427,13 @@ they show the direction of time; how many of them. Of 26 measured channels the l
 
 def _reversed(channel: Channel, x: FloatArray, rate_hz: float) -> ChannelProblem | None:
     """Look for impacts that swell and end suddenly: by the energy beside their peaks, then by the envelope's steps."""
+    from scipy.fft import rfft
+
     top_hz = 0.45 * rate_hz
     if channel.quantity not in _OFFSET_QUANTITIES or top_hz < 1000.0:
         return None
     x = np.asarray(x[: 1 << int(np.log2(min(len(x), LONGEST_TURNED)))], dtype=np.float64)
-    spectrum, frequency = np.fft.fft(x - x.mean()), np.fft.fftfreq(len(x), 1.0 / rate_hz)
+    spectrum, frequency = rfft(x - x.mean()), np.fft.rfftfreq(len(x), 1.0 / rate_hz)
     ratio, errors = _energy_after_peaks(spectrum, frequency, top_hz, max(2, int(LASTS_S * rate_hz)))
     evidence = ""
     if ratio < -CLEAR_LOG_RATIO and errors < -CLEAR_ERRORS:
@@ -457,7 +459,7 @@ def _energy_after_peaks(
     """
     from scipy.ndimage import maximum_filter1d
 
-    power = np.abs(np.fft.ifft(np.where((frequency > 300.0) & (frequency < top_hz), 2.0 * spectrum, 0.0))) ** 2
+    power = _power_within(spectrum, frequency, 300.0, top_hz)
     is_peak = (power > 8.0 * power.mean()) & (power == maximum_filter1d(power, 8 * n_ring + 1))
     peaks = np.flatnonzero(is_peak)
     peaks = peaks[(peaks > n_ring) & (peaks < len(power) - n_ring - 1)]
@@ -479,8 +481,7 @@ def _sudden_ends(spectrum: NDArray[np.complexfloating], frequency: FloatArray, r
     edges = [300.0 * (top_hz / 300.0) ** (i / 4) for i in range(5)]
     skews, scores = [], []
     for low, high in pairwise(edges):
-        envelope = np.abs(np.fft.ifft(np.where((frequency > low) & (frequency < high), 2.0 * spectrum, 0.0)))
-        steps = np.diff(envelope[:: max(1, int(rate_hz / (high - low)))])
+        steps = np.diff(np.sqrt(_power_within(spectrum, frequency, low, high)[:: max(1, int(rate_hz / (high - low)))]))
         parts = steps[: len(steps) // 32 * 32].reshape(32, -1)
         scale = float(np.mean(parts**2)) ** 1.5
         cubes = np.mean(parts**3, axis=1) / scale if scale > 0 else np.zeros(32)
@@ -499,13 +500,32 @@ def _sudden_ends(spectrum: NDArray[np.complexfloating], frequency: FloatArray, r
     )
 
 
+def _power_within(
+    spectrum: NDArray[np.complexfloating], frequency: FloatArray, low_hz: float, high_hz: float
+) -> FloatArray:
+    """Return |z|² of the band between two frequencies, from the `rfft` of an even number of samples."""
+    from scipy.fft import ifft
+
+    first, last = np.searchsorted(frequency, low_hz, side="right"), np.searchsorted(frequency, high_hz)
+    lines = np.zeros(2 * (len(frequency) - 1), dtype=np.complex128)
+    lines[first:last] = 2.0 * spectrum[first:last]
+    z = ifft(lines, overwrite_x=True)
+    power: FloatArray = z.real**2
+    power += z.imag**2
+    return power
+
+
 def _hum(channel: Channel, x: FloatArray, rate_hz: float) -> ChannelProblem | None:
+    from scipy.fft import rfft
+
     n = 1 << int(np.log2(min(len(x), 4 * LONGEST_TURNED)))
     window = np.hanning(n)
-    spectrum = np.abs(np.fft.rfft((x[:n] - np.mean(x[:n], dtype=np.float64)) * window))
-    i, step_hz = int(np.argmax(spectrum[1:-1])) + 1, rate_hz / n
-    line_hz = (i + float(parabola_vertex(*spectrum[i - 1 : i + 2])[0])) * step_hz
-    share = float(np.sum(spectrum[max(i - 2, 0) : i + 3] ** 2) / max(float(np.sum(spectrum**2)), 1e-300))
+    lines = rfft((x[:n] - np.mean(x[:n], dtype=np.float64)) * window, overwrite_x=True)
+    power = lines.real**2
+    power += lines.imag**2
+    i, step_hz = int(np.argmax(power[1:-1])) + 1, rate_hz / n
+    line_hz = (i + float(parabola_vertex(*np.sqrt(power[i - 1 : i + 2]))[0])) * step_hz
+    share = float(np.sum(power[max(i - 2, 0) : i + 3]) / max(float(np.sum(power)), 1e-300))
     for mains_hz in MAINS_HZ:
         multiple = round(line_hz / mains_hz)
         deviation = abs(line_hz / (max(multiple, 1) * mains_hz) - 1)
