@@ -10,7 +10,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.checks import FloatArray
+from gearsig.checks import FloatArray, read_only
+from gearsig.compiled import njit
 from gearsig.formatting import counted, percent, signed
 from gearsig.peaks import parabola_vertex
 from gearsig.recording._types import Channel, Recording
@@ -226,7 +227,7 @@ def find_problems(recording: Recording) -> tuple[ChannelProblem, ...]:
         In the order of the channels; empty if nothing was found. Fewer than 64 samples are judged for "dead" only.
     """
     problems: list[ChannelProblem] = []
-    spreads = {c.name: float(np.std(recording.values(c.name), dtype=np.float64)) for c in recording.channels}
+    spreads = {c.name: float(_standard_deviation(read_only(recording.values(c.name)))) for c in recording.channels}
     for channel in recording.channels:
         if channel.is_vibration:
             other_spreads = [spreads[c.name] for c in recording.channels if _is_comparable(c, channel)]
@@ -235,6 +236,19 @@ def find_problems(recording: Recording) -> tuple[ChannelProblem, ...]:
                 continue
             problems += _further_problems(channel, recording.values(channel.name), recording.sampling_rate_hz)
     return tuple(problems)
+
+
+@njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz"})  # type: ignore[untyped-decorator,unused-ignore]
+def _standard_deviation(x):  # type: ignore[no-untyped-def]
+    """Divisor N, in double precision."""
+    total, squares = 0.0, 0.0
+    for i in range(x.shape[0]):
+        total += x[i]
+    mean = total / x.shape[0]
+    for i in range(x.shape[0]):
+        deviation = x[i] - mean
+        squares += deviation * deviation
+    return np.sqrt(squares / x.shape[0])
 
 
 def _is_comparable(candidate: Channel, channel: Channel) -> bool:
