@@ -154,9 +154,7 @@ class LineEvidence:
     top: float
 
 
-def line_evidence(
-    samples: FloatArray, rate: float, n_segment: int, top: float, reach: float = np.inf
-) -> LineEvidence:
+def line_evidence(samples: FloatArray, rate: float, n_segment: int, top: float, reach: float = np.inf) -> LineEvidence:
     """Return the evidence for lines in all channels together.
 
     Hann windows of `n_segment` samples at half overlap; mean power over them; heights over the floor averaged over

@@ -319,7 +319,7 @@ def _indicators(
         values, rate_hz = signals.recording.values(name), signals.recording.sampling_rate_hz
         yield from indicators.time_indicators(values, name, unit)
         speed_rpm = None if signals.angle is None else signals.angle.mean_speed_rpm
-        spectrum, transform = signals.spectra[name], signals.prepared.transform(name)
+        spectrum, transform = signals.spectra[name], signals.prepared.joined_transform(name)
         yield from indicators.overall_indicators(
             values, rate_hz, channel, speed_rpm, spectrum=spectrum, transform=transform
         )

@@ -311,7 +311,7 @@ def _running_quantile(power: FloatArray, block: int, q: float) -> FloatArray:
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _join_levels(x, logs, levels):  # type: ignore[no-untyped-def]
-    """exp of straight lines between ascending points, at 0, 1, …; level beyond either end. As `exp(interp(…))`, quicker.
+    """`exp(interp(…))` at 0, 1, … of straight lines between ascending points; level beyond either end.
 
     Between two points each level is the one before times a factor; from the start of every 64 by `exp` itself, so that
     rounding errors do not add up.

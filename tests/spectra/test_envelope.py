@@ -20,6 +20,15 @@ def test_magnitude_of_an_amplitude_modulated_tone_is_its_amplitude():
     assert envelope.sampling_rate_hz < FS / 5
 
 
+@pytest.mark.parametrize("highest_hz", [None, 1500.0])
+def test_a_drift_whose_ends_do_not_meet_makes_no_click(highest_hz):
+    x = np.sin(2 * np.pi * 5000.0 * np.arange(1 << 18) / 25_600.0) + np.linspace(0.0, 1e3, 1 << 18)
+    envelope = band_envelope(x, 25_600.0, (1859, 11_520), kind="magnitude", highest_hz=highest_hz)
+    assert envelope.values == pytest.approx(1.0, abs=1.0)  # what is cut of the sine itself
+    assert envelope.values[200:-200] == pytest.approx(1.0, abs=5e-3)
+    assert (envelope.sampling_rate_hz < 5000.0) == (highest_hz is not None)  # by blocks, or all at once
+
+
 def test_squared_envelope_spectrum_has_the_closed_form_lines():
     spectrum = envelope_spectrum(band_envelope(MODULATED, FS, (2800, 3200), unit="m/s^2"), highest_hz=100.0)
     # 4 (1 + cos/2)² = 4.5 + 4 cos(20 Hz) + 0.5 cos(40 Hz)
