@@ -139,7 +139,7 @@ def _examined(
     # spectrum helps where every channel is dead.
     recording, known = prepared.recording, prepared.rig
     announce("finding the speed")
-    findings, dead = detect_data_problems(recording)
+    findings, dead = detect_data_problems(prepared)
     healthy_recording = healthy.recording if healthy is not None else None
     unsteady = start_stop_analysis(recording, known, findings, asdict(settings), healthy_recording)
     if unsteady is not None:

@@ -27,8 +27,8 @@ from gearsig.diagnosis._types import (
     outcome_of,
 )
 from gearsig.formatting import percent, sentence
-from gearsig.prepared import magnetic_pull_near
-from gearsig.recording import ChannelProblem, Recording
+from gearsig.prepared import PreparedRecording, magnetic_pull_near
+from gearsig.recording import ChannelProblem
 from gearsig.rig import Rig
 
 DEPTH_UNKNOWN = "crack-depth-unknown"
@@ -131,11 +131,8 @@ def _problem_title(problem: ChannelProblem) -> str:
     return problem.title
 
 
-def detect_data_problems(recording: Recording) -> tuple[list[Finding], frozenset[str]]:
+def detect_data_problems(prepared: PreparedRecording) -> tuple[list[Finding], frozenset[str]]:
     """Return findings about the data, and the names of dead channels, which are not analysed further."""
-    from gearsig.recording import find_problems
-
-    problems = find_problems(recording)
     findings = [
         Finding(
             f"channel-{p.kind}",
@@ -147,13 +144,13 @@ def detect_data_problems(recording: Recording) -> tuple[list[Finding], frozenset
             evidence=(p.evidence,),
             surer=p.remedy,
         )
-        for p in problems
+        for p in prepared.problems
     ]
     findings += [
         Finding("reader-note", Kind.NOTICE, sentence(text), confidence_basis="stated by the reader of the file")
-        for text in recording.warnings
+        for text in prepared.recording.warnings
     ]
-    return findings, frozenset(p.channel for p in problems if p.kind == "dead")
+    return findings, frozenset(p.channel for p in prepared.problems if p.kind == "dead")
 
 
 # --------------------

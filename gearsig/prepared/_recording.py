@@ -25,7 +25,7 @@ from gearsig.orders import (
 )
 from gearsig.prepared._angle import phase_followed_angle, refined_angle
 from gearsig.prepared._lines import LinesOverFloor, lines_over_noise_floor
-from gearsig.recording import Recording, check_recording
+from gearsig.recording import ChannelProblem, Recording, check_recording, find_problems
 from gearsig.rig import PulseTimes, Rig, TachometerChannel, check_rig, known_ratio
 from gearsig.spectra import Spectrum, amplitude_spectrum, fast_length, joined_ends, power_density
 
@@ -122,6 +122,11 @@ class PreparedRecording:
         if isinstance(kept, GearsigError):
             raise kept.with_traceback(None)
         return kept  # type: ignore[no-any-return]  # of the type that `compute` returns
+
+    @property
+    def problems(self) -> tuple[ChannelProblem, ...]:
+        """What is wrong with the samples of vibration channels, see `gearsig.recording.find_problems`."""
+        return self.keep("problems", lambda: find_problems(self.recording))
 
     # Angles: small, and asked for by everything.
 

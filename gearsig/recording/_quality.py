@@ -80,7 +80,8 @@ def find_clipping(x: FloatArray, levels: SampleLevels, *, rest: float | None = N
     sides: it was cut, not rounded. Two tests per end of the range look for such runs; either is enough.
 
     - *Held samples.* Runs of samples equal to the extreme, w being one step of the converter. They must hold three
-      times as many samples as the next step below, as no noise does.
+      times as many samples as the next step below, as no noise does. Or the extreme holds a thousandth of the samples
+      and ten times as many as any value between both, where a fast signal meets it in single ones.
     - *Pile-up.* Runs in the last 0.5 % of the range, w. That band must hold 6 times as many samples as the 0.5 %
       before. Near a parabolic maximum, time goes with the square root of the distance from it, so that this ratio
       is at most
@@ -125,7 +126,15 @@ def _n_held(distance: FloatArray, levels: SampleLevels) -> int:
     min_run = MIN_RUN if np.count_nonzero(held) < 20.0 * usual else 2
     n = _n_in_cornered_runs(held, distance, q, min_run)
     n_next = int(np.count_nonzero((distance > 0) & (distance <= 1.5 * q)))
-    return int(np.count_nonzero(held)) if n > 3.0 * n_next else 0
+    n_held = int(np.count_nonzero(held))
+    if n > 3.0 * n_next:
+        return n_held
+    # A fast signal meets a limit in single samples, but no other value comes anywhere near as often.
+    if n_held < max(20.0, 1e-3 * len(held), 20.0 * usual):
+        return 0
+    places = np.rint(distance * (1e6 / float(distance.max())))  # values of a tone differ by their rounding
+    _, counts = np.unique(places[(places > 0) & (places < 1e6)], return_counts=True)
+    return n_held if n_held > 10.0 * counts.max(initial=0) else 0
 
 
 def _n_piled(distance: FloatArray, span: float, step: float | None) -> int:
@@ -188,6 +197,16 @@ class ChannelProblem:
     def title(self) -> str:
         """What is the matter, in a sentence."""
         return _TITLES.get(self.kind, "Channel {} is {}.").format(self.channel, self.kind)
+
+    @property
+    def text(self) -> str:
+        """The title with its evidence, as the beginning of a sentence."""
+        return f"{self.title.rstrip('.')} ({self.evidence})"
+
+    @property
+    def is_grave(self) -> bool:
+        """Whether levels and lines may be wrong for it, which an offset or few levels hardly touch."""
+        return self.kind not in ("offset", "quantised")
 
 
 _TITLES = {
@@ -397,7 +416,9 @@ def _wrapped(channel: Channel, x: FloatArray) -> ChannelProblem | None:
     # Values that wrap around fill the range up to both ends; those of a natural signal thin out towards them.
     place = (x - low) / span
     outer, next_to = (np.count_nonzero(np.abs(place - 0.5) > 0.5 - edge) for edge in (0.01, 0.05))
-    if not 0.08 * next_to <= outer <= 0.5 * next_to or outer < 20:  # more of them at the ends were cut
+    held = np.count_nonzero((x == low) | (x == high))
+    # More of them at the ends, or at one value there, were cut.
+    if not 0.08 * next_to <= outer <= 0.5 * next_to or outer < 20 or held > 0.5 * outer:
         return None
     # Uniform noise fills it evenly, and goes from end to end as well.
     is_even = np.median(neighbour_steps) > 0.6 and np.count_nonzero(np.abs(place - 0.5) < 0.05) < 3 * next_to
@@ -493,9 +514,15 @@ def _sudden_ends(spectrum: NDArray[np.complexfloating], frequency: FloatArray, r
     resonances that are struck it is positive. It is taken in four bands above 300 Hz, and by what 32 parts scatter.
     """
     edges = [300.0 * (top_hz / 300.0) ** (i / 4) for i in range(5)]
+    total = 2.0 * float(np.mean(spectrum.real**2 + spectrum.imag**2)) / len(frequency)  # mean square, nearly
     skews, scores = [], []
     for low, high in pairwise(edges):
-        steps = np.diff(np.sqrt(_power_within(spectrum, frequency, low, high)[:: max(1, int(rate_hz / (high - low)))]))
+        power = _power_within(spectrum, frequency, low, high)
+        if float(power.mean()) <= total * 1e-10:  # rounding errors of a tone elsewhere, as of simulations
+            skews.append(0.0)
+            scores.append(0.0)
+            continue
+        steps = np.diff(np.sqrt(power[:: max(1, int(rate_hz / (high - low)))]))
         parts = steps[: len(steps) // 32 * 32].reshape(32, -1)
         scale = float(np.mean(parts**2)) ** 1.5
         cubes = np.mean(parts**3, axis=1) / scale if scale > 0 else np.zeros(32)
