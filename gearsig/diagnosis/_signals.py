@@ -331,9 +331,11 @@ def envelopes_in(
             return  # the band is narrower than the modulations sought
     for name in envelopes.channel_names:
         spectrum = amplitude_spectrum(envelopes, name) if over_angle is None else order_spectrum(over_angle, name)
-        yield BandEnvelope(
-            name, band, lines_over_noise_floor(spectrum), float(envelopes.values(name).mean()), over_angle
-        )
+        try:
+            excess = lines_over_noise_floor(spectrum)
+        except RefusalError:
+            return  # the record is too short for modulations so slow
+        yield BandEnvelope(name, band, excess, float(envelopes.values(name).mean()), over_angle)
 
 
 def in_common_bands(

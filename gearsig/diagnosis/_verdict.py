@@ -186,6 +186,9 @@ SAME_LINE = 2e-3
 SURE = 0.7
 """Below it, what was a fault is a suspicion."""
 
+FASTEST_RPM = 5e5
+"""Dental drills and the smallest turbines come near it."""
+
 NEAR_ZERO_SHARE = 0.1
 """Of the highest speed: a tachometer does not tell whether a shaft that slows down so far turns on or back."""
 
@@ -215,6 +218,10 @@ def speed_doubts(angle: ShaftAngle | CannotTell, rig: Rig) -> list[Finding]:
                 surer="Check sampling rate, pulses per revolution and the speed in the rig file.",
             )
         )
+    elif high > FASTEST_RPM:
+        title = f"The speed, {high:.3g} rpm, is beyond that of any machine with gears or rolling bearings."
+        surer = "Check sampling rate and pulses per revolution."
+        doubts.append(Finding(OFF_NOMINAL, Kind.DATA_PROBLEM, title, Where(shaft=angle.shaft), surer=surer))
     if low < NEAR_ZERO_SHARE * high:
         title = f"The speed falls to {low:.3g} rpm, near standstill: whether the shaft turns on or back is not told."
         where = Where(shaft=angle.shaft)

@@ -514,20 +514,19 @@ def _sudden_ends(spectrum: NDArray[np.complexfloating], frequency: FloatArray, r
     resonances that are struck it is positive. It is taken in four bands above 300 Hz, and by what 32 parts scatter.
     """
     edges = [300.0 * (top_hz / 300.0) ** (i / 4) for i in range(5)]
-    total = 2.0 * float(np.mean(spectrum.real**2 + spectrum.imag**2)) / len(frequency)  # mean square, nearly
-    skews, scores = [], []
-    for low, high in pairwise(edges):
+    total = float(np.mean(spectrum.real**2 + spectrum.imag**2)) / len(frequency)
+    skews, scores = np.zeros(4), np.zeros(4)
+    for i, (low, high) in enumerate(pairwise(edges)):
         power = _power_within(spectrum, frequency, low, high)
-        if float(power.mean()) <= total * 1e-10:  # rounding errors of a tone elsewhere, as of simulations
-            skews.append(0.0)
-            scores.append(0.0)
-            continue
         steps = np.diff(np.sqrt(power[:: max(1, int(rate_hz / (high - low)))]))
+        # Too few, or rounding errors of a tone elsewhere, as a simulation has them.
+        if len(steps) < 32 or float(power.mean()) <= 1e-10 * total:
+            continue
         parts = steps[: len(steps) // 32 * 32].reshape(32, -1)
         scale = float(np.mean(parts**2)) ** 1.5
         cubes = np.mean(parts**3, axis=1) / scale if scale > 0 else np.zeros(32)
-        skews.append(float(cubes.mean()))
-        scores.append(skews[-1] / max(float(np.std(cubes, ddof=1)) / 32**0.5, 1e-12))
+        skews[i] = cubes.mean()
+        scores[i] = skews[i] / max(float(np.std(cubes, ddof=1)) / 32**0.5, 1e-12)
     # Strikes that overlap beat and may rise faster than they fall in one band: of some 25 measured channels the lowest
     # is -0.5 (11 standard errors), beside 0.5 in the next band. Time runs one way in all bands: one that rings down
     # speaks against it.
