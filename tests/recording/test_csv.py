@@ -262,5 +262,5 @@ def test_rows_that_stand_twice_are_no_rounded_time(tmp_path):
     time_s = np.repeat(np.arange(0, 2000, 2) / 1e4, 2)
     path = tmp_path / "doubled.csv"
     path.write_text("time,a1\n" + "".join(f"{t:.4f},{np.sin(300 * t):.6f}\n" for t in time_s))
-    with pytest.raises(InputError, match="line 3.*doubled"):
+    with pytest.raises(InputError, match=r"line 3.*doubled"):
         read_recording(path)
