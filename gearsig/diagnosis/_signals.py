@@ -467,9 +467,9 @@ def _tones_removed(signals: AnalysisSignals, channel: str) -> Recording | None:
 
     recorded = signals.recording.values(channel)
     lines = prepared_lines(signals.prepared.transform(channel), "tones removed")
-    x = np.asarray(irfft(lines, len(recorded), overwrite_x=True))
-    if np.std(x) < 1e-9 * np.std(recorded):
+    if np.linalg.norm(lines) < 1e-9 * np.linalg.norm(signals.prepared.transform(channel)[1:]):
         return None  # of a model: what is left are the rounding errors of the tones' removal
+    x = np.asarray(irfft(lines, len(recorded), overwrite_x=True))
     return replace(signals.recording.select([channel]), samples=x[None, :])
 
 

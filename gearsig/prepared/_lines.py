@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.fft import ifft, next_fast_len
 from scipy.optimize import minimize_scalar
 
-from gearsig.checks import FloatArray
+from gearsig.checks import FloatArray, read_only
 from gearsig.compiled import njit
 from gearsig.peaks import parabola_vertex
 from gearsig.spectra import ComplexArray, Spectrum, noise_floor
@@ -601,9 +601,21 @@ def sliding_mean(values: FloatArray, width: int) -> FloatArray:
     >>> sliding_mean(np.array([0.0, 2.0, 4.0, 6.0]), 2).tolist()
     [1.0, 3.0, 5.0, 3.0]
     """
-    padded = np.concatenate([np.zeros((*values.shape[:-1], 1)), values, values[..., :width]], axis=-1).cumsum(axis=-1)
-    mean: FloatArray = (padded[..., width:-1] - padded[..., : values.shape[-1]]) / width
-    return mean
+    rows = np.ascontiguousarray(values, dtype=np.float64).reshape(-1, values.shape[-1])
+    mean = np.empty_like(rows)
+    _sliding_means(read_only(rows), width, mean)
+    return mean.reshape(values.shape)
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _sliding_means(rows, width, mean):  # type: ignore[no-untyped-def]
+    n = rows.shape[1]
+    sums = np.zeros(n + width + 1)
+    for r in range(rows.shape[0]):
+        for i in range(n + width):
+            sums[i + 1] = sums[i] + rows[r, i % n]
+        for i in range(n):
+            mean[r, i] = (sums[i + width] - sums[i]) / width
 
 
 def strongest_window(energies: FloatArray) -> tuple[int, float]:
