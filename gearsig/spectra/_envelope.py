@@ -117,8 +117,8 @@ def band_envelope(
     _band_lines(band_hz, fs, len(x))  # refuses early
     blocks = None
     if highest_hz is not None and kind == "magnitude" and edge_fraction > 0:
-        blocks = _Blocks.of(band_hz, fs, edge_fraction, positive(highest_hz, "highest_hz", "Hz"))
-    if blocks is not None and blocks.pay(len(x), transform is not None):
+        blocks = _Blocks.of(band_hz, fs, edge_fraction, positive(highest_hz, "highest_hz", "Hz"), len(x))
+    if blocks is not None and blocks.pay(has_transform=transform is not None):
         values, rate_hz = blocks.magnitude(x), fs * blocks.n_out / blocks.n
     else:
         known = rfft(joined_ends(x.astype(np.float64))) if transform is None else transform
@@ -394,10 +394,15 @@ class _Blocks:
     low_pass: FloatArray
 
     @classmethod
-    def of(cls, band_hz: tuple[float, float], fs: float, edge_fraction: float, highest_hz: float) -> _Blocks:
+    def of(
+        cls, band_hz: tuple[float, float], fs: float, edge_fraction: float, highest_hz: float, n_samples: int
+    ) -> _Blocks | None:
+        """Return None where fewer than eight blocks make the signal; of a slow machine, one may be longer than that."""
         edge_hz = edge_fraction * (band_hz[1] - band_hz[0])
         ringing = PERIODS_OF_EDGE * fs * (1.0 / edge_hz + 1.0 / highest_hz)
         n = 1 << max(13, int(np.ceil(np.log2(8 * ringing))))
+        if 8 * n > n_samples:
+            return None
         hertz = np.arange(n // 2) * fs / n
         lines, response = edged_band(hertz, band_hz, edge_hz)
         n_band, n_out = (_multiple_of_eight(k) for k in (4 * len(lines) + 1, 3 * highest_hz * n / fs))
@@ -405,10 +410,9 @@ class _Blocks:
         slow = np.clip(2.0 - hertz[: n_out // 2 + 1] / highest_hz, 0.0, 1.0)
         return cls(n, n_band, n_out, int(lines[0]), response, np.sin(np.pi / 2 * slow) ** 2)
 
-    def pay(self, n_samples: int, has_transform: bool) -> bool:
+    def pay(self, *, has_transform: bool) -> bool:
         """Whether blocks cost less than transforms of all samples; a narrow band of a known transform does not."""
-        is_slow = self.n_band > (2 if has_transform else 1) * self.n_out and 2 * self.n_out <= self.n
-        return is_slow and 8 * self.n <= n_samples
+        return self.n_band > (2 if has_transform else 1) * self.n_out and 2 * self.n_out <= self.n
 
     def magnitude(self, x: FloatArray) -> FloatArray:
         """Return the low-passed magnitude, `n_out` samples for `n` of the signal, computed in the signal's precision.
