@@ -330,8 +330,8 @@ def envelopes_in(
         except (InputError, RefusalError):
             return  # the band is narrower than the modulations sought
     for name in envelopes.channel_names:
-        spectrum = amplitude_spectrum(envelopes, name) if over_angle is None else order_spectrum(over_angle, name)
         try:
+            spectrum = amplitude_spectrum(envelopes, name) if over_angle is None else order_spectrum(over_angle, name)
             excess = lines_over_noise_floor(spectrum)
         except RefusalError:
             return  # the record is too short for modulations so slow
