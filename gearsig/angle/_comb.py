@@ -154,7 +154,7 @@ class LineEvidence:
     top: float
 
 
-def line_evidence(samples: FloatArray, rate: float, n_segment: int, top: float) -> LineEvidence:
+def line_evidence(samples: FloatArray, rate: float, n_segment: int, top: float, reach: float = np.inf) -> LineEvidence:
     """Return the evidence for lines in all channels together.
 
     Hann windows of `n_segment` samples at half overlap; mean power over them; heights over the floor averaged over
@@ -169,20 +169,18 @@ def line_evidence(samples: FloatArray, rate: float, n_segment: int, top: float) 
         Shortened a little to a length that transforms fast.
     top : float
         In the unit of `rate`.
+    reach : float
+        Up to where evidence is asked for, in the same unit; a line's rank is among all lines nevertheless.
     """
     from scipy.fft import prev_fast_len
-    from scipy.ndimage import maximum_filter1d
 
     n_segment = prev_fast_len(n_segment, real=True)
     n_keep = min(n_segment // 2, int(top / rate * n_segment) + 4)
     ratios = [_log_ratio(_mean_power(row, n_segment)[:n_keep]) for row in samples]
     log_ratio = np.mean(ratios, axis=0)
-    # The flanks of a line are not lines: only what is the largest within two bins each way counts.
-    largest = maximum_filter1d(log_ratio, 5, mode="nearest")
-    peaks = np.where((log_ratio >= largest) & (log_ratio > 0), log_ratio, 0.0)
-    # Interval i holds the higher of its two ends, so that a candidate may miss a line's middle by half a bin.
-    height = np.maximum(peaks[:-1], peaks[1:])
-    high = height > 0
+    height = np.empty(n_keep - 1)
+    _interval_heights(log_ratio, height)
+    high = np.flatnonzero(height)
     positive = height[high]
     order = np.argsort(positive)
     ascending = positive[order]
@@ -191,12 +189,31 @@ def line_evidence(samples: FloatArray, rate: float, n_segment: int, top: float) 
     rank[order] = (len(order) - first) / len(height)
     # A line that is there stands among the top ranks q: density a·q^(a-1), a = 0.3. ln(1 - p + p·a·q^(a-1)): a line
     # missing costs little, a line of high rank gives a lot, none decides alone.
-    density = 0.3 * rank ** (0.3 - 1.0)
-    likelihoods = np.empty((len(PRESENCE), len(height)))
+    n_asked = int(min(len(height), reach / rate * n_segment + 2))
+    high = high[: np.searchsorted(high, n_asked)]
+    density = 0.3 * rank[: len(high)] ** (0.3 - 1.0)
+    likelihoods = np.empty((len(PRESENCE), n_asked))
     for row, present in zip(likelihoods, PRESENCE, strict=True):
         row[:] = np.log(1.0 - present + present * 0.3)  # rank 1: all that is no peak
         row[high] = np.log(1.0 - present + present * density)
     return LineEvidence(likelihoods, log_ratio, rate / n_segment, top)
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _interval_heights(x, height):  # type: ignore[no-untyped-def]
+    """Height of the higher end of each interval between two bins, 0 where neither is a line.
+
+    The flanks of a line are not lines: only what is the largest within two bins each way counts. A candidate may so
+    miss a line's middle by half a bin.
+    """
+    n = len(x)
+    height[:] = 0.0
+    for i in range(n):
+        if x[i] > 0.0 and x[i] >= max(x[max(i - 1, 0)], x[max(i - 2, 0)], x[min(i + 1, n - 1)], x[min(i + 2, n - 1)]):
+            if i > 0:
+                height[i - 1] = max(height[i - 1], x[i])
+            if i < n - 1:
+                height[i] = x[i]
 
 
 @lru_cache(maxsize=8)
@@ -276,6 +293,9 @@ def _score(ratios, per_bin, top, orders, presence, is_mesh, speeds, out):  # typ
 
 # Ranges narrower than this ratio come from a known nominal speed: the scale of the speed is then not in question.
 NARROW = 1.35
+
+FARTHEST_MOVED = 0.12
+"""Share by which a line of a comb of chance is moved at most."""
 
 
 @dataclass(frozen=True)
@@ -367,7 +387,7 @@ def decide(evidence: LineEvidence, comb: CombLines, low: float, high: float) -> 
     runner_up = int(np.argmax(elsewhere))
     rng = np.random.default_rng(20_230_501)  # fixed: the same recording gives the same answer
     tried = speeds if len(speeds) <= 200_000 else speeds[:: len(speeds) // 200_000 + 1]
-    moved = [comb.orders * np.exp(rng.uniform(-0.12, 0.12, len(comb.orders))) for _ in range(16)]
+    moved = [comb.orders * np.exp(rng.uniform(-FARTHEST_MOVED, FARTHEST_MOVED, len(comb.orders))) for _ in range(16)]
     chance = [float(score_speeds(evidence, comb, tried, orders).max()) for orders in moved]
     around = (speed * (1 - same / 2), speed * (1 + same / 2))
     teeth = (score_speeds(evidence, c, candidate_speeds(*around, c, evidence)).max() for c in with_other_teeth(comb))
@@ -530,10 +550,12 @@ def best_decision(samples: FloatArray, rate: float, comb: CombLines, low: float,
     `rate` is in samples per second, or per revolution; `low` and `high` accordingly.
     """
     best: CombDecision | None = None
+    # Moved at random, and with other teeth, combs reach farther up.
+    reach = high * max(np.exp(FARTHEST_MOVED) * comb.highest, *(c.highest for c in with_other_teeth(comb)), 0.0)
     for n in (samples.shape[1] // d for d in _DIVISIONS):
         # Sidebands need four bins between them and the mesh line.
         if n >= 256 and high * n / rate > 4.0:
-            decision = decide(line_evidence(samples, rate, n, TOP * rate), comb, low, high)
+            decision = decide(line_evidence(samples, rate, n, TOP * rate, reach), comb, low, high)
             if best is None or decision.rank > best.rank:
                 best = decision
             if best.quality >= CLEAR:

@@ -393,6 +393,7 @@ def scales_at(knots, speed, times, factor, lowest, out):  # type: ignore[no-unty
 
 _CHUNK = 1 << 15  # angles at a time: positions and a segment of the signal stay in the cache
 _MAX_VALUES = 1 << 28  # 2 GB of results; beyond it a typing error is likelier than a wish
+CHUNKS_FOR_THREADS = 8  # fewer take less time than threads do to begin
 _SLOW_SHARE = 0.05  # revolutions that may lose bandwidth to the default number of samples per revolution
 
 
@@ -572,7 +573,7 @@ def _fill(
                 interpolate(signal, positions, half_band, table, out[start:stop])
 
     starts, n_threads = range(0, n, _CHUNK), min(4, config.NUMBA_NUM_THREADS)
-    if len(starts) == 1 or n_threads == 1:
+    if len(starts) * len(rows) < CHUNKS_FOR_THREADS or n_threads == 1:
         for start in starts:
             fill_chunk(start)
         return

@@ -359,7 +359,8 @@ def _coverage(samples: FloatArray, n_per_rev: float, comb: CombLines) -> float:
         return 1.0
     right = 0
     for part in range(8):
-        evidence = line_evidence(samples[:, part * n_part : (part + 1) * n_part], n_per_rev, n_part, TOP * n_per_rev)
+        rows = samples[:, part * n_part : (part + 1) * n_part]
+        evidence = line_evidence(rows, n_per_rev, n_part, TOP * n_per_rev, 1.06 * comb.highest)
         speeds = candidate_speeds(0.94, 1.06, comb, evidence)
         scores = score_speeds(evidence, comb, speeds)
         here = np.abs(speeds - 1.0) <= 2.0 * evidence.bin_width / comb.meshes[0]

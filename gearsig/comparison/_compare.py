@@ -133,8 +133,10 @@ def compare(
     check_rig(rig)
     simulated, recorded = (side.recording for side in prepared)
     pairs = pair_channels(simulated, recorded, channels)
-    check_live(simulated, [p.simulated for p in pairs], "simulation")
-    check_live(recorded, [p.recorded for p in pairs], "recording")
+    problems = (
+        *check_live(prepared[0], [p.simulated for p in pairs], "simulation"),
+        *check_live(prepared[1], [p.recorded for p in pairs], "recording"),
+    )
     machine = common_machine(simulated, recorded, rig)
     rig, reference = machine.recorded, machine.recorded.reference_shaft
     # Revolutions of each shaft per revolution of the reference shaft, which comes first.
@@ -171,7 +173,7 @@ def compare(
         highest_order=highest,
         alignments=alignments,
         channels=compared,
-        notes=(*machine.notes, *notes_of(*sides, alignments, compared, ratios)),
+        notes=(*machine.notes, *problems, *notes_of(*sides, alignments, compared, ratios)),
         verdict=verdict_of(compared, alignments),
         findings=findings_of(compared),
     )

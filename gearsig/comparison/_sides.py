@@ -12,7 +12,7 @@ from gearsig.checks import FloatArray, listed, short
 from gearsig.errors import InputError, RefusalError, options_named
 from gearsig.orders import first_whole_sample
 from gearsig.prepared import PreparedRecording
-from gearsig.recording import SI_FACTORS, Channel, Recording, find_problems, si_factor
+from gearsig.recording import SI_FACTORS, Channel, Recording, si_factor
 from gearsig.rig import ConstantSpeed, PulseTimes, Rig, SpeedSource
 
 MIN_REVOLUTIONS = 8
@@ -252,19 +252,21 @@ def _factor(unit: str, target_unit: str, quantity: str) -> float | None:
     return None
 
 
-def check_live(recording: Recording, channels: Sequence[str], side_name: str) -> None:
-    """Refuse dead channels: their level is that of nothing.
+def check_live(side: PreparedRecording, channels: Sequence[str], side_name: str) -> tuple[str, ...]:
+    """Refuse dead channels, whose level is that of nothing; return what is wrong with the others.
 
     Raises
     ------
     RefusalError
     """
-    for problem in find_problems(recording):
-        if problem.kind == "dead" and problem.channel in channels:
+    problems = [problem for problem in side.problems if problem.channel in channels and problem.is_grave]
+    for problem in problems:
+        if problem.kind == "dead":
             raise RefusalError(
                 f"channel {problem.channel} of the {side_name} is dead ({problem.evidence})",
                 remedy="check sensor, cable and input, or name other channels with --channel SIM=RECORDED",
             )
+    return tuple(f"The {side_name}: {p.text}; what differs may be no more than that." for p in problems)
 
 
 @dataclass(frozen=True)

@@ -139,7 +139,7 @@ def _examined(
     # spectrum helps where every channel is dead.
     recording, known = prepared.recording, prepared.rig
     announce("finding the speed")
-    findings, dead = detect_data_problems(recording)
+    findings, dead = detect_data_problems(prepared)
     healthy_recording = healthy.recording if healthy is not None else None
     unsteady = start_stop_analysis(recording, known, findings, asdict(settings), healthy_recording)
     if unsteady is not None:
@@ -337,7 +337,7 @@ def _indicators(
         values, rate_hz = signals.recording.values(name), signals.recording.sampling_rate_hz
         yield from indicators.time_indicators(values, name, unit)
         speed_rpm = None if signals.angle is None else signals.angle.mean_speed_rpm
-        spectrum, transform = signals.spectra[name], signals.prepared.transform(name)
+        spectrum, transform = signals.spectra[name], signals.prepared.joined_transform(name)
         yield from indicators.overall_indicators(
             values, rate_hz, channel, speed_rpm, spectrum=spectrum, transform=transform
         )

@@ -292,7 +292,7 @@ class BandEnvelope:
 def band_envelopes(signals: AnalysisSignals) -> Iterator[BandEnvelope]:
     """Yield the envelope spectra of all channels and bands."""
     recording = signals.recording
-    transforms = {name: signals.prepared.transform(name) for name in recording.vibration_names()}
+    transforms = {name: signals.prepared.joined_transform(name) for name in recording.vibration_names()}
     for band in envelope_bands(recording.sampling_rate_hz):
         yield from envelopes_in(signals, recording, band, transforms)
 
@@ -330,10 +330,12 @@ def envelopes_in(
         except (InputError, RefusalError):
             return  # the band is narrower than the modulations sought
     for name in envelopes.channel_names:
-        spectrum = amplitude_spectrum(envelopes, name) if over_angle is None else order_spectrum(over_angle, name)
-        yield BandEnvelope(
-            name, band, lines_over_noise_floor(spectrum), float(envelopes.values(name).mean()), over_angle
-        )
+        try:
+            spectrum = amplitude_spectrum(envelopes, name) if over_angle is None else order_spectrum(over_angle, name)
+            excess = lines_over_noise_floor(spectrum)
+        except RefusalError:
+            return  # the record is too short for modulations so slow
+        yield BandEnvelope(name, band, excess, float(envelopes.values(name).mean()), over_angle)
 
 
 def in_common_bands(
@@ -436,10 +438,9 @@ def witness_text(
 def _kurtogram_band(signals: AnalysisSignals, channel: str, narrowest_hz: float) -> KurtogramBand | None:
     from gearsig.spectra import kurtogram
 
-    left = _without_tones(signals, channel)
-    if left is None:
+    recording = _without_tones(signals, channel)
+    if recording is None:
         return None
-    recording, lines = left
     try:
         grid = kurtogram(
             recording.values(channel),
@@ -450,22 +451,26 @@ def _kurtogram_band(signals: AnalysisSignals, channel: str, narrowest_hz: float)
         band = grid.best_band(narrowest_hz=narrowest_hz)
     except RefusalError:  # the record is too short, or the races too fast for the sampling rate
         return None
-    envelope = next(envelopes_in(signals, recording, band.band_hz, {channel: lines}), None)
+    envelope = next(envelopes_in(signals, recording, band.band_hz), None)
     return None if envelope is None else KurtogramBand(grid, band, envelope)
 
 
-def _without_tones(signals: AnalysisSignals, channel: str) -> tuple[Recording, NDArray[np.complexfloating]] | None:
-    """Return a channel without its steady tones, and its `rfft`; None where they are all there is."""
+def _without_tones(signals: AnalysisSignals, channel: str) -> Recording | None:
+    """Return a channel without its steady tones; None where they are all there is."""
+    return signals.prepared.keep(("diagnosis", "without tones", channel), lambda: _tones_removed(signals, channel))
+
+
+def _tones_removed(signals: AnalysisSignals, channel: str) -> Recording | None:
     from scipy.fft import irfft
 
     from gearsig.spectra import prepared_lines
 
     recorded = signals.recording.values(channel)
     lines = prepared_lines(signals.prepared.transform(channel), "tones removed")
-    x = np.asarray(irfft(lines, len(recorded)))
-    if np.std(x) < 1e-9 * np.std(recorded):
+    if np.linalg.norm(lines) < 1e-9 * np.linalg.norm(signals.prepared.transform(channel)[1:]):
         return None  # of a model: what is left are the rounding errors of the tones' removal
-    return replace(signals.recording.select([channel]), samples=x[None, :]), lines
+    x = np.asarray(irfft(lines, len(recorded), overwrite_x=True))
+    return replace(signals.recording.select([channel]), samples=x[None, :])
 
 
 def is_of_tones(signals: AnalysisSignals, envelope: BandEnvelope, order: float) -> bool:
@@ -483,11 +488,10 @@ def is_of_tones(signals: AnalysisSignals, envelope: BandEnvelope, order: float) 
 
 def _lines_without_tones(signals: AnalysisSignals, channel: str, band_hz: tuple[float, float]) -> LinesOverFloor | None:
     """Return the lines of a band's envelope beside shafts' without the steady tones; None where nothing is left."""
-    left = _without_tones(signals, channel)
-    if left is None:
+    recording = _without_tones(signals, channel)
+    if recording is None:
         return None
-    recording, lines = left
-    envelope = next(envelopes_in(signals, recording, band_hz, {channel: lines}), None)
+    envelope = next(envelopes_in(signals, recording, band_hz), None)
     return None if envelope is None else without_shafts(signals, envelope.excess)
 
 

@@ -15,6 +15,7 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import counted
 from gearsig.indicators import Indicator
 from gearsig.motion import Burst, MotionSegments, StartStop
+from gearsig.prepared import prepare
 from gearsig.recording import Recording
 from gearsig.rig import EncoderChannel, Rig, SpeedChannel, path_of_contact
 
@@ -56,7 +57,7 @@ def start_stop_analysis(
     reference_analysis = None
     if reference is not None:
         healthy = reference if reference.rig is not None else reference.with_rig(rig)
-        reference_analysis = start_stop_analysis(healthy, rig, detect_data_problems(healthy)[0], settings)
+        reference_analysis = start_stop_analysis(healthy, rig, detect_data_problems(prepare(healthy))[0], settings)
         if reference_analysis is None:
             title = "The reference does not start and stop: nothing is compared with it."
             findings.append(cannot_tell("reference-not-compared", title, surer="A reference of the same cycle."))

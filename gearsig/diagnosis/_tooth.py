@@ -446,7 +446,8 @@ class _Examined:
         """The event's rms against the median window's."""
         event = self.event
         ratio_db = 20 * log10(event.rms / event.median_rms) if event.rms > 0 and event.median_rms > 0 else None
-        floor_is = f"median tooth of the difference signal in {event.channel}"
+        of_what = "what differs from the reference" if self.since_reference else "the difference signal"
+        floor_is = f"median tooth of {of_what} in {event.channel}"
         return Strength(event.rms, self.shaft.averages[event.channel].unit, event.median_rms, floor_is, ratio_db)
 
     def reaches(self, level: tuple[float, float]) -> bool:

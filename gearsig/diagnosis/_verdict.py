@@ -27,8 +27,8 @@ from gearsig.diagnosis._types import (
     outcome_of,
 )
 from gearsig.formatting import percent, sentence
-from gearsig.prepared import magnetic_pull_near
-from gearsig.recording import ChannelProblem, Recording
+from gearsig.prepared import PreparedRecording, magnetic_pull_near
+from gearsig.recording import ChannelProblem
 from gearsig.rig import Rig
 
 DEPTH_UNKNOWN = "crack-depth-unknown"
@@ -132,11 +132,8 @@ def _problem_title(problem: ChannelProblem) -> str:
     return problem.title
 
 
-def detect_data_problems(recording: Recording) -> tuple[list[Finding], frozenset[str]]:
+def detect_data_problems(prepared: PreparedRecording) -> tuple[list[Finding], frozenset[str]]:
     """Return findings about the data, and the names of dead channels, which are not analysed further."""
-    from gearsig.recording import find_problems
-
-    problems = find_problems(recording)
     findings = [
         Finding(
             f"channel-{p.kind}",
@@ -148,13 +145,13 @@ def detect_data_problems(recording: Recording) -> tuple[list[Finding], frozenset
             evidence=(p.evidence,),
             surer=p.remedy,
         )
-        for p in problems
+        for p in prepared.problems
     ]
     findings += [
         Finding("reader-note", Kind.NOTICE, sentence(text), confidence_basis="stated by the reader of the file")
-        for text in recording.warnings
+        for text in prepared.recording.warnings
     ]
-    return findings, frozenset(p.channel for p in problems if p.kind == "dead")
+    return findings, frozenset(p.channel for p in prepared.problems if p.kind == "dead")
 
 
 # --------------------
@@ -190,6 +187,9 @@ SAME_LINE = 2e-3
 SURE = 0.7
 """Below it, what was a fault is a suspicion."""
 
+FASTEST_RPM = 5e5
+"""Dental drills and the smallest turbines come near it."""
+
 NEAR_ZERO_SHARE = 0.1
 """Of the highest speed: a tachometer does not tell whether a shaft that slows down so far turns on or back."""
 
@@ -219,6 +219,10 @@ def speed_doubts(angle: ShaftAngle | CannotTell, rig: Rig) -> list[Finding]:
                 surer="Check sampling rate, pulses per revolution and the speed in the rig file.",
             )
         )
+    elif high > FASTEST_RPM:
+        title = f"The speed, {high:.3g} rpm, is beyond that of any machine with gears or rolling bearings."
+        surer = "Check sampling rate and pulses per revolution."
+        doubts.append(Finding(OFF_NOMINAL, Kind.DATA_PROBLEM, title, Where(shaft=angle.shaft), surer=surer))
     if low < NEAR_ZERO_SHARE * high:
         title = f"The speed falls to {low:.3g} rpm, near standstill: whether the shaft turns on or back is not told."
         where = Where(shaft=angle.shaft)

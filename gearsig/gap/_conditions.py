@@ -41,7 +41,7 @@ from gearsig.gap._report import ConditionFacts
 from gearsig.gap._simulator import Added, OperatingCondition, Twin, as_tried
 from gearsig.gap._waveform import gain_scatter
 from gearsig.prepared import PreparedRecording
-from gearsig.recording import find_problems, metres_per_second_squared
+from gearsig.recording import metres_per_second_squared
 from gearsig.rig import GearPair, Rig
 from gearsig.severity import (
     LARGEST_SPEED_DIFFERENCE,
@@ -740,7 +740,7 @@ def check_steady(now: ReducedRecording, reference: ReducedRecording | None) -> N
 def _reduced(prepared: PreparedRecording) -> tuple[ReducedRecording, list[str]]:
     """Return a recording reduced without its dead channels, and notes."""
     recording, name, messages = prepared.recording, prepared.recording.name, list[str]()
-    problems = find_problems(recording)
+    problems = prepared.problems
     dead = {p.channel: p for p in problems if p.kind == "dead"}
     live = [channel for channel in recording.vibration_names() if channel not in dead]
     if not live:
@@ -754,9 +754,8 @@ def _reduced(prepared: PreparedRecording) -> tuple[ReducedRecording, list[str]]:
         )
     reduced = reduce_recording(prepared, channels=live)
     messages += [f"{name}: channel {p.channel} is dead ({p.evidence}) and left out." for p in dead.values()]
-    # An offset or few levels hardly touch what is compared.
-    grave = [p for p in problems if p.channel in live and p.kind not in ("offset", "quantised")]
-    messages += [f"{name}: {p.title.rstrip('.')} ({p.evidence}); what differs may be no more than that." for p in grave]
+    grave = [p for p in problems if p.channel in live and p.is_grave]
+    messages += [f"{name}: {p.text}; what differs may be no more than that." for p in grave]
     return reduced, messages
 
 

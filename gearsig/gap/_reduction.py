@@ -20,6 +20,7 @@ from gearsig.prepared import MAINS_TOLERANCE, PreparedRecording, prepare
 from gearsig.recording import MAINS_HZ, Recording, metres_per_second_squared
 from gearsig.rig import GearPair, Rig
 from gearsig.severity import orders_from_mesh
+from gearsig.spectra import BEYOND_THE_ENDS, continuations
 
 # --------------------
 # The gear pair under study, with every order counted on its driver's shaft.
@@ -802,7 +803,8 @@ def _envelopes(
 
     n = len(residual)
     beyond = min(BEYOND_THE_ENDS, n - 1)
-    long = _continued(residual, beyond)
+    before, after = continuations(residual, beyond)
+    long = np.concatenate([before, residual, after])
     lines = rfft(long)
     m = 2 * next_fast_len(int(highest_cycle * n / n_per_rev) + 1)
     powers, moments, step = [], [], 0.0
@@ -821,22 +823,6 @@ def _envelopes(
         # With z the analytic signal: E x² = E|z|²/2, E x⁴ = 3/8 E|z|⁴.
         moments.append([[square[i:j].mean() / 2.0, 0.375 * (square[i:j] ** 2).mean()] for i, j in pairwise(edges)])
     return np.stack(powers, axis=1), np.asarray(moments).transpose(1, 0, 2), step
-
-
-BEYOND_THE_ENDS = 2048
-"""Samples by which a record is continued before it is cut into bands."""
-
-
-def _continued(values: FloatArray, by: int) -> FloatArray:
-    """Return a record continued beyond both ends by its reflections in them, which fade: no step in value or slope.
-
-    The spectrum of a record takes its end for what comes before its beginning. Where a strong slow line, such as hum,
-    differs in the two, that step is a click in every band: it would be impulsive noise that nobody recorded.
-    """
-    rise = np.sin(0.5 * np.pi * np.arange(1, by + 1) / (by + 1)) ** 2
-    before = (2.0 * values[0] - values[by:0:-1]) * rise
-    after = (2.0 * values[-1] - values[-2 : -by - 2 : -1]) * rise[::-1]
-    return np.concatenate([before, values, after])
 
 
 def _squared_envelope(band: NDArray[np.complex128], n: int) -> FloatArray:

@@ -21,7 +21,7 @@ from gearsig.compiled import njit
 from gearsig.errors import InputError
 from gearsig.recording import SI_FACTORS, Channel, Recording, si_factor
 from gearsig.results import Result
-from gearsig.spectra import Spectrum, amplitude_spectrum, array_rate_hz
+from gearsig.spectra import Spectrum, amplitude_spectrum, array_rate_hz, joined_ends, joined_length
 
 # --------------------
 # The amplitude distribution.
@@ -449,8 +449,10 @@ def overall_indicators(
     channel : Channel
     speed_rpm : float or None
         Slow machines have a band from 2 Hz.
-    spectrum, transform
-        The values' `amplitude_spectrum` and `rfft`, where they are known.
+    spectrum : Spectrum or None
+        The values' `amplitude_spectrum`, where it is known.
+    transform : array or None
+        The `rfft` of `gearsig.spectra.joined_ends` of the values, where it is known.
     """
     from scipy.fft import irfft, rfft
 
@@ -463,11 +465,12 @@ def overall_indicators(
         yield Indicator("overall velocity", velocity, "mm/s", channel.name, "velocity", band=_band_text(band_hz))
     low_hz, high_hz = HIGH_BAND_HZ[0], min(HIGH_BAND_HZ[1], 0.45 * sampling_rate_hz)
     if channel.quantity in ("acceleration", "unknown") and high_hz > 2 * low_hz:
-        n, known = len(values), rfft(checked_values(values)) if transform is None else transform
+        known = rfft(joined_ends(checked_values(values))) if transform is None else transform
+        n = joined_length(len(values), len(known))
         inside = slice(ceil(low_hz * n / sampling_rate_hz), floor(high_hz * n / sampling_rate_hz) + 1)
         lines = np.zeros_like(known)
         lines[inside] = known[inside]
-        high = Amplitudes(irfft(lines, n, overwrite_x=True))
+        high = Amplitudes(irfft(lines, n, overwrite_x=True)[: len(values)])
         for name, value, unit in (
             ("high-frequency rms", rms(high), channel.unit),
             ("high-frequency crest factor", crest_factor(high), ""),

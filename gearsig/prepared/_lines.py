@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.fft import ifft, next_fast_len
 from scipy.optimize import minimize_scalar
 
-from gearsig.checks import FloatArray
+from gearsig.checks import FloatArray, read_only
 from gearsig.compiled import njit
 from gearsig.peaks import parabola_vertex
 from gearsig.spectra import ComplexArray, Spectrum, noise_floor
@@ -113,21 +113,11 @@ class LinesOverFloor:
         return scores
 
     @cached_property
-    def heights(self) -> FloatArray:
-        """ln(A/A₀) of each line by itself, not cut at any limit, with the masked lines at 0."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            heights = np.log(self.spectrum.values / self.floor)
-        heights = np.nan_to_num(heights, copy=False, nan=0.0, posinf=40.0, neginf=0.0)
-        heights[self.masked] = 0.0
-        heights.flags.writeable = False
-        return heights
-
-    @cached_property
     def _densities(self) -> list[FloatArray]:
         """Distributions of sums of 1, 2, … draws: searches over many ranges ask for the same ones."""
         n_cells = int(np.ceil(LOG_RATIO_LIMIT / _STEP)) + 1
-        terms = self.log_ratio[~self.masked]
-        cells = np.bincount(np.floor(terms / _STEP).astype(np.int64), minlength=n_cells).astype(np.float64)
+        cells = np.zeros(n_cells)
+        _count(self.log_ratio, self.masked, cells)
         return [(cells + 1e-9) / (cells.sum() + 1e-9 * n_cells)]
 
     def sum_density(self, n_terms: int) -> FloatArray:
@@ -135,6 +125,13 @@ class LinesOverFloor:
         while len(self._densities) < n_terms:
             self._densities.append(np.convolve(self._densities[-1], self._densities[0]))
         return self._densities[max(n_terms, 1) - 1]
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _count(log_ratio, masked, cells):  # type: ignore[no-untyped-def]
+    for i in range(log_ratio.shape[0]):
+        if not masked[i]:
+            cells[int(log_ratio[i] / _STEP)] += 1.0
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
@@ -378,11 +375,26 @@ def _comb_totals(scores, candidates, origins, factors, first, resolution, inside
 
 
 def _sharpest(excess: LinesOverFloor, origins: FloatArray, factors: NDArray[np.int_], candidates: FloatArray) -> int:
-    """Return the candidate whose harmonics meet the peaks best."""
-    last, sums = len(excess.log_ratio) - 1, np.zeros(len(candidates))
-    for origin, factor in zip(origins, factors, strict=True):
-        sums += excess.heights[np.clip(excess.line_numbers(origin + factor * candidates), 0, last)]
+    """Return the candidate whose harmonics meet the peaks best: ln(A/A₀) of each by itself, not cut at any limit."""
+    spectrum = excess.spectrum
+    sums = np.zeros(len(candidates))
+    _sum_heights(
+        spectrum.values, excess.floor, excess.masked, candidates, origins, factors, float(spectrum.positions[0]),
+        spectrum.resolution, sums,
+    )  # fmt: skip
     return int(np.argmax(sums))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
+def _sum_heights(values, floor, masked, candidates, origins, factors, first, resolution, sums):  # type: ignore[no-untyped-def]
+    last = len(values) - 1
+    for i in range(len(factors)):
+        for j in range(len(candidates)):
+            place = int(np.rint((origins[i] + factors[i] * candidates[j] - first) / resolution))
+            k = min(max(place, 0), last)
+            ratio = values[k] / floor[k]
+            if not masked[k] and ratio > 0.0:
+                sums[j] += min(np.log(ratio), 40.0)  # over a floor of nothing
 
 
 def tail_probability(excess: LinesOverFloor, n_terms: int, score: float) -> float:
@@ -589,9 +601,21 @@ def sliding_mean(values: FloatArray, width: int) -> FloatArray:
     >>> sliding_mean(np.array([0.0, 2.0, 4.0, 6.0]), 2).tolist()
     [1.0, 3.0, 5.0, 3.0]
     """
-    padded = np.concatenate([np.zeros((*values.shape[:-1], 1)), values, values[..., :width]], axis=-1).cumsum(axis=-1)
-    mean: FloatArray = (padded[..., width:-1] - padded[..., : values.shape[-1]]) / width
-    return mean
+    rows = np.ascontiguousarray(values, dtype=np.float64).reshape(-1, values.shape[-1])
+    mean = np.empty_like(rows)
+    _sliding_means(read_only(rows), width, mean)
+    return mean.reshape(values.shape)
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _sliding_means(rows, width, mean):  # type: ignore[no-untyped-def]
+    n = rows.shape[1]
+    sums = np.zeros(n + width + 1)
+    for r in range(rows.shape[0]):
+        for i in range(n + width):
+            sums[i + 1] = sums[i] + rows[r, i % n]
+        for i in range(n):
+            mean[r, i] = (sums[i + width] - sums[i]) / width
 
 
 def strongest_window(energies: FloatArray) -> tuple[int, float]:

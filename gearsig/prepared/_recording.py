@@ -25,9 +25,9 @@ from gearsig.orders import (
 )
 from gearsig.prepared._angle import phase_followed_angle, refined_angle
 from gearsig.prepared._lines import LinesOverFloor, lines_over_noise_floor
-from gearsig.recording import Recording, check_recording
+from gearsig.recording import ChannelProblem, Recording, check_recording, find_problems
 from gearsig.rig import PulseTimes, Rig, TachometerChannel, check_rig, known_ratio
-from gearsig.spectra import Spectrum, amplitude_spectrum, fast_length, power_density
+from gearsig.spectra import Spectrum, amplitude_spectrum, fast_length, joined_ends, power_density
 
 T = TypeVar("T")
 
@@ -122,6 +122,11 @@ class PreparedRecording:
         if isinstance(kept, GearsigError):
             raise kept.with_traceback(None)
         return kept  # type: ignore[no-any-return]  # of the type that `compute` returns
+
+    @property
+    def problems(self) -> tuple[ChannelProblem, ...]:
+        """What is wrong with the samples of vibration channels, see `gearsig.recording.find_problems`."""
+        return self.keep("problems", lambda: find_problems(self.recording))
 
     # Angles: small, and asked for by everything.
 
@@ -261,6 +266,16 @@ class PreparedRecording:
         from scipy.fft import rfft
 
         return self.keep(("transform", channel), lambda: read_only(rfft(self.fast_part.values(channel))))
+
+    def joined_transform(self, channel: str) -> NDArray[np.complexfloating]:
+        """Return the `rfft` of the channel with its ends joined, from which bands are cut, see `joined_ends`."""
+        from scipy.fft import rfft
+
+        values = self.fast_part.values(channel)
+        joined = joined_ends(values)
+        if joined is values:
+            return self.transform(channel)
+        return self.keep(("joined transform", channel), lambda: read_only(rfft(joined)))
 
     def spectrum(self, channel: str) -> Spectrum:
         """Return the amplitude spectrum (peak) over frequency, of `fast_part`."""

@@ -10,7 +10,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.checks import FloatArray
+from gearsig.checks import FloatArray, read_only
+from gearsig.compiled import njit
 from gearsig.formatting import counted, percent, signed
 from gearsig.peaks import parabola_vertex
 from gearsig.recording._types import Channel, Recording
@@ -79,7 +80,8 @@ def find_clipping(x: FloatArray, levels: SampleLevels, *, rest: float | None = N
     sides: it was cut, not rounded. Two tests per end of the range look for such runs; either is enough.
 
     - *Held samples.* Runs of samples equal to the extreme, w being one step of the converter. They must hold three
-      times as many samples as the next step below, as no noise does.
+      times as many samples as the next step below, as no noise does. Or the extreme holds a thousandth of the samples
+      and ten times as many as any value between both, where a fast signal meets it in single ones.
     - *Pile-up.* Runs in the last 0.5 % of the range, w. That band must hold 6 times as many samples as the 0.5 %
       before. Near a parabolic maximum, time goes with the square root of the distance from it, so that this ratio
       is at most
@@ -124,7 +126,15 @@ def _n_held(distance: FloatArray, levels: SampleLevels) -> int:
     min_run = MIN_RUN if np.count_nonzero(held) < 20.0 * usual else 2
     n = _n_in_cornered_runs(held, distance, q, min_run)
     n_next = int(np.count_nonzero((distance > 0) & (distance <= 1.5 * q)))
-    return int(np.count_nonzero(held)) if n > 3.0 * n_next else 0
+    n_held = int(np.count_nonzero(held))
+    if n > 3.0 * n_next:
+        return n_held
+    # A fast signal meets a limit in single samples, but no other value comes anywhere near as often.
+    if n_held < max(20.0, 1e-3 * len(held), 20.0 * usual):
+        return 0
+    places = np.rint(distance * (1e6 / float(distance.max())))  # values of a tone differ by their rounding
+    _, counts = np.unique(places[(places > 0) & (places < 1e6)], return_counts=True)
+    return n_held if n_held > 10.0 * counts.max(initial=0) else 0
 
 
 def _n_piled(distance: FloatArray, span: float, step: float | None) -> int:
@@ -188,6 +198,16 @@ class ChannelProblem:
         """What is the matter, in a sentence."""
         return _TITLES.get(self.kind, "Channel {} is {}.").format(self.channel, self.kind)
 
+    @property
+    def text(self) -> str:
+        """The title with its evidence, as the beginning of a sentence."""
+        return f"{self.title.rstrip('.')} ({self.evidence})"
+
+    @property
+    def is_grave(self) -> bool:
+        """Whether levels and lines may be wrong for it, which an offset or few levels hardly touch."""
+        return self.kind not in ("offset", "quantised")
+
 
 _TITLES = {
     "wrapped": "Channel {} has overflowed: its values wrap around.",
@@ -226,7 +246,7 @@ def find_problems(recording: Recording) -> tuple[ChannelProblem, ...]:
         In the order of the channels; empty if nothing was found. Fewer than 64 samples are judged for "dead" only.
     """
     problems: list[ChannelProblem] = []
-    spreads = {c.name: float(np.std(recording.values(c.name), dtype=np.float64)) for c in recording.channels}
+    spreads = {c.name: float(_standard_deviation(read_only(recording.values(c.name)))) for c in recording.channels}
     for channel in recording.channels:
         if channel.is_vibration:
             other_spreads = [spreads[c.name] for c in recording.channels if _is_comparable(c, channel)]
@@ -235,6 +255,19 @@ def find_problems(recording: Recording) -> tuple[ChannelProblem, ...]:
                 continue
             problems += _further_problems(channel, recording.values(channel.name), recording.sampling_rate_hz)
     return tuple(problems)
+
+
+@njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz"})  # type: ignore[untyped-decorator,unused-ignore]
+def _standard_deviation(x):  # type: ignore[no-untyped-def]
+    """Divisor N, in double precision."""
+    total, squares = 0.0, 0.0
+    for i in range(x.shape[0]):
+        total += x[i]
+    mean = total / x.shape[0]
+    for i in range(x.shape[0]):
+        deviation = x[i] - mean
+        squares += deviation * deviation
+    return np.sqrt(squares / x.shape[0])
 
 
 def _is_comparable(candidate: Channel, channel: Channel) -> bool:
@@ -383,7 +416,9 @@ def _wrapped(channel: Channel, x: FloatArray) -> ChannelProblem | None:
     # Values that wrap around fill the range up to both ends; those of a natural signal thin out towards them.
     place = (x - low) / span
     outer, next_to = (np.count_nonzero(np.abs(place - 0.5) > 0.5 - edge) for edge in (0.01, 0.05))
-    if not 0.08 * next_to <= outer <= 0.5 * next_to or outer < 20:  # more of them at the ends were cut
+    held = np.count_nonzero((x == low) | (x == high))
+    # More of them at the ends, or at one value there, were cut.
+    if not 0.08 * next_to <= outer <= 0.5 * next_to or outer < 20 or held > 0.5 * outer:
         return None
     # Uniform noise fills it evenly, and goes from end to end as well.
     is_even = np.median(neighbour_steps) > 0.6 and np.count_nonzero(np.abs(place - 0.5) < 0.05) < 3 * next_to
@@ -427,11 +462,13 @@ they show the direction of time; how many of them. Of 26 measured channels the l
 
 def _reversed(channel: Channel, x: FloatArray, rate_hz: float) -> ChannelProblem | None:
     """Look for impacts that swell and end suddenly: by the energy beside their peaks, then by the envelope's steps."""
+    from scipy.fft import rfft
+
     top_hz = 0.45 * rate_hz
     if channel.quantity not in _OFFSET_QUANTITIES or top_hz < 1000.0:
         return None
     x = np.asarray(x[: 1 << int(np.log2(min(len(x), LONGEST_TURNED)))], dtype=np.float64)
-    spectrum, frequency = np.fft.fft(x - x.mean()), np.fft.fftfreq(len(x), 1.0 / rate_hz)
+    spectrum, frequency = rfft(x - x.mean()), np.fft.rfftfreq(len(x), 1.0 / rate_hz)
     ratio, errors = _energy_after_peaks(spectrum, frequency, top_hz, max(2, int(LASTS_S * rate_hz)))
     evidence = ""
     if ratio < -CLEAR_LOG_RATIO and errors < -CLEAR_ERRORS:
@@ -457,7 +494,7 @@ def _energy_after_peaks(
     """
     from scipy.ndimage import maximum_filter1d
 
-    power = np.abs(np.fft.ifft(np.where((frequency > 300.0) & (frequency < top_hz), 2.0 * spectrum, 0.0))) ** 2
+    power = _power_within(spectrum, frequency, 300.0, top_hz)
     is_peak = (power > 8.0 * power.mean()) & (power == maximum_filter1d(power, 8 * n_ring + 1))
     peaks = np.flatnonzero(is_peak)
     peaks = peaks[(peaks > n_ring) & (peaks < len(power) - n_ring - 1)]
@@ -477,15 +514,19 @@ def _sudden_ends(spectrum: NDArray[np.complexfloating], frequency: FloatArray, r
     resonances that are struck it is positive. It is taken in four bands above 300 Hz, and by what 32 parts scatter.
     """
     edges = [300.0 * (top_hz / 300.0) ** (i / 4) for i in range(5)]
-    skews, scores = [], []
-    for low, high in pairwise(edges):
-        envelope = np.abs(np.fft.ifft(np.where((frequency > low) & (frequency < high), 2.0 * spectrum, 0.0)))
-        steps = np.diff(envelope[:: max(1, int(rate_hz / (high - low)))])
+    total = float(np.mean(spectrum.real**2 + spectrum.imag**2)) / len(frequency)
+    skews, scores = np.zeros(4), np.zeros(4)
+    for i, (low, high) in enumerate(pairwise(edges)):
+        power = _power_within(spectrum, frequency, low, high)
+        steps = np.diff(np.sqrt(power[:: max(1, int(rate_hz / (high - low)))]))
+        # Too few, or rounding errors of a tone elsewhere, as a simulation has them.
+        if len(steps) < 32 or float(power.mean()) <= 1e-10 * total:
+            continue
         parts = steps[: len(steps) // 32 * 32].reshape(32, -1)
         scale = float(np.mean(parts**2)) ** 1.5
         cubes = np.mean(parts**3, axis=1) / scale if scale > 0 else np.zeros(32)
-        skews.append(float(cubes.mean()))
-        scores.append(skews[-1] / max(float(np.std(cubes, ddof=1)) / 32**0.5, 1e-12))
+        skews[i] = cubes.mean()
+        scores[i] = skews[i] / max(float(np.std(cubes, ddof=1)) / 32**0.5, 1e-12)
     # Strikes that overlap beat and may rise faster than they fall in one band: of some 25 measured channels the lowest
     # is -0.5 (11 standard errors), beside 0.5 in the next band. Time runs one way in all bands: one that rings down
     # speaks against it.
@@ -499,13 +540,32 @@ def _sudden_ends(spectrum: NDArray[np.complexfloating], frequency: FloatArray, r
     )
 
 
+def _power_within(
+    spectrum: NDArray[np.complexfloating], frequency: FloatArray, low_hz: float, high_hz: float
+) -> FloatArray:
+    """Return |z|² of the band between two frequencies, from the `rfft` of an even number of samples."""
+    from scipy.fft import ifft
+
+    first, last = np.searchsorted(frequency, low_hz, side="right"), np.searchsorted(frequency, high_hz)
+    lines = np.zeros(2 * (len(frequency) - 1), dtype=np.complex128)
+    lines[first:last] = 2.0 * spectrum[first:last]
+    z = ifft(lines, overwrite_x=True)
+    power: FloatArray = z.real**2
+    power += z.imag**2
+    return power
+
+
 def _hum(channel: Channel, x: FloatArray, rate_hz: float) -> ChannelProblem | None:
+    from scipy.fft import rfft
+
     n = 1 << int(np.log2(min(len(x), 4 * LONGEST_TURNED)))
     window = np.hanning(n)
-    spectrum = np.abs(np.fft.rfft((x[:n] - np.mean(x[:n], dtype=np.float64)) * window))
-    i, step_hz = int(np.argmax(spectrum[1:-1])) + 1, rate_hz / n
-    line_hz = (i + float(parabola_vertex(*spectrum[i - 1 : i + 2])[0])) * step_hz
-    share = float(np.sum(spectrum[max(i - 2, 0) : i + 3] ** 2) / max(float(np.sum(spectrum**2)), 1e-300))
+    lines = rfft((x[:n] - np.mean(x[:n], dtype=np.float64)) * window, overwrite_x=True)
+    power = lines.real**2
+    power += lines.imag**2
+    i, step_hz = int(np.argmax(power[1:-1])) + 1, rate_hz / n
+    line_hz = (i + float(parabola_vertex(*np.sqrt(power[i - 1 : i + 2]))[0])) * step_hz
+    share = float(np.sum(power[max(i - 2, 0) : i + 3]) / max(float(np.sum(power)), 1e-300))
     for mains_hz in MAINS_HZ:
         multiple = round(line_hz / mains_hz)
         deviation = abs(line_hz / (max(multiple, 1) * mains_hz) - 1)

@@ -316,7 +316,9 @@ def rate_of_time(
     jitters, roundings = _jitters_by_rounding(values, t, jitter)
     is_uniform = bool(np.all(jitters <= np.maximum(0.01 * step, 0.51 * roundings)))
     coarsest = float(roundings.max())
-    if steps[i] < 0 or (steps[i] == 0 and not (is_uniform and coarsest <= MAX_ROUNDING * span)):
+    # Stamps that were rounded lie one rounding apart where they are not equal; rows that are doubled lie farther.
+    hides_none = is_uniform and coarsest <= MAX_ROUNDING * span and steps.max() < 1.5 * max(coarsest, step)
+    if steps[i] < 0 or (steps[i] == 0 and not hides_none):
         raise InputError(
             f"time does not increase at {row_place(i + 1)}: {t[i]:.9g} is followed by {t[i + 1]:.9g}",
             where=where,

@@ -667,7 +667,10 @@ def ring_picture(analysis: Analysis, picture: VerdictPicture) -> Picture:
     marks = plot.marks_of(analysis.findings, shaft, teeth)
     seen = f"; marked: {', '.join(mark.label for mark in marks)}" if marks else ""
     look = "healthy teeth draw an even ring, a damaged one swings out"
-    look = look if teeth else "what leaves the ring comes back at that angle every turn"
+    if average.kind == "change":
+        look = "what differs from the reference at the same teeth; a tooth that has changed swings out of the ring"
+    elif not teeth:
+        look = "what leaves the ring comes back at that angle every turn"
     return Picture.of_svg(
         plot.svg_ring(average, n_teeth=teeth, marks=marks, numbered=analysis.has_mark(shaft)),
         f"{shaft or 'The shaft'}: {look}. {zero_text(analysis, shaft)}",

@@ -12,7 +12,7 @@ from gearsig.checks import FloatArray, instance_of, listed, positive, within
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import percent
 from gearsig.prepared import PreparedRecording, prepare
-from gearsig.recording import Recording, check_recording
+from gearsig.recording import ChannelProblem, Recording, check_recording
 from gearsig.rig import GearPair, Rig
 from gearsig.severity._features import (
     DB_OF_LOG_ENERGY,
@@ -546,19 +546,26 @@ def estimate_crack(
     now = pair_lines(prepared, None, facts.pair, names)
     used.check_reach(reach_of(facts, now[0].order_hz * facts.driver_teeth))
     healthy = None
-    turned: tuple[str, ...] = ()
+    doubts = [f"{p.text}; place and depth may be wrong for it." for p in _grave(prepared, names)]
     if reference is not None:
         before = prepare(reference, prepared.rig)
         acceleration_channels(before.recording, names, "of the reference ")
         check_same_rig(prepared.rig, before.rig)
         healthy = pair_lines(before, None, facts.pair, names)
         check_same_level(now, healthy)
+        doubts += [f"The reference: {p.text}; place and depth may be wrong for it." for p in _grave(before, names)]
         turned = reversed_channels(now[0], healthy[0], whole_teeth=_is_marked(now, healthy))
-        healthy = tuple(shaft.turned_about(turned) for shaft in healthy) if turned else healthy
+        if turned:
+            healthy = tuple(shaft.turned_about(turned) for shaft in healthy)
+            doubts.append(reversed_text(turned))
     evidence = gear_evidence(now, healthy, facts.module_mm, facts.load_mpa, tip_relief_um)
     way = ALONE if reference is None else WITH_REFERENCE
     answer = judge(evidence, used.models[way + ("" if tip_relief_um is None else RELIEF_KNOWN)], used, facts)
-    return replace(answer, reasons=(*answer.reasons, reversed_text(turned))) if turned else answer
+    return replace(answer, reasons=(*answer.reasons, *doubts)) if doubts else answer
+
+
+def _grave(prepared: PreparedRecording, names: Sequence[str]) -> list[ChannelProblem]:
+    return [problem for problem in prepared.problems if problem.channel in names and problem.is_grave]
 
 
 def reach_of(facts: PairFacts, mesh_hz: float) -> dict[str, float]:

@@ -26,6 +26,7 @@ from gearsig.spectra._deconvolution import (
     multipoint_norms,
 )
 from gearsig.spectra._envelope import (
+    BEYOND_THE_ENDS,
     LARGEST_SLIP,
     PERIODS_OF_EDGE,
     BandChoice,
@@ -35,9 +36,12 @@ from gearsig.spectra._envelope import (
     band_envelope,
     coherence_band,
     compare_bands,
+    continuations,
     edged_band,
     envelope_recording,
     envelope_spectrum,
+    joined_ends,
+    joined_length,
     kurtogram_envelope,
 )
 from gearsig.spectra._kurtogram import BandCandidate, Kurtogram, kurtogram, splitter
@@ -65,6 +69,7 @@ from gearsig.spectra._types import (
 
 __all__ = [
     "BATCH_SAMPLES",
+    "BEYOND_THE_ENDS",
     "LARGEST_SLIP",
     "PERIODS_OF_EDGE",
     "WINDOW_NAMES",
@@ -92,12 +97,15 @@ __all__ = [
     "checked_signal",
     "coherence_band",
     "compare_bands",
+    "continuations",
     "edged_band",
     "enhanced_envelope",
     "envelope_recording",
     "envelope_spectrum",
     "fast_length",
     "find_lines",
+    "joined_ends",
+    "joined_length",
     "kurtogram",
     "kurtogram_envelope",
     "lifter_families",

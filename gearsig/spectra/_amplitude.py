@@ -9,6 +9,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from gearsig.checks import FloatArray, one_of, positive, within
+from gearsig.compiled import njit
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Recording
 from gearsig.spectra._types import (
@@ -302,10 +303,32 @@ def _running_quantile(power: FloatArray, block: int, q: float) -> FloatArray:
     x = np.concatenate([[c for _, c in below], centres, [c for _, c in above]])
     y = np.concatenate([[v for v, _ in below], levels, [v for v, _ in above]])
     # Zeros (a dead segment of a simulated spectrum) have no logarithm; the smallest positive double stands for them.
-    logs = np.log(np.maximum(y, np.finfo(np.float64).tiny))
     order = np.argsort(x, kind="stable")
-    result: FloatArray = np.exp(np.interp(np.arange(n), x[order], logs[order]))
+    result = np.empty(n)
+    _join_levels(x[order], np.log(np.maximum(y, np.finfo(np.float64).tiny))[order], result)
     return result
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _join_levels(x, logs, levels):  # type: ignore[no-untyped-def]
+    """`exp(interp(…))` at 0, 1, … of straight lines between ascending points; level beyond either end.
+
+    Between two points each level is the one before times a factor; from the start of every 64 by `exp` itself, so that
+    rounding errors do not add up.
+    """
+    begin, last = 0, len(x) - 1
+    for i in range(-1, len(x)):
+        end = len(levels) if i == last else min(len(levels), int(np.floor(x[i + 1])) + 1)
+        slope = 0.0 if i < 0 or i == last or x[i + 1] <= x[i] else (logs[i + 1] - logs[i]) / (x[i + 1] - x[i])
+        at = max(i, 0)
+        factor = np.exp(slope)
+        for k in range(begin, end):
+            if (k - begin) % 64 == 0:
+                level = np.exp(logs[at] + slope * (k - x[at]))
+            else:
+                level *= factor
+            levels[k] = level
+        begin = max(begin, end)
 
 
 def _quantiles(rows: FloatArray, q: float) -> FloatArray:

@@ -11,7 +11,8 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.checks import FloatArray, count, freeze, limits, one_of, positive, within
+from gearsig.checks import FloatArray, count, freeze, limits, one_of, positive, read_only, within
+from gearsig.compiled import njit
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Channel, Recording
 from gearsig.results import Result
@@ -83,8 +84,8 @@ def band_envelope(
     edge_fraction : float
         0 (brick wall) to 0.5: part of the band that each edge takes.
     unit, source : str
-    transform : array, (n_samples // 2 + 1,), or None
-        The signal's `rfft`, where several bands of one signal are wanted.
+    transform : array or None
+        The `rfft` of `joined_ends` of the signal, where several bands of one signal are wanted.
     highest_hz : float or None
         Highest modulation of interest: a magnitude that is sampled much faster than that needs may come at three times
         this frequency, without what is faster.
@@ -100,25 +101,32 @@ def band_envelope(
 
     Notes
     -----
-    The transform takes the signal as periodic: within about 1/bandwidth of either end the envelope mixes both ends.
-    The band must be wider than the modulation sought.
+    The transform takes the signal as periodic: within about 1/bandwidth of either end the envelope mixes both ends, or
+    where these do not meet, each with its continuation, see `joined_ends`. The band must be wider than the modulation
+    sought.
 
     References
     ----------
     R. B. Randall and J. Antoni, "Rolling element bearing diagnostics – a tutorial", 2011.
     """
+    from scipy.fft import rfft
+
     x, fs, unit, source = named_signal(signal, channel_or_rate_hz, unit, source, minimum=8)
     one_of(kind, "kind", get_args(EnvelopeKind))
     within(edge_fraction, "edge_fraction", 0.0, 0.5)
-    first, last = _band_lines(band_hz, fs, len(x))
+    _band_lines(band_hz, fs, len(x))  # refuses early
     blocks = None
     if highest_hz is not None and kind == "magnitude" and edge_fraction > 0:
-        blocks = _Blocks.of(band_hz, fs, edge_fraction, positive(highest_hz, "highest_hz", "Hz"))
-    if blocks is not None and blocks.pay(len(x), transform is not None):
+        blocks = _Blocks.of(band_hz, fs, edge_fraction, positive(highest_hz, "highest_hz", "Hz"), len(x))
+    if blocks is not None and blocks.pay(has_transform=transform is not None):
         values, rate_hz = blocks.magnitude(x), fs * blocks.n_out / blocks.n
     else:
-        z = _complex_envelope(x, first, last, edge_fraction, 2 if kind == "squared" else 4, transform)
-        values, rate_hz = z.real**2 + z.imag**2, fs * len(z) / len(x)
+        known = rfft(joined_ends(x.astype(np.float64))) if transform is None else transform
+        n = joined_length(len(x), len(known))
+        z = _complex_envelope(known, n, *_band_lines(band_hz, fs, n), edge_fraction, 2 if kind == "squared" else 4)
+        rate_hz = fs * len(z) / n
+        z = z[: len(x) * len(z) // n]
+        values = z.real**2 + z.imag**2
         if kind == "magnitude":
             np.sqrt(values, out=values)
     return Envelope(
@@ -200,7 +208,7 @@ def envelope_recording(
 
     It is what angular resampling takes to give an envelope spectrum over order. The speed source is dropped, since
     pulses do not survive the lower rate: find the shaft angle on the original. `transforms` holds the `rfft` of each
-    channel, where several bands of one recording are wanted; `highest_hz` is as of `band_envelope`.
+    channel's `joined_ends`, where several bands of one recording are wanted; `highest_hz` is as of `band_envelope`.
     """
     names = tuple(channels) if channels is not None else recording.vibration_names()
     if not names:
@@ -252,20 +260,93 @@ def _band_lines(band_hz: tuple[float, float], fs: float, n: int) -> tuple[int, i
 
 
 def _complex_envelope(
-    x: FloatArray, first: int, last: int, edge_fraction: float, oversampling: int, transform: ComplexArray | None
+    known: ComplexArray, n: int, first: int, last: int, edge_fraction: float, oversampling: int
 ) -> ComplexArray:
-    """Return the band's complex envelope with about `oversampling` samples per line of the band."""
-    from scipy.fft import ifft, next_fast_len, rfft
+    """Return the band's complex envelope with about `oversampling` samples per line of the band, from n's `rfft`."""
+    from scipy.fft import ifft, next_fast_len
 
-    n, n_band = len(x), last - first + 1
+    n_band = last - first + 1
     m = next_fast_len(oversampling * n_band + 1)
-    known = rfft(x.astype(np.float64)) if transform is None else transform
     lines = np.zeros(m, dtype=known.dtype)
     lines[:n_band] = known[first : last + 1]
     lines[:n_band] *= band_taper(n_band, edge_fraction)
     z: ComplexArray = ifft(lines, overwrite_x=True)
     z *= 2.0 * m / n
     return z
+
+
+BEYOND_THE_ENDS = 2048
+"""Samples by which a record is continued at either end."""
+
+
+def continuations(values: FloatArray, n_beyond: int = BEYOND_THE_ENDS) -> tuple[FloatArray, FloatArray]:
+    """Return what a record is taken for before its beginning and after its end: its reflections there, which fade.
+
+    The reflections are odd, 2 x₀ - x₋ₖ, so that neither value nor slope has a step. A transform of the record alone
+    takes its end for what comes before its beginning. Where a strong slow line, such as hum, or a drift differs in the
+    two, that step is a click in every band: impulsive noise that nobody recorded.
+
+    Parameters
+    ----------
+    values : array, (n_samples,)
+    n_beyond : int
+        Below the number of samples.
+
+    Returns
+    -------
+    (array, array)
+        Each (n_beyond,), in the order of time.
+    """
+    rise = np.sin(0.5 * np.pi * np.arange(1, n_beyond + 1) / (n_beyond + 1)) ** 2
+    before = (2.0 * values[0] - values[n_beyond:0:-1]) * rise
+    after = (2.0 * values[-1] - values[-2 : -n_beyond - 2 : -1]) * rise[::-1]
+    return before, after
+
+
+def joined_ends(values: FloatArray) -> FloatArray:
+    """Return a record whose end meets its beginning, as a transform takes it: itself, or with its continuations.
+
+    Itself where the step from its end to its beginning is no larger than any within it: what is periodic stays so. Else
+    the continuation follows it, and at last comes that before it; sample 0 stays where it is. The length, then
+    `joined_length`, is one that transforms fast.
+
+    Parameters
+    ----------
+    values : array, (n_samples,)
+
+    Returns
+    -------
+    array, (n,)
+        In the precision of the values.
+    """
+    if not _has_step(read_only(values)):
+        return values
+    before, after = continuations(values, min(BEYOND_THE_ENDS, len(values) - 1))
+    joined = np.zeros(_continued_length(len(values)), dtype=values.dtype)
+    joined[: len(values)] = values
+    joined[len(values) : len(values) + len(after)] = after
+    joined[len(joined) - len(before) :] = before
+    return joined
+
+
+def joined_length(n_samples: int, n_lines: int) -> int:
+    """Return of how many samples a transform of `joined_ends` is, from its number of lines."""
+    return n_samples if n_lines == n_samples // 2 + 1 else _continued_length(n_samples)
+
+
+def _continued_length(n_samples: int) -> int:
+    from scipy.fft import next_fast_len
+
+    return int(next_fast_len(n_samples + 2 * min(BEYOND_THE_ENDS, n_samples - 1), real=True))
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _has_step(x):  # type: ignore[no-untyped-def]
+    """Whether the step from the end of a record to its beginning is larger than any within it."""
+    largest = 0.0
+    for i in range(1, x.shape[0]):
+        largest = max(largest, abs(x[i] - x[i - 1]))
+    return abs(x[0] - x[x.shape[0] - 1]) > largest
 
 
 PERIODS_OF_EDGE = 50
@@ -315,10 +396,15 @@ class _Blocks:
     low_pass: FloatArray
 
     @classmethod
-    def of(cls, band_hz: tuple[float, float], fs: float, edge_fraction: float, highest_hz: float) -> _Blocks:
+    def of(
+        cls, band_hz: tuple[float, float], fs: float, edge_fraction: float, highest_hz: float, n_samples: int
+    ) -> _Blocks | None:
+        """Return None where fewer than eight blocks make the signal; of a slow machine, one may be longer than that."""
         edge_hz = edge_fraction * (band_hz[1] - band_hz[0])
         ringing = PERIODS_OF_EDGE * fs * (1.0 / edge_hz + 1.0 / highest_hz)
         n = 1 << max(13, int(np.ceil(np.log2(8 * ringing))))
+        if 8 * n > n_samples:
+            return None
         hertz = np.arange(n // 2) * fs / n
         lines, response = edged_band(hertz, band_hz, edge_hz)
         n_band, n_out = (_multiple_of_eight(k) for k in (4 * len(lines) + 1, 3 * highest_hz * n / fs))
@@ -326,10 +412,9 @@ class _Blocks:
         slow = np.clip(2.0 - hertz[: n_out // 2 + 1] / highest_hz, 0.0, 1.0)
         return cls(n, n_band, n_out, int(lines[0]), response, np.sin(np.pi / 2 * slow) ** 2)
 
-    def pay(self, n_samples: int, has_transform: bool) -> bool:
+    def pay(self, *, has_transform: bool) -> bool:
         """Whether blocks cost less than transforms of all samples; a narrow band of a known transform does not."""
-        is_slow = self.n_band > (2 if has_transform else 1) * self.n_out and 2 * self.n_out <= self.n
-        return is_slow and 8 * self.n <= n_samples
+        return self.n_band > (2 if has_transform else 1) * self.n_out and 2 * self.n_out <= self.n
 
     def magnitude(self, x: FloatArray) -> FloatArray:
         """Return the low-passed magnitude, `n_out` samples for `n` of the signal, computed in the signal's precision.
@@ -339,7 +424,8 @@ class _Blocks:
         from scipy.fft import ifft, irfft, rfft
 
         step, side = 3 * self.n // 4, self.n // 8
-        joined = np.concatenate([x[-side:], x, x[: self.n]])
+        before, after = continuations(x, side) if _has_step(read_only(x)) else (x[-side:], x[: self.n])
+        joined = np.concatenate([before, x, after, np.zeros(self.n)], dtype=x.dtype, casting="same_kind")
         blocks = np.lib.stride_tricks.sliding_window_view(joined, self.n)[: len(x) : step]
         inner = slice(self.n_out // 8, 7 * self.n_out // 8)
         values = np.empty((len(blocks), 3 * self.n_out // 4))

@@ -73,6 +73,15 @@ def test_a_shift_is_found_by_correlation(shift_deg: float) -> None:
     assert found.channels[0].shafts[0].correlation.value > 0.99
 
 
+def test_a_clipped_channel_is_told() -> None:
+    simulated, recorded = gear_record(seed=1), gear_record(seed=2)
+    limit = float(np.quantile(np.abs(recorded.values(recorded.vibration_names()[0])), 0.95))
+    cut = recorded.samples.copy()
+    cut[0] = np.clip(cut[0], -limit, limit)
+    notes = compare(simulated, replace(recorded, samples=cut)).notes
+    assert sum("clipped" in note and note.startswith("The recording") for note in notes) == 1
+
+
 def test_marks_are_trusted_and_a_better_shift_is_told() -> None:
     simulated, recorded = gear_record(seed=1), gear_record(shift_rev=0.1)
     found = compare(simulated, recorded)

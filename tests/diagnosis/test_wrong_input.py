@@ -98,6 +98,23 @@ def test_spoiled_is_noticed_said_and_lowered(name):
     assert any(seen[code].title in found.verdict for code in problems) or not problems
 
 
+@pytest.mark.parametrize("has_nominal", [True, False])
+def test_a_speed_of_no_machine_is_said(has_nominal):
+    point = TRUE.rig.operating_point if has_nominal else OperatingPoint()
+    fast = replace(TRUE, sampling_rate_hz=1000 * RATE, rig=replace(TRUE.rig, operating_point=point))
+    found = analyze(fast)
+    assert [f.code for f in found.findings if f.kind is Kind.DATA_PROBLEM].count("speed-off-nominal") == 1
+    assert not [f for f in found.findings if f.kind is Kind.FAULT]
+
+
+@pytest.mark.parametrize("rpm", [0.0015, 1.5, 25.0, 60.0])
+def test_a_speed_stated_far_too_low_is_said_and_no_error(rpm):
+    """As of rev/s that are called rpm, or of pulse times in milliseconds: the record holds a turn or less."""
+    found = analyze(replace(TRUE, speed=ConstantSpeed(rpm, "input")))
+    assert "speed-off-nominal" in {f.code for f in found.findings}
+    assert not [f for f in found.findings if f.kind is Kind.FAULT]
+
+
 @pytest.mark.slow
 def test_a_stop_or_a_reversal_is_noticed_without_a_tachometer():
     """A stated speed, and one that most of the record shows, know nothing of it."""

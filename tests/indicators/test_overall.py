@@ -85,6 +85,18 @@ def test_high_frequencies_show_impacts() -> None:
     assert loud["high-frequency crest factor"] > 1.5 * quiet["high-frequency crest factor"]
 
 
+@pytest.mark.parametrize("drift", ["ramp", "decay", "hum"])
+def test_a_slow_signal_whose_ends_do_not_meet_is_no_impact(drift: str) -> None:
+    """A sine has the kurtosis 3/2 and the rms 1/√2, whatever slow signal, a thousand times as strong, it rides on."""
+    time_s = np.arange(100_000) / FS_HZ
+    slow = {"ramp": time_s / time_s[-1], "decay": np.exp(-time_s), "hum": np.sin(2 * np.pi * 50.13 * time_s + 0.3)}
+    x = np.sin(2 * np.pi * 2000.0 * time_s) + 1e3 * slow[drift]
+    values = {i.name: i.value for i in overall_indicators(x, FS_HZ, ACCELERATION)}
+    assert values["high-frequency kurtosis"] == pytest.approx(1.5, abs=1e-3)
+    assert values["high-frequency rms"] == pytest.approx(0.5**0.5, rel=1e-3)
+    assert values["high-frequency crest factor"] < 3.0
+
+
 @pytest.mark.parametrize(
     ("group", "mounting", "boundaries"),
     [

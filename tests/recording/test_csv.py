@@ -256,3 +256,11 @@ def test_export_with_events_above_the_table(tmp_path, decimal):
     r = read_recording(write(tmp_path / "x.txt", [*head, "Time (s)\tAI 1 (m/s2)\tAI 2 (V)", *numbers]))
     assert [(c.name, c.unit) for c in r.channels] == [("AI 1", "m/s2"), ("AI 2", "V")]
     assert r.sampling_rate_hz == 25600
+
+
+def test_rows_that_stand_twice_are_no_rounded_time(tmp_path):
+    time_s = np.repeat(np.arange(0, 2000, 2) / 1e4, 2)
+    path = tmp_path / "doubled.csv"
+    path.write_text("time,a1\n" + "".join(f"{t:.4f},{np.sin(300 * t):.6f}\n" for t in time_s))
+    with pytest.raises(InputError, match=r"line 3.*doubled"):
+        read_recording(path)

@@ -121,3 +121,19 @@ def test_other_quantities_are_not_looked_at():
 def test_short_recordings():
     assert kinds(np.array([1.0, 2.0])) == []
     assert kinds(np.array([1.0])) == [("a0", "dead")]
+
+
+@pytest.mark.parametrize("share", [0.02, 0.05, 0.2])
+@pytest.mark.parametrize("step", [None, 1e-3])
+def test_a_limit_that_a_fast_signal_meets_in_single_samples_is_found(share, step):
+    """Its sign alternates from sample to sample, so that hardly two in a row are cut."""
+    x = np.random.default_rng(5).standard_normal(40_000)
+    x -= 0.9 * np.roll(x, 1)
+    x = x if step is None else np.round(x / step) * step
+    limit = np.quantile(np.abs(x), 1.0 - share)
+    assert kinds(np.clip(x, -limit, limit)) == [("a0", "clipped")]
+    assert not kinds(x)
+
+
+def test_a_tone_has_no_direction_of_time():
+    assert not kinds(np.sin(2 * np.pi * np.arange(64_000) / 8.0 + 0.3))

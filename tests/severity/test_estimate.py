@@ -196,6 +196,18 @@ def test_the_recording_itself_is_no_reference(record: Record) -> None:
         estimate_crack(record(2.0), reference=record(2.0))
 
 
+def test_a_clipped_channel_is_told_of_either_record(record: Record, healthy: Recording) -> None:
+    def cut(recording: Recording) -> Recording:
+        limit = float(np.quantile(np.abs(recording.values("a1")), 0.98))
+        return replace(recording, samples=np.clip(recording.samples, -limit, limit))
+
+    cracked = record(3.0)
+    for now, then in ((cut(cracked), healthy), (cracked, cut(healthy))):
+        reasons = estimate_crack(now, reference=then).reasons
+        assert sum("a1 is clipped" in reason for reason in reasons) == 1
+    assert not any("clipped" in reason for reason in estimate_crack(cracked, reference=healthy).reasons)
+
+
 def test_a_dead_channel_is_refused(record: Record) -> None:
     samples = np.array(record(2.0).samples)
     samples[1] = 0.0

@@ -20,6 +20,15 @@ def test_magnitude_of_an_amplitude_modulated_tone_is_its_amplitude():
     assert envelope.sampling_rate_hz < FS / 5
 
 
+@pytest.mark.parametrize("highest_hz", [None, 1500.0])
+def test_a_drift_whose_ends_do_not_meet_makes_no_click(highest_hz):
+    x = np.sin(2 * np.pi * 5000.0 * np.arange(1 << 18) / 25_600.0) + np.linspace(0.0, 1e3, 1 << 18)
+    envelope = band_envelope(x, 25_600.0, (1859, 11_520), kind="magnitude", highest_hz=highest_hz)
+    assert envelope.values == pytest.approx(1.0, abs=1.0)  # what is cut of the sine itself
+    assert envelope.values[200:-200] == pytest.approx(1.0, abs=0.02)
+    assert (envelope.sampling_rate_hz < 5000.0) == (highest_hz is not None)  # by blocks, or all at once
+
+
 def test_squared_envelope_spectrum_has_the_closed_form_lines():
     spectrum = envelope_spectrum(band_envelope(MODULATED, FS, (2800, 3200), unit="m/s^2"), highest_hz=100.0)
     # 4 (1 + cos/2)² = 4.5 + 4 cos(20 Hz) + 0.5 cos(40 Hz)
@@ -103,3 +112,9 @@ def test_edges_of_a_band_lie_inside_it_and_add_up_to_one_with_their_mirror_image
     rise = response[lines < 300]
     assert rise + rise[::-1] == pytest.approx(1.0)
     assert response == pytest.approx(response[::-1])
+
+
+def test_blocks_for_modulations_slower_than_the_record_are_never_made():
+    """As of a machine whose speed is stated a million times too low: they would not fit into any memory."""
+    envelopes = [band_envelope(MODULATED, FS, (2800, 3200), kind="magnitude", highest_hz=hz) for hz in (None, 1e-6)]
+    assert np.array_equal(envelopes[0].values, envelopes[1].values)
