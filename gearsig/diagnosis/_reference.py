@@ -202,8 +202,8 @@ def beside_reference(
 ) -> list[Finding]:
     """Return the findings, each fault or suspicion with a sentence on what the reference shows of it.
 
-    A suspicion that the healthy machine gives as much reason for is a notice; damage that shows there as strongly is a
-    suspicion, as it is not new, or the reference is not of a healthy machine.
+    A suspicion that the healthy machine gives as much reason for is a notice; damage that shows there as strongly is no
+    more than a suspicion, as it is not new, or the reference is not of a healthy machine.
 
     Parameters
     ----------
@@ -234,7 +234,11 @@ def _beside(finding: Finding, reference: Analysis, measured: LevelChange | None)
     if kind is Kind.SUSPICION and not is_new:
         kind = Kind.NOTICE
     elif kind is Kind.FAULT and earlier is not None and change_db is not None and change_db < MIN_CHANGE_DB / 2:
-        kind, title = Kind.SUSPICION, f"{title.removesuffix('.')}, as strong in the reference: it is not new."
+        # A reference with a fault of its own is not healthy, as is said besides; what it has short of one, healthy
+        # machines have.
+        kind = Kind.SUSPICION if earlier.finding.kind is Kind.FAULT else Kind.NOTICE
+        title = f"{title.removesuffix('.')}, as strong in the reference: it is not new."
+        title = f"Perhaps {title[:1].lower()}{title[1:]}" if kind is Kind.NOTICE else title
     return replace(finding, kind=kind, title=title, evidence=(*finding.evidence, text))
 
 
