@@ -65,6 +65,7 @@ def band_envelope(
     source: str = "",
     transform: ComplexArray | None = None,
     highest_hz: float | None = None,
+    continued: bool | None = None,
 ) -> Envelope:
     """Return the envelope of a frequency band, decimated to what the band needs.
 
@@ -89,6 +90,9 @@ def band_envelope(
     highest_hz : float or None
         Highest modulation of interest: a magnitude that is sampled much faster than that needs may come at three times
         this frequency, without what is faster.
+    continued : bool or None
+        Whether the signal is continued at its ends, so that envelopes of several have one length; None: where its ends
+        do not meet.
 
     Returns
     -------
@@ -121,7 +125,7 @@ def band_envelope(
     if blocks is not None and blocks.pay(has_transform=transform is not None):
         values, rate_hz = blocks.magnitude(x), fs * blocks.n_out / blocks.n
     else:
-        known = rfft(joined_ends(x.astype(np.float64))) if transform is None else transform
+        known = rfft(joined_ends(x.astype(np.float64), continued=continued)) if transform is None else transform
         n = joined_length(len(x), len(known))
         z = _complex_envelope(known, n, *_band_lines(band_hz, fs, n), edge_fraction, 2 if kind == "squared" else 4)
         rate_hz = fs * len(z) / n
@@ -208,12 +212,14 @@ def envelope_recording(
 
     It is what angular resampling takes to give an envelope spectrum over order. The speed source is dropped, since
     pulses do not survive the lower rate: find the shaft angle on the original. `transforms` holds the `rfft` of each
-    channel's `joined_ends`, where several bands of one recording are wanted; `highest_hz` is as of `band_envelope`.
+    channel's `joined_ends`, all or none of them continued, where several bands of one recording are wanted;
+    `highest_hz` is as of `band_envelope`.
     """
     names = tuple(channels) if channels is not None else recording.vibration_names()
     if not names:
         raise InputError("there is no channel to take the envelope of", remedy="name the channels")
     old = [recording.channels[recording.index(name)] for name in names]
+    continued = None if transforms is not None else not all(ends_meet(recording.values(name)) for name in names)
     envelopes = [
         band_envelope(
             recording.values(c.name),
@@ -225,6 +231,7 @@ def envelope_recording(
             source=c.name,
             transform=None if transforms is None else transforms[c.name],
             highest_hz=highest_hz,
+            continued=continued,
         )
         for c in old
     ]
@@ -303,23 +310,30 @@ def continuations(values: FloatArray, n_beyond: int = BEYOND_THE_ENDS) -> tuple[
     return before, after
 
 
-def joined_ends(values: FloatArray) -> FloatArray:
+def ends_meet(values: FloatArray) -> bool:
+    """Whether the step from a record's end to its beginning is no larger than any within it."""
+    return not _has_step(read_only(values))
+
+
+def joined_ends(values: FloatArray, *, continued: bool | None = None) -> FloatArray:
     """Return a record whose end meets its beginning, as a transform takes it: itself, or with its continuations.
 
-    Itself where the step from its end to its beginning is no larger than any within it: what is periodic stays so. Else
-    the continuation follows it, and at last comes that before it; sample 0 stays where it is. The length, then
-    `joined_length`, is one that transforms fast.
+    Itself where they meet of themselves, see `ends_meet`: what is periodic stays so. Else the continuation follows it,
+    and at last comes that before it; sample 0 stays where it is. The length, then `joined_length`, is one that
+    transforms fast.
 
     Parameters
     ----------
     values : array, (n_samples,)
+    continued : bool or None
+        Whether it is continued all the same, or not; None: where its ends do not meet.
 
     Returns
     -------
     array, (n,)
         In the precision of the values.
     """
-    if not _has_step(read_only(values)):
+    if continued is False or (continued is None and ends_meet(values)):
         return values
     before, after = continuations(values, min(BEYOND_THE_ENDS, len(values) - 1))
     joined = np.zeros(_continued_length(len(values)), dtype=values.dtype)
@@ -424,7 +438,7 @@ class _Blocks:
         from scipy.fft import ifft, irfft, rfft
 
         step, side = 3 * self.n // 4, self.n // 8
-        before, after = continuations(x, side) if _has_step(read_only(x)) else (x[-side:], x[: self.n])
+        before, after = (x[-side:], x[: self.n]) if ends_meet(x) else continuations(x, side)
         joined = np.concatenate([before, x, after, np.zeros(self.n)], dtype=x.dtype, casting="same_kind")
         blocks = np.lib.stride_tricks.sliding_window_view(joined, self.n)[: len(x) : step]
         inner = slice(self.n_out // 8, 7 * self.n_out // 8)

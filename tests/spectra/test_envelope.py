@@ -5,6 +5,7 @@ import pytest
 from scipy import signal as scipy_signal
 
 from gearsig.errors import InputError
+from gearsig.prepared import PreparedRecording
 from gearsig.recording import Channel, Provenance, Recording
 from gearsig.spectra import band_envelope, edged_band, envelope_recording, envelope_spectrum
 
@@ -118,3 +119,16 @@ def test_blocks_for_modulations_slower_than_the_record_are_never_made():
     """As of a machine whose speed is stated a million times too low: they would not fit into any memory."""
     envelopes = [band_envelope(MODULATED, FS, (2800, 3200), kind="magnitude", highest_hz=hz) for hz in (None, 1e-6)]
     assert np.array_equal(envelopes[0].values, envelopes[1].values)
+
+
+def test_channels_of_which_one_drifts_have_envelopes_of_one_length() -> None:
+    rng, t = np.random.default_rng(5), np.arange(10_007) / 10_000.0
+    quiet = rng.standard_normal(len(t))
+    both = np.stack([quiet, quiet + 1000.0 * t])
+    recording = Recording(both, 10_000.0, (Channel("a"), Channel("b")))
+    envelopes = envelope_recording(recording, (1000.0, 3000.0))
+    assert envelopes.values("b") == pytest.approx(envelopes.values("a"), abs=0.05 * np.std(envelopes.values("a")))
+    together = PreparedRecording(recording)
+    transforms = {name: together.joined_transform(name) for name in ("a", "b")}
+    again = envelope_recording(recording, (1000.0, 3000.0), transforms=transforms)
+    assert again.samples == pytest.approx(envelopes.samples, rel=1e-6, abs=1e-6)
