@@ -504,7 +504,11 @@ def _beyond_reference(
 
     What is barely suspected in one recording is often just missed in another of the same machine.
     """
-    if alone.reference is None or not any(part.finding.is_claim for part in alone.unexpected):
+
+    def is_asked(finding: Finding) -> bool:
+        return finding.is_claim or finding.code in RACE_EFFECTS  # alone, weak lines of a race are no more than a notice
+
+    if alone.reference is None or not any(is_asked(part.finding) for part in alone.unexpected):
         return alone
     # The prepared one: what its own analysis has resampled and averaged is there.
     reference = next(prepared for prepared in references if prepared.recording is alone.reference.recording)
@@ -513,7 +517,8 @@ def _beyond_reference(
     kept, notes = [], list(alone.notes)
     for part in alone.unexpected:
         finding = now.get((part.finding.code, part.finding.where), part.finding)
-        if part.finding.is_claim and finding.kind is not part.finding.kind:
+        is_less = finding.kind is not part.finding.kind if part.finding.is_claim else not finding.is_claim
+        if is_asked(part.finding) and is_less:
             notes.append(f"{alone.name}: {finding.title.rstrip('.')}. {finding.evidence[-1]}")
         else:
             kept.append(part)

@@ -245,7 +245,7 @@ def test_a_small_window_shows_the_verdict_above_its_picture(page: playwright.Pag
     assert words.bounding_box()["y"] < picture.bounding_box()["y"]
     assert page.evaluate("document.documentElement.scrollWidth") <= 800
     brief = page.locator(".st-key-verdict-brief")
-    for measure in ("19.7 dB over its floor", "≤ 86 % sure"):
+    for measure in ("28.3 dB over its floor", "≤ 86 % sure"):
         assert measure in brief.inner_text().replace("\u00a0", " ")
     page.set_viewport_size({"width": 1280, "height": 900})
     brief.wait_for(state="hidden")
