@@ -23,7 +23,7 @@ from gearsig.diagnosis._types import (
     from_p_value,
     p_text,
 )
-from gearsig.errors import RefusalError
+from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import enumerated, percent, unit_text
 from gearsig.orders import SynchronousAverage, separate, whole_revolutions
 from gearsig.prepared import chance_of_any, has_mark, sliding_mean, strongest_window
@@ -540,37 +540,47 @@ class _Compared:
 def _compared(signals: AnalysisSignals, shaft: ShaftSignals, healthy: AnalysisSignals) -> _Compared | None:
     """Return a shaft beside the healthy machine's; None where the two do not compare."""
     before = next((s for s in healthy.shafts if s.shaft == shaft.shaft), None)
-    names = [n for n in shaft.separated if before is not None and n in before.separated]
-    if before is None or not names:
+    if before is None:
         return None
-    highest = min(s.averages[n].highest_line for s in (shaft, before) for n in names)
-    now, then = _lines_of(signals, shaft, names, highest), _lines_of(healthy, before, names, highest)
+    both = [n for n in shaft.separated if n in before.separated]
+    names = [n for n in both if shaft.averages[n].unit == before.averages[n].unit]
+    highest = min((s.averages[n].highest_line for s in (shaft, before) for n in names), default=0)
+    visible = tuple(z for z in shaft.teeth if z <= highest)
+    if not visible:
+        return None
+    now, then = (_lines_of(g, s, names, highest, visible[0]) for g, s in ((signals, shaft), (healthy, before)))
     on_either = {s for pair in signals.rig.pairs_on(shaft.shaft) for s in (pair.driver, pair.driven)}
     is_marked = any(all(has_mark(g.recording, g.rig, s) for g in (signals, healthy)) for s in on_either)
     then = then.turned_about(reversed_channels(now, then, whole_teeth=is_marked))
+    separated, halves, born = {}, {}, {}
     try:
         changed, agreement = difference_lines(now, then, whole_teeth=is_marked)
-    except RefusalError:  # another speed
+        for name, row, was in zip(names, changed.lines, now.lines - changed.lines, strict=True):
+            average = shaft.averages[name]
+            separated[name], healthy_parts = (
+                separate(replace(average, values=_revolution(lines, len(average.values))), visible)
+                for lines in (row, was)
+            )
+            born[name] = healthy_parts.difference.values
+            # Both halves less the same: the whole healthy average.
+            halves[name] = _within(shaft.halves[name], 0, highest) - born[name]
+    except (RefusalError, InputError):  # another speed, or nothing differs
         return None
-    separated, halves, born = {}, {}, {}
-    for name, row, was in zip(names, changed.lines, now.lines - changed.lines, strict=True):
-        average, visible = shaft.averages[name], tuple(z for z in shaft.teeth if z <= highest)
-        separated[name], healthy_parts = (
-            separate(replace(average, values=_revolution(lines, len(average.values))), visible) for lines in (row, was)
-        )
-        born[name] = healthy_parts.difference.values
-        # Both halves less the same: the whole healthy average.
-        halves[name] = _within(shaft.halves[name], 0, highest) - born[name]
+    if not any(np.any(parts.difference.values) for parts in separated.values()):
+        return None
     return _Compared(replace(shaft, separated=separated, halves=halves), born, agreement)
 
 
-def _lines_of(signals: AnalysisSignals, shaft: ShaftSignals, names: Sequence[str], highest: int) -> ShaftLines:
-    """Return a shaft's averages in the form that the alignment takes; of several gears the first one's teeth count."""
+def _lines_of(
+    signals: AnalysisSignals, shaft: ShaftSignals, names: Sequence[str], highest: int, teeth: int
+) -> ShaftLines:
+    """Return a shaft's averages in the form that the alignment takes, by the teeth of one of its gears."""
     averages = [shaft.averages[name] for name in names]
     lines = np.stack([average.lines()[: highest + 1].astype(np.complex128) for average in averages])
     order_hz, is_marked = shaft.angle.mean_speed_rpm / 60.0, has_mark(signals.recording, signals.rig, shaft.shaft)
-    teeth, n_revolutions = shaft.teeth[0], averages[0].n_revolutions
-    return ShaftLines(shaft.shaft, teeth, teeth, lines, n_revolutions, highest, order_hz, tuple(names), is_marked)
+    return ShaftLines(
+        shaft.shaft, teeth, teeth, lines, averages[0].n_revolutions, highest, order_hz, tuple(names), is_marked
+    )
 
 
 def _revolution(lines: ComplexArray, n_angles: int) -> FloatArray:

@@ -215,3 +215,20 @@ def test_a_reference_at_another_speed_leaves_the_teeth_to_the_recording_alone() 
     analysis = analyze(record(replace(STEADY, tooth_damages=(DAMAGE,))), reference=slower)
     told = finding(analysis, "tooth-local-damage")
     assert "The averages were turned" not in " ".join(told.evidence)
+
+
+def thinned(recording: Recording) -> Recording:
+    """Return every fourth sample, below half of whose rate the gears' vibration lies in part."""
+    return replace(recording, samples=recording.samples[:, ::4], sampling_rate_hz=recording.sampling_rate_hz / 4)
+
+
+def in_g(recording: Recording) -> Recording:
+    """Return the recording with its vibration in another unit."""
+    channels = (replace(recording.channels[0], unit="g"), *recording.channels[1:])
+    return replace(recording, samples=recording.samples / np.array([[9.81], [1.0]]), channels=channels)
+
+
+@pytest.mark.parametrize("otherwise", [thinned, in_g])
+def test_a_reference_recorded_otherwise_makes_no_tooth_of_the_difference(otherwise) -> None:
+    analysis = analyze(knocking_teeth(UNEQUAL), reference=otherwise(knocking_teeth(UNEQUAL, seed=1)))
+    assert "tooth-local-damage" not in codes(analysis)
