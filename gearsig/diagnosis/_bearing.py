@@ -146,7 +146,7 @@ def _named_finding(signals: AnalysisSignals, candidate: Candidate, n_parts: int)
     depth = CLEAR_MODULATION if signals.has_reference else USUAL_MODULATION
     is_weak = candidate.modulation < depth
     if not signals.has_reference:
-        confidence *= min(1.0, candidate.modulation / USUAL_MODULATION)
+        confidence *= float(np.clip(candidate.modulation / USUAL_MODULATION, 0.5, 1.0))
     clear = not (is_open or is_weak) and confidence >= 0.75
     suspected = Kind.SUSPICION if confidence >= WORTH_A_SUSPICION else Kind.NOTICE
 
