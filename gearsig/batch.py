@@ -226,7 +226,7 @@ def _made_of() -> Callable[[_Job], str]:
             files = [state(path) for path in (job.path, beside, reference, then) if path is not None]
         except OSError:
             return ""
-        rig = job.options.rig and vars(job.options.rig)  # its repr is a summary
+        rig = job.options.rig and job.options.rig.key()
         options = repr(vars(job.options) | {"rig": rig})
         parts = [__version__, files, job.name, options, job.is_reference, job.methods]
         return hashlib.sha256(json.dumps(parts).encode("utf-8", "surrogateescape")).hexdigest()

@@ -82,7 +82,11 @@ def choose_view(analysis: Analysis, names: Sequence[str]) -> str:
     chosen = address.chosen(state.TAB, "view", names, first if first in names else names[0])
     angle = analysis.shaft_angle
     speed_rpm = None if isinstance(angle, CannotTell) else angle.mean_speed_rpm  # stated later, it makes more of them
-    items = _tiles(state.view_key(f"tiles {is_dark()} {speed_rpm} {analysis.rig!r}", analysis), tuple(names), analysis)
+    items = _tiles(
+        state.view_key(f"tiles {is_dark()} {speed_rpm} {analysis.rig and analysis.rig.key()}", analysis),
+        tuple(names),
+        analysis,
+    )
     _strip(
         key="strip",
         data={"items": items, "chosen": chosen},

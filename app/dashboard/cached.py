@@ -108,7 +108,7 @@ def _constant(speed_rpm: float | None) -> ConstantSpeed | None:
     return None if speed_rpm is None else ConstantSpeed(speed_rpm)
 
 
-@kept(6, "Reading …", key=lambda request, _, rig=None: (request, repr(rig and vars(rig))))
+@kept(6, "Reading …", key=lambda request, _, rig=None: (request, rig and rig.key()))
 def recorded(request: AnalysisRequest, content: Content, rig: Rig | None = None) -> Recording:
     """Return a recording as requested; `rig` is for files without a rig file of their own.
 

@@ -25,7 +25,7 @@ from gearsig.comparison._types import (
     power_levels,
 )
 from gearsig.errors import InputError
-from gearsig.orders import average_lines
+from gearsig.orders import average_lines, revolution_of_lines
 from gearsig.prepared import best_shift, lines_over_floor, shift_scores, turned_lines
 from gearsig.rig import OrderLine, Rig, order_lines
 from gearsig.spectra import ComplexArray, Spectrum, noise_floor, power_density
@@ -87,10 +87,7 @@ def halved_lines(halves: Sequence[AngleSignal]) -> HalvedLines:
 
 def waveform(lines: ComplexArray, n_angles: int) -> FloatArray:
     """Return one revolution, (n_angles,), of one channel's rms amplitudes, without its mean."""
-    full = np.zeros(n_angles // 2 + 1, dtype=np.complex128)
-    full[1 : len(lines)] = lines[1:]
-    values: FloatArray = np.fft.irfft(full, n_angles) * (n_angles / np.sqrt(2.0))
-    return values
+    return revolution_of_lines(lines, n_angles, "amplitude rms")
 
 
 def align(

@@ -259,7 +259,7 @@ def check_live(side: PreparedRecording, channels: Sequence[str], side_name: str)
     ------
     RefusalError
     """
-    problems = [problem for problem in side.problems if problem.channel in channels and problem.is_grave]
+    problems = side.grave_problems(channels)
     for problem in problems:
         if problem.kind == "dead":
             raise RefusalError(

@@ -25,10 +25,9 @@ from gearsig.diagnosis._types import (
 )
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import enumerated, percent, unit_text
-from gearsig.orders import SynchronousAverage, separate, whole_revolutions
-from gearsig.prepared import chance_of_any, has_mark, sliding_mean, strongest_window
+from gearsig.orders import SynchronousAverage, revolution_of_lines, separate, whole_revolutions
+from gearsig.prepared import chance_of_any, sliding_mean, strongest_window
 from gearsig.severity import ShaftLines, difference_lines, reversed_channels
-from gearsig.spectra import ComplexArray
 
 
 @dataclass(frozen=True)
@@ -409,7 +408,7 @@ class _Examined:
     @property
     def has_mark(self) -> bool:
         """Whether the angle of this very shaft counts from a mark that is there once per revolution."""
-        return has_mark(self.signals.recording, self.signals.rig, self.shaft.shaft)
+        return self.signals.prepared.has_mark(self.shaft.shaft)
 
     @property
     def is_at_mark(self) -> bool:
@@ -550,15 +549,16 @@ def _compared(signals: AnalysisSignals, shaft: ShaftSignals, healthy: AnalysisSi
         return None
     now, then = (_lines_of(g, s, names, highest, visible[0]) for g, s in ((signals, shaft), (healthy, before)))
     on_either = {s for pair in signals.rig.pairs_on(shaft.shaft) for s in (pair.driver, pair.driven)}
-    is_marked = any(all(has_mark(g.recording, g.rig, s) for g in (signals, healthy)) for s in on_either)
+    is_marked = any(signals.prepared.has_mark(s) and healthy.prepared.has_mark(s) for s in on_either)
     then = then.turned_about(reversed_channels(now, then, whole_teeth=is_marked))
     separated, halves, born = {}, {}, {}
     try:
         changed, agreement = difference_lines(now, then, whole_teeth=is_marked)
         for name, row, was in zip(names, changed.lines, now.lines - changed.lines, strict=True):
             average = shaft.averages[name]
+            n = len(average.values)
             separated[name], healthy_parts = (
-                separate(replace(average, values=_revolution(lines, len(average.values))), visible)
+                separate(replace(average, values=revolution_of_lines(lines, n, "amplitude peak")), visible)
                 for lines in (row, was)
             )
             born[name] = healthy_parts.difference.values
@@ -577,17 +577,10 @@ def _lines_of(
     """Return a shaft's averages in the form that the alignment takes, by the teeth of one of its gears."""
     averages = [shaft.averages[name] for name in names]
     lines = np.stack([average.lines()[: highest + 1].astype(np.complex128) for average in averages])
-    order_hz, is_marked = shaft.angle.mean_speed_rpm / 60.0, has_mark(signals.recording, signals.rig, shaft.shaft)
+    order_hz, is_marked = shaft.angle.mean_speed_rpm / 60.0, signals.prepared.has_mark(shaft.shaft)
     return ShaftLines(
         shaft.shaft, teeth, teeth, lines, averages[0].n_revolutions, highest, order_hz, tuple(names), is_marked
     )
-
-
-def _revolution(lines: ComplexArray, n_angles: int) -> FloatArray:
-    """Return the revolution of amplitudes (peak), without its mean."""
-    full = np.pad(lines, (0, n_angles // 2 + 1 - len(lines)))
-    full[0] = 0.0
-    return np.asarray(np.fft.irfft(full, n_angles) * (n_angles / 2.0))
 
 
 def _able(signals: AnalysisSignals) -> list[ShaftSignals]:

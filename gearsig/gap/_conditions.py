@@ -740,8 +740,7 @@ def check_steady(now: ReducedRecording, reference: ReducedRecording | None) -> N
 def _reduced(prepared: PreparedRecording) -> tuple[ReducedRecording, list[str]]:
     """Return a recording reduced without its dead channels, and notes."""
     recording, name, messages = prepared.recording, prepared.recording.name, list[str]()
-    problems = prepared.problems
-    dead = {p.channel: p for p in problems if p.kind == "dead"}
+    dead = {p.channel: p for p in prepared.problems if p.kind == "dead"}
     live = [channel for channel in recording.vibration_names() if channel not in dead]
     if not live:
         why = "; ".join(f"{p.channel}: {p.evidence}" for p in dead.values()) or "there is none"
@@ -754,7 +753,7 @@ def _reduced(prepared: PreparedRecording) -> tuple[ReducedRecording, list[str]]:
         )
     reduced = reduce_recording(prepared, channels=live)
     messages += [f"{name}: channel {p.channel} is dead ({p.evidence}) and left out." for p in dead.values()]
-    grave = [p for p in problems if p.channel in live and p.is_grave]
+    grave = prepared.grave_problems(live)
     messages += [f"{name}: {p.text}; what differs may be no more than that." for p in grave]
     return reduced, messages
 

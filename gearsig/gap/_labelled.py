@@ -160,9 +160,8 @@ def _key(
     healthy = [labelled.reference] if labelled.reference is not None else [s.recording.recording for s in shared]
     for recording in (labelled.recording, *healthy):
         digest.update(np.ascontiguousarray(recording.samples).tobytes())
-        digest.update(
-            repr((recording.sampling_rate_hz, recording.channels, recording.rig and vars(recording.rig))).encode()
-        )
+        rig = recording.rig and recording.rig.key()
+        digest.update(repr((recording.sampling_rate_hz, recording.channels, rig)).encode())
     return digest.hexdigest()[:32]
 
 

@@ -136,6 +136,15 @@ def lines_of_revolution(revolution: FloatArray, scaling: LineScaling) -> Complex
     return lines
 
 
+def revolution_of_lines(lines: ComplexArray, n_angles: int, scaling: LineScaling) -> FloatArray:
+    """Return the periodic waveform of lines 0 … along the last axis, N samples, without its mean."""
+    waves = np.array(lines, dtype=np.complex128)
+    waves[..., 0] = 0.0
+    scale = n_angles / (2.0 if scaling == "amplitude peak" else np.sqrt(2.0))
+    values: FloatArray = np.fft.irfft(waves, n_angles) * scale
+    return values
+
+
 def first_whole_sample(signal: AngleSignal) -> tuple[int, int]:
     """Return (index of the first sample of a whole revolution, that revolution).
 

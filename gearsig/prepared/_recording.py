@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import fields, is_dataclass, replace
 from typing import Any, TypeVar
@@ -127,6 +127,10 @@ class PreparedRecording:
     def problems(self) -> tuple[ChannelProblem, ...]:
         """What is wrong with the samples of vibration channels, see `gearsig.recording.find_problems`."""
         return self.keep("problems", lambda: find_problems(self.recording))
+
+    def grave_problems(self, channels: Collection[str]) -> list[ChannelProblem]:
+        """Return the problems of some channels for which levels and lines may be wrong."""
+        return [problem for problem in self.problems if problem.channel in channels and problem.is_grave]
 
     # Angles: small, and asked for by everything.
 

@@ -481,8 +481,12 @@ class Rig:
         shaft_ratios(self)  # raises where the pairs do not connect or contradict each other
 
     def __repr__(self) -> str:
-        """Return a summary; in a key that tells rigs apart stands `vars`."""
+        """Return a summary; `key` tells rigs apart."""
         return "\n".join([f"Rig {self.name!r}", *(f"  {name}: {text}" for name, text in self._facts())])
+
+    def key(self) -> str:
+        """Return a text that tells rigs apart, under which results are kept; pulse times, a record's own, in short."""
+        return repr(vars(self))
 
     def _repr_html_(self) -> str:
         """Return the same as a table, for notebooks; names may come from files."""

@@ -12,7 +12,7 @@ from gearsig.checks import FloatArray, instance_of, listed, positive, within
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import percent
 from gearsig.prepared import PreparedRecording, prepare
-from gearsig.recording import ChannelProblem, Recording, check_recording
+from gearsig.recording import Recording, check_recording
 from gearsig.rig import GearPair, Rig
 from gearsig.severity._features import (
     DB_OF_LOG_ENERGY,
@@ -546,14 +546,15 @@ def estimate_crack(
     now = pair_lines(prepared, None, facts.pair, names)
     used.check_reach(reach_of(facts, now[0].order_hz * facts.driver_teeth))
     healthy = None
-    doubts = [f"{p.text}; place and depth may be wrong for it." for p in _grave(prepared, names)]
+    wrong = "place and depth may be wrong for it."
+    doubts = [f"{problem.text}; {wrong}" for problem in prepared.grave_problems(names)]
     if reference is not None:
         before = prepare(reference, prepared.rig)
         acceleration_channels(before.recording, names, "of the reference ")
         check_same_rig(prepared.rig, before.rig)
         healthy = pair_lines(before, None, facts.pair, names)
         check_same_level(now, healthy)
-        doubts += [f"The reference: {p.text}; place and depth may be wrong for it." for p in _grave(before, names)]
+        doubts += [f"The reference: {problem.text}; {wrong}" for problem in before.grave_problems(names)]
         turned = reversed_channels(now[0], healthy[0], whole_teeth=_is_marked(now, healthy))
         if turned:
             healthy = tuple(shaft.turned_about(turned) for shaft in healthy)
@@ -562,10 +563,6 @@ def estimate_crack(
     way = ALONE if reference is None else WITH_REFERENCE
     answer = judge(evidence, used.models[way + ("" if tip_relief_um is None else RELIEF_KNOWN)], used, facts)
     return replace(answer, reasons=(*answer.reasons, *doubts)) if doubts else answer
-
-
-def _grave(prepared: PreparedRecording, names: Sequence[str]) -> list[ChannelProblem]:
-    return [problem for problem in prepared.problems if problem.channel in names and problem.is_grave]
 
 
 def reach_of(facts: PairFacts, mesh_hz: float) -> dict[str, float]:

@@ -65,7 +65,7 @@ def band_envelope(
     source: str = "",
     transform: ComplexArray | None = None,
     highest_hz: float | None = None,
-    continued: bool | None = None,
+    continued: bool = False,
 ) -> Envelope:
     """Return the envelope of a frequency band, decimated to what the band needs.
 
@@ -90,9 +90,8 @@ def band_envelope(
     highest_hz : float or None
         Highest modulation of interest: a magnitude that is sampled much faster than that needs may come at three times
         this frequency, without what is faster.
-    continued : bool or None
-        Whether the signal is continued at its ends, so that envelopes of several have one length; None: where its ends
-        do not meet.
+    continued : bool
+        Whether the signal is continued at its ends also where these meet, so that envelopes of several have one length.
 
     Returns
     -------
@@ -219,7 +218,7 @@ def envelope_recording(
     if not names:
         raise InputError("there is no channel to take the envelope of", remedy="name the channels")
     old = [recording.channels[recording.index(name)] for name in names]
-    continued = None if transforms is not None else not all(ends_meet(recording.values(name)) for name in names)
+    continued = transforms is None and not all(ends_meet(recording.values(name)) for name in names)
     envelopes = [
         band_envelope(
             recording.values(c.name),
@@ -312,10 +311,10 @@ def continuations(values: FloatArray, n_beyond: int = BEYOND_THE_ENDS) -> tuple[
 
 def ends_meet(values: FloatArray) -> bool:
     """Whether the step from a record's end to its beginning is no larger than any within it."""
-    return not _has_step(read_only(values))
+    return bool(_ends_meet(read_only(values)))
 
 
-def joined_ends(values: FloatArray, *, continued: bool | None = None) -> FloatArray:
+def joined_ends(values: FloatArray, *, continued: bool = False) -> FloatArray:
     """Return a record whose end meets its beginning, as a transform takes it: itself, or with its continuations.
 
     Itself where they meet of themselves, see `ends_meet`: what is periodic stays so. Else the continuation follows it,
@@ -325,15 +324,15 @@ def joined_ends(values: FloatArray, *, continued: bool | None = None) -> FloatAr
     Parameters
     ----------
     values : array, (n_samples,)
-    continued : bool or None
-        Whether it is continued all the same, or not; None: where its ends do not meet.
+    continued : bool
+        Whether it is continued also where its ends meet.
 
     Returns
     -------
     array, (n,)
         In the precision of the values.
     """
-    if continued is False or (continued is None and ends_meet(values)):
+    if not continued and ends_meet(values):
         return values
     before, after = continuations(values, min(BEYOND_THE_ENDS, len(values) - 1))
     joined = np.zeros(_continued_length(len(values)), dtype=values.dtype)
@@ -355,12 +354,11 @@ def _continued_length(n_samples: int) -> int:
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _has_step(x):  # type: ignore[no-untyped-def]
-    """Whether the step from the end of a record to its beginning is larger than any within it."""
+def _ends_meet(x):  # type: ignore[no-untyped-def]
     largest = 0.0
     for i in range(1, x.shape[0]):
         largest = max(largest, abs(x[i] - x[i - 1]))
-    return abs(x[0] - x[x.shape[0] - 1]) > largest
+    return not abs(x[0] - x[x.shape[0] - 1]) > largest
 
 
 PERIODS_OF_EDGE = 50
