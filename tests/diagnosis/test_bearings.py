@@ -19,7 +19,7 @@ from gearsig.recording import Channel, Recording
 from gearsig.rig import Bearing, ConstantSpeed, GearPair, Rig, Shaft, SpeedChannel
 from gearsig.spectra import amplitude_spectrum
 from sims.measure import ColouredNoise
-from tests.diagnosis.machines import GOOD, RIG, SAMPLING_RATE_HZ, codes, finding, motor, record
+from tests.diagnosis.machines import GOOD, MOTOR_HZ, RIG, SAMPLING_RATE_HZ, codes, finding, motor, record
 from tests.kinematic.model import BearingFault, KinematicModel, SensorChannel
 from tests.kinematic.speed import ConstantProfile
 
@@ -434,6 +434,36 @@ def test_noise_that_the_supplys_pull_modulates_is_no_race() -> None:
     found = finding(analyze(hum), "bearing-outer-race")
     assert found.confidence < 0.5
     assert found.kind is not Kind.FAULT
+
+
+@pytest.mark.parametrize(
+    ("course", "is_named"),
+    [
+        ("knocks", True),
+        ("slow knocks", True),
+        ("one sine", False),
+        ("passing elements", False),
+        ("dips", False),
+        ("knocks turned round", False),
+    ],
+)
+def test_only_what_rises_and_rings_down_at_a_races_order_is_called_damage(course: str, is_named: bool) -> None:
+    """Noise of the same depth, modulated as damage does it, or play, waviness and elements that pass the load."""
+    quiet = motor("", seed=3)
+    since = np.arange(quiet.n_samples) / quiet.sampling_rate_hz * 3.585 * 0.997 * MOTOR_HZ % 1  # in intervals
+    courses = {
+        "knocks": np.exp(-since / 0.15),
+        "slow knocks": np.exp(-since / 1.5),
+        "one sine": np.cos(2 * np.pi * since),
+        "passing elements": np.abs(np.cos(np.pi * since)),
+        "dips": -np.exp(-np.minimum(since, 1 - since) / 0.15),
+        "knocks turned round": -np.exp(-since / 0.15),
+    }
+    modulation = (courses[course] - courses[course].mean()) / courses[course].std()
+    carrier = 3 * np.random.default_rng(4).standard_normal(quiet.n_samples)
+    analysis = analyze(replace(quiet, samples=quiet.samples + np.maximum(1 + 0.45 * modulation, 0) * carrier))
+    found = [f.kind for f in analysis.findings if f.code == "bearing-outer-race"]
+    assert found == [Kind.FAULT] if is_named else found in ([], [Kind.NOTICE])
 
 
 def test_a_race_behind_the_clicks_of_a_supply_is_named() -> None:
