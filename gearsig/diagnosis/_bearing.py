@@ -142,7 +142,9 @@ def _named_finding(signals: AnalysisSignals, candidate: Candidate, n_parts: int)
     is_beyond_slip = only_stated and abs(slip) > signals.settings.bearing_slip
     times = factor_left_open(signals)
     is_shared = candidate.name == "FTF" or candidate.in_train or n_parts > MAX_PARTS
-    is_hunting, is_smooth = _is_among_hunting_lines(signals, candidate), _is_smooth(candidate)
+    width = 2.0 * candidate.envelope.excess.spectrum.resolution
+    is_hunting = candidate.name == "FTF" and bool(_hunting_tooth_beside(signals, candidate.comb.fundamental, width))
+    is_smooth = _is_smooth(candidate)
 
     confidence = from_p_value(candidate.p_value) * candidate.share
     confidence *= WITH_ASSUMED_DATA if signals.rig.assumed else 1.0
@@ -221,16 +223,16 @@ def _other_speed_text(times: int) -> str:
     )
 
 
-def _is_among_hunting_lines(signals: AnalysisSignals, candidate: Candidate) -> bool:
-    """Whether a cage's order is no further from a multiple of a hunting-tooth order than a line is wide.
+def _hunting_tooth_beside(signals: AnalysisSignals, order: float, width: float) -> str:
+    """Return the pair whose hunting-tooth order has a multiple within `width` of an order, and which one; "" if none.
 
     Teeth that differ meet in turn, and modulate the mesh at multiples of that order: in a short record they are dense.
     """
-    width, fundamental = 2.0 * candidate.envelope.excess.spectrum.resolution, candidate.comb.fundamental
-    hunting = [o for p in signals.rig.pairs if (o := hunting_tooth_order(signals.rig, p)) is not None]
-    return candidate.name == "FTF" and any(
-        abs(fundamental - round(fundamental / order) * order) <= width for order in hunting
-    )
+    for pair in signals.rig.pairs:
+        hunting = hunting_tooth_order(signals.rig, pair)
+        if hunting is not None and (k := round(order / hunting)) and abs(order - k * hunting) <= width:
+            return f"{f'{k}× ' if k > 1 else ''}the hunting-tooth order of {named('pair', pair.name)}"
+    return ""
 
 
 def _is_smooth(candidate: Candidate) -> bool:
@@ -320,13 +322,18 @@ def _unnamed_finding(signals: AnalysisSignals, candidate: Candidate) -> Finding:
     ]
     near += _race_beyond_slip(signals, candidate)
     mains = mains_beside(signals, candidate)
+    n_lines = round(max(candidate.comb.positions, default=order) / order)  # that many tell the fundamental better
+    width = 2.0 * candidate.envelope.excess.spectrum.resolution / n_lines
+    hunting = "" if mains else _hunting_tooth_beside(signals, order, width)
     multiple, shaft = _shaft_as_stated(signals, candidate)
     # A shaft may well turn there; that it is struck every other turn is no better than an unknown part.
     is_shafts = (multiple > 0 and multiple.is_integer()) or bool(near and not speed_is_confirmed(signals))
-    strong = candidate.modulation >= CLEAR_MODULATION and not is_shafts and not mains
+    strong = candidate.modulation >= CLEAR_MODULATION and not (is_shafts or mains or hunting)
     causes = ["A rolling bearing that is not in the rig file is the usual cause; other machines and belts do it too."]
     if mains:
         causes = [f"It is the rate of {mains}, or of what that supply feeds."]
+    elif hunting:
+        causes = [f"It is {hunting}: teeth that differ from each other, or one that is damaged, meet at that rate."]
     elif candidate.in_train:
         causes = ["The rate is low for a race: another machine, a belt or a shaft that is not in the rig file does it."]
         beside = [
@@ -343,6 +350,8 @@ def _unnamed_finding(signals: AnalysisSignals, candidate: Candidate) -> Finding:
     explained = _unexplained_by(signals.rig)
     if shaft and not multiple.is_integer():
         causes.append("Loose or rubbing parts strike every other turn.")
+    if hunting:
+        explained, surer = f"is {hunting}", ""
     if shaft:
         explained, surer = f"may be {shaft} itself: the speed is stated and taken as constant", "A tachometer."
     return Finding(

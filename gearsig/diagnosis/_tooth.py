@@ -382,6 +382,8 @@ SMALLEST_SHARE, SMALLEST_SIGNIFICANCE = 0.05, 3.0
 """Rms in the window against that of the whole average, and against the average's standard error there: below, an event
 is too small to matter, or is made by the ends of the record."""
 
+REPEATS = 0.7
+"""Correlation of odd and even revolutions from which an event is alike in both."""
 
 AGREES, RULES = 0.5, 1.5
 """How far an average's pattern of teeth must agree with the healthy one's for what differs to be a change; else rms of
@@ -422,7 +424,7 @@ class _Examined:
         event = self.event
         # The standard error counts other shafts' lines as well, which an average lessens and two averages share.
         error = 0.0 if self.since_reference else SMALLEST_SIGNIFICANCE * event.error_rms
-        return event.rms >= max(SMALLEST_SHARE * event.average_rms, error) and event.place.repeatability >= 0.7
+        return event.rms >= max(SMALLEST_SHARE * event.average_rms, error) and event.place.repeatability >= REPEATS
 
     @property
     def is_withheld(self) -> bool:
@@ -788,7 +790,10 @@ def _withheld(examined: _Examined) -> Finding:
     )
     evidence = (f"Odd and even revolutions {scatter}.", _visible_text(examined))
     surer = "A longer recording, and a tachometer whose pulses the shaft's own torsion does not shift."
-    return _left_open(examined, "but not alike from turn to turn", evidence, surer)
+    why = (
+        "but not alike from turn to turn" if place.repeatability < REPEATS else "but other shafts' lines may have made it"
+    )
+    return _left_open(examined, why, evidence, surer)
 
 
 def _left_open(examined: _Examined, why: str, evidence: tuple[str, ...], surer: str) -> Finding:

@@ -421,6 +421,21 @@ def with_bearings(recording: Recording, *bearings: Bearing) -> Recording:
     return replace(recording, rig=replace(recording.rig, bearings=bearings))
 
 
+@pytest.mark.parametrize(("numbers", "is_of_the_teeth"), [(2.0, True), (2.3, False)])
+def test_impacts_as_often_as_two_teeth_meet_again_are_the_teeths(numbers: float, is_of_the_teeth: bool) -> None:
+    """A damaged tooth strikes each of the other gear's teeth in turn, and they are not alike."""
+    recording = record(seconds=25.0)
+    rings = np.exp(-900 * np.arange(400) / SAMPLING_RATE_HZ) * np.sin(
+        2 * np.pi * 3000 * np.arange(400) / SAMPLING_RATE_HZ
+    )
+    turns = refined_angle(recording, RIG).revolutions_at(np.arange(recording.n_samples) / SAMPLING_RATE_HZ)
+    struck = np.diff(np.floor(turns * numbers / 43), prepend=0) > 0
+    samples = np.array(recording.samples)
+    samples[recording.channel_names.index("a1")] += 40 * np.convolve(struck, rings)[: recording.n_samples]
+    found = finding(analyze(replace(recording, samples=samples)), "non-synchronous-impacts")
+    assert ("hunting-tooth order" in found.title) == is_of_the_teeth
+
+
 def test_loose_parts_that_strike_every_other_turn_are_no_race() -> None:
     loose = with_bearings(at_sensors(0.5, (20.0, 6.0)), outer_race_at(2.51, 7, "drive end"))
     assert all(f.confidence < 0.5 for f in analyze(loose).findings if f.code in NAMED)
