@@ -15,7 +15,7 @@ Single methods take a recording and a channel's name, or a plain array and its s
 >>> round(float(gearsig.amplitude_spectrum(tone, 1000.0).values[50]), 9)
 1.0
 
-Everything else is imported from its room, e.g. `from gearsig.orders import separate_shafts`.
+Everything else is in its room: `gearsig.orders.separate_shafts`, or `from gearsig.orders import separate_shafts`.
 """
 
 import os

@@ -1,5 +1,25 @@
 # ruff: noqa: I001 - one import a room; the names of `gearsig`, read by type checkers and by `__init__.py` at run time
-from . import plot as plot
+from . import (
+    angle as angle,
+    comparison as comparison,
+    decompose as decompose,
+    diagnosis as diagnosis,
+    fleet as fleet,
+    gap as gap,
+    indicators as indicators,
+    methods as methods,
+    motion as motion,
+    orders as orders,
+    phase as phase,
+    plot as plot,
+    prepared as prepared,
+    recording as recording,
+    report as report,
+    rig as rig,
+    severity as severity,
+    spectra as spectra,
+    timefreq as timefreq,
+)
 from .angle import (
     AngleSignal as AngleSignal,
     ShaftAngle as ShaftAngle,

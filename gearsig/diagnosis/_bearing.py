@@ -73,6 +73,9 @@ below which no knocks make it. Exponentials, however slowly they ring, have 0.5 
 by 3 %, 0.13 to 0.9; damaged races of recordings and simulators 0.21 to 1.1 and 0.11 to 1.4, sound ones that play,
 waviness and passing elements modulate −0.4 to 0.16, or 0 to 0.04."""
 
+ONE_TO_THREE = np.arange(1.0, 4.0)
+"""Multiples of a race's order that must not be a shaft's for its course to be known."""
+
 BLOCK_INTERVALS = 8
 """From knock to knock, over which slip hardly parts the first six multiples."""
 
@@ -165,6 +168,8 @@ def _named_finding(signals: AnalysisSignals, candidate: Candidate, n_parts: int)
     if candidate.of_elements:
         place += ", or at its rolling elements or cage"
     title = f"{'Damage' if clear else 'Perhaps damage'} at {place}."
+    if is_smooth:
+        title = f"Modulation at the order of {place}, unlike knocks."
     if is_beyond_slip:
         title = f"May be {place}: the speed is stated and not confirmed."
     if times > 1:
@@ -211,7 +216,7 @@ def _named_evidence(
     elif candidate.in_train:
         yield "The rate is that of a train of lines: another machine's or a belt's would look the same."
     if is_smooth:
-        yield "It rises and falls unlike knocks, as play, waviness and elements that pass the load make it."
+        yield "Play, waviness and elements that pass the load modulate so; knocks rise at once and ring down."
 
 
 def _other_speed_text(times: int) -> str:
@@ -238,10 +243,19 @@ def _hunting_tooth_beside(signals: AnalysisSignals, order: float, width: float) 
 def _is_smooth(candidate: Candidate) -> bool:
     """Whether what modulates at a race's order is no knocking, by more than twice the errors."""
     envelope, over_angle = candidate.envelope, candidate.envelope.over_angle
-    if candidate.name not in RACES or over_angle is None:
+    order, excess = candidate.comb.fundamental, envelope.excess
+    if (
+        candidate.name not in RACES
+        or over_angle is None
+        or excess.masked[excess.line_numbers(order * ONE_TO_THREE)].any()
+    ):
         return False
-    per_interval = over_angle.samples_per_revolution / candidate.comb.fundamental
-    course = course_of_knocks(over_angle.values(envelope.channel), per_interval)
+    # Shafts' lines, beside the race's or stronger, would be taken for its course.
+    values, per_revolution = over_angle.values(envelope.channel), over_angle.samples_per_revolution
+    lines = np.fft.rfft(values)
+    numbers = excess.line_numbers(np.arange(len(lines)) * per_revolution / len(values))
+    lines[excess.masked[np.clip(numbers, 0, len(excess.masked) - 1)]] = 0
+    course = course_of_knocks(np.fft.irfft(lines, len(values)), per_revolution / order)
     if course is None:
         return False
     (moment, moment_error), (later, later_error) = course
@@ -532,8 +546,11 @@ def _reasons_to_leave_open(
         yield why, f"A tachometer, or a sensor nearer to the {'gears' if signals.rig.pairs else 'bearings'}."
     named_here = new((*families.named, *(c for c in families.trains if c.bearing is not None)))
     rival = next((r for c in named_here for r in c.rivals), "")
+    besides = f"{rival} would show there as well" if rival else "something else explains them as well"
+    if named_here and all(_is_smooth(c) for c in named_here):
+        besides = "they rise and fall unlike knocks"
     for seen, but in (
-        (named_here, f"{rival} would show there as well" if rival else "something else explains them as well"),
+        (named_here, besides),
         (new(families.unclear), "families beside it are as clear"),
     ):
         if seen:
