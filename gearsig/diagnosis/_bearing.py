@@ -244,11 +244,7 @@ def _is_smooth(candidate: Candidate) -> bool:
     """Whether what modulates at a race's order is no knocking, by more than twice the errors."""
     envelope, over_angle = candidate.envelope, candidate.envelope.over_angle
     order, excess = candidate.comb.fundamental, envelope.excess
-    if (
-        candidate.name not in RACES
-        or over_angle is None
-        or excess.masked[excess.line_numbers(order * ONE_TO_THREE)].any()
-    ):
+    if candidate.name not in RACES or over_angle is None or len(excess.free_lines_at(order * ONE_TO_THREE)) < 3:
         return False
     # Shafts' lines, beside the race's or stronger, would be taken for its course.
     values, per_revolution = over_angle.values(envelope.channel), over_angle.samples_per_revolution
