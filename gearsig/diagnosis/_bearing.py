@@ -79,8 +79,9 @@ ONE_TO_THREE = np.arange(1.0, 4.0)
 BLOCK_INTERVALS = 8
 """From knock to knock, over which slip hardly parts the first six multiples."""
 
-IF_SMOOTH = 0.25
-"""Factor where no knocks make a family: of 22 such, one race was damaged."""
+IF_SMOOTH, IF_SMOOTH_BESIDE = 0.25, 0.5
+"""Factors where no knocks make a family: alone, where of 22 such one race was damaged; and beside a reference, which
+shows what play and waviness make."""
 
 OTHER_MAKE = 0.04
 """How far the orders of two makes of a bearing of one designation may be apart."""
@@ -151,7 +152,8 @@ def _named_finding(signals: AnalysisSignals, candidate: Candidate, n_parts: int)
 
     confidence = from_p_value(candidate.p_value) * candidate.share
     confidence *= WITH_ASSUMED_DATA if signals.rig.assumed else 1.0
-    confidence *= SHARED_BY_OTHERS ** (is_shared + is_hunting) * (IF_SMOOTH if is_smooth else 1.0)
+    if_smooth = IF_SMOOTH_BESIDE if signals.has_reference else IF_SMOOTH
+    confidence *= SHARED_BY_OTHERS ** (is_shared + is_hunting) * (if_smooth if is_smooth else 1.0)
     is_of_other_speed = is_beyond_slip or times > 1
     if only_stated or is_of_other_speed:
         is_likely = (candidate.name in RACES or abs(slip) <= USUAL_SLIP) and not is_of_other_speed
