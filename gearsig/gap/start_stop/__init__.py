@@ -35,7 +35,7 @@ from gearsig.gap.start_stop._cycles import (
     spot_of,
     thin,
 )
-from gearsig.gap.start_stop._diagnose import DriveDiagnosis, diagnose_start_stop, drive_report
+from gearsig.gap.start_stop._diagnose import diagnose_start_stop
 
 __all__ = [
     "FLOORS_FILE",
@@ -45,7 +45,6 @@ __all__ = [
     "TRIED",
     "CycleFeatures",
     "DriveComparison",
-    "DriveDiagnosis",
     "DriveEvidence",
     "DriveFloor",
     "FittedDriveCause",
@@ -59,7 +58,6 @@ __all__ = [
     "compare_drive",
     "cut_cycles",
     "diagnose_start_stop",
-    "drive_report",
     "evidences",
     "fit",
     "load_floors",
