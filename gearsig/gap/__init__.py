@@ -58,7 +58,6 @@ from gearsig.gap._evidence import (
     evidence_of,
     evidence_of_feature,
     feature_words,
-    over_floors,
     shaft_signs,
 )
 from gearsig.gap._features import Feature, Features, burst_features, features_of, once
@@ -79,8 +78,6 @@ from gearsig.gap._labelled import LabelledRecording, labelled_changes, labelled_
 from gearsig.gap._next_recording import next_recordings, next_steps
 from gearsig.gap._path import MeasuredPath, measured_path
 from gearsig.gap._places import (
-    ComparedPair,
-    compared_pair,
     gap_places,
     locate_all_round,
     locate_mesh,
@@ -246,7 +243,6 @@ __all__ = [
     "AverageCurves",
     "Bank",
     "BearingFrame",
-    "ComparedPair",
     "Condition",
     "ConditionFacts",
     "DriveFacts",
@@ -321,7 +317,6 @@ __all__ = [
     "check_steady",
     "closed_shares",
     "compare_waveform",
-    "compared_pair",
     "conditions_of",
     "contrast_rows",
     "counted_against",
@@ -371,7 +366,6 @@ __all__ = [
     "next_recordings",
     "next_steps",
     "once",
-    "over_floors",
     "paths_of",
     "place_of",
     "place_of_unexpected",

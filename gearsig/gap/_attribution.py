@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cache
 from math import exp
 from pathlib import Path
@@ -33,6 +33,7 @@ from gearsig.gap._report import (
     Shrinkage,
     group_probabilities,
     likeliest_first,
+    scaled,
     shares_of,
 )
 from gearsig.gap._simulator import GapEffect, Twin
@@ -42,9 +43,6 @@ CALIBRATION_FILE = Path(__file__).with_name("calibration.json")
 
 SIZES = (0.3, 6.0)
 """Structural floors that a gap's size counts from and to."""
-
-_NUMBERS = ("sharpness", "shrink_weight", "neutral_shrink", "none_bias", "unknown_bias", "named_from", "apart")
-_FURTHER = {"sharper": 0.0, "none_slope": 0.0, "several": 1.0}
 
 
 @dataclass(frozen=True)
@@ -89,14 +87,15 @@ class GapCalibration:
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> GapCalibration:
         """Build it from what a JSON file holds."""
-        biases = {name: float(value) for name, value in values.get("effect_biases", {}).items()}
-        further = {name: float(values.get(name, usual)) for name, usual in _FURTHER.items()}
-        return cls(**{name: float(values[name]) for name in _NUMBERS}, effect_biases=biases, **further)
+        return cls(**{field.name: values[field.name] for field in fields(cls) if field.name in values})
 
     def to_mapping(self) -> dict[str, Any]:
         """Return plain values, for a JSON file."""
-        numbers: dict[str, Any] = {name: round(float(getattr(self, name)), 4) for name in (*_NUMBERS, *_FURTHER)}
-        return numbers | ({"effect_biases": dict(self.effect_biases)} if self.effect_biases else {})
+        numbers = asdict(self)
+        biases = numbers.pop("effect_biases")
+        return {name: round(float(value), 4) for name, value in numbers.items()} | (
+            {"effect_biases": biases} if biases else {}
+        )
 
     def probabilities(
         self, forest: Mapping[str, float], scores: Mapping[str, float], size: float = 1.0, n_conditions: int = 1
@@ -384,7 +383,7 @@ def attribute(
         If the rig has a place for some of the likeliest effects, and none of them can be simulated there.
     """
     forest = _forest(conditions, effects, known)
-    with_reference = all(c.reference is not None for c in conditions)
+    with_reference = all(c.has_reference for c in conditions)
     size = max(condition.size.structural.value for condition in conditions)
     calibration = load_gap_calibration(with_reference=with_reference)
     evidence = labelled_evidence(conditions, labelled) if labelled else None
@@ -459,8 +458,7 @@ def counted_against(
         if place.structural >= FAR_FROM_HEALTHY:
             for name in (NONE, *([UNKNOWN] if _is_first_of_a_shaft(place, frame) else [])):
                 lowered[name] *= 2.0 * (1.0 - place.share)
-    total = sum(lowered.values())
-    return likeliest_first({name: p / total for name, p in lowered.items()})
+    return scaled(lowered)
 
 
 def _is_first_of_a_shaft(place: GapPlace, frame: GearFrame) -> bool:

@@ -16,12 +16,12 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import percent
 from gearsig.gap._change import (
     as_mounted,
+    beyond_the_mesh,
     change_features,
     difference_features,
     lines_of_shaft,
     turned_difference,
 )
-from gearsig.gap._evidence import over_floors
 from gearsig.gap._features import STEPS_PER_TOOTH, Features, decibel, tooth_energy
 from gearsig.gap._floors import FLOOR_IN_DEVIATIONS, GapSize, StructuralFloor, gap_size, pooled_scatter
 from gearsig.gap._path import MeasuredPath, measured_path
@@ -95,9 +95,14 @@ class Condition:
     path: MeasuredPath | None = field(default=None, repr=False)
 
     @property
+    def has_reference(self) -> bool:
+        """Whether it is compared with a healthy recording of the same machine, and not with the twin."""
+        return self.reference is not None
+
+    @property
     def baseline(self) -> ReducedRecording:
         """What it is compared with."""
-        return self.reference if self.reference is not None else self.simulated
+        return self.simulated if self.reference is None else self.reference
 
     def change_of(self, part: ReducedRecording) -> Features:
         """Return the change of the recording, or of some of its blocks, against what it is compared with.
@@ -127,7 +132,7 @@ class Condition:
     @property
     def recogniser(self) -> Recogniser:
         """By which its change is recognised."""
-        return self.learned.recognisers[self.reference is not None]
+        return self.learned.recognisers[self.has_reference]
 
     @property
     def tooth_load_n_per_mm(self) -> float:
@@ -146,9 +151,31 @@ class Condition:
         return unknown if self.path is None else self.path.gain_scatter(unknown)
 
     @cached_property
+    def change_db(self) -> dict[str, float]:
+        """Feature → distance from healthy machines', in dB.
+
+        With a reference, a level relative to the mesh counts as far as it changed by itself.
+        """
+        names, distances = self.change.names, self.floor.from_centre(self.change.names, self.change.values)
+        held = beyond_the_mesh(names, distances) if self.has_reference else distances
+        return dict(zip(names, held.tolist(), strict=True))
+
+    @cached_property
+    def floors(self) -> tuple[FloatArray, FloatArray]:
+        """Structural and repeatability floor of each feature, in dB, both (n,)."""
+        return self.floor.of(self.change.names), FLOOR_IN_DEVIATIONS * pooled_scatter(self.change)
+
+    @cached_property
     def over_floors(self) -> dict[str, float]:
-        """Changes over the larger of both floors, with their signs."""
-        return over_floors(self.change, self.floor, is_reference=self.reference is not None)
+        """Feature → distance over the larger of both floors, with its sign."""
+        # Healthy machines' differences hold their scatter already; a shorter record's may be larger.
+        ratios = np.array([*self.change_db.values()]) / np.maximum(*self.floors)
+        return dict(zip(self.change.names, ratios.tolist(), strict=True))
+
+    def strongest(self, *beginnings: str) -> str:
+        """Return the feature with the largest change over the floors among those whose names begin so."""
+        sizes = self.over_floors
+        return max((name for name in sizes if name.startswith(beginnings)), key=lambda name: abs(sizes[name]))
 
 
 USUAL_PRESSURE_ANGLE_DEG = 20.0

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 
@@ -22,13 +21,7 @@ from gearsig.gap._gearless import diagnose_gearless, place_of_unexpected, unexpe
 from gearsig.gap._inputs import is_gearless, twin_rig, with_stage
 from gearsig.gap._labelled import LabelledRecording, labelled_changes
 from gearsig.gap._next_recording import next_recordings, next_steps
-from gearsig.gap._places import (
-    compared_pair,
-    gap_places,
-    ranked_places,
-    without_multiples,
-    without_silent_races,
-)
+from gearsig.gap._places import gap_places, ranked_places, without_multiples, without_silent_races
 from gearsig.gap._population import load_learned
 from gearsig.gap._reduction import ReducedRecording
 from gearsig.gap._report import (
@@ -60,7 +53,7 @@ from gearsig.gap._trials import (
     start_healthy_trial,
     steps_of,
 )
-from gearsig.gap.start_stop._diagnose import diagnose_start_stop, drive_report, refuse_start_stop
+from gearsig.gap.start_stop._diagnose import diagnose_start_stop, refuse_start_stop
 from gearsig.prepared import PreparedRecording
 from gearsig.processes import one_pool, start_early
 from gearsig.recording import Recording, check_recording, metres_per_second_squared
@@ -103,9 +96,6 @@ NOT_NEARER = (
     "With {title} the twin comes no nearer to data that it was not fitted to: no severity is given, and no twin with "
     "the effect. What speaks for it is how the recordings changed, by recognition alone."
 )
-
-
-Result = TypeVar("Result")
 
 
 @one_pool(PROCESSES)
@@ -183,7 +173,7 @@ def diagnose_gap(
     # 2. Machines that start and stop are compared by their motion, those without gears by their bearings alone.
     if isinstance(simulator, DriveSimulator):
         _refuse_further(learn, run_up, "a machine that starts and stops")
-        return drive_report(diagnose_start_stop(recordings, references, simulator, allowed, tell))
+        return diagnose_start_stop(recordings, references, simulator, allowed, tell)
     refuse_start_stop(recordings, simulator.name)
     rig, recordings, references, run_ups, learn = _on_stage(rig, recordings, references, run_ups, learn, stage)
     prepared, healthy = [PreparedRecording(r) for r in recordings], [PreparedRecording(r) for r in references]
@@ -306,7 +296,7 @@ def diagnose_gap(
             outcome,
             causes,
             [condition.facts.point for condition in conditions],
-            has_reference=all(condition.reference is not None for condition in conditions),
+            has_reference=all(condition.has_reference for condition in conditions),
             has_encoders=has_encoders(recording.recording),
             is_labelled=labels is not None,
             has_run_up=clearest.path is not None or not isinstance(as_tried(twin), CanRunUp),
@@ -521,25 +511,13 @@ def _posterior(
 ) -> dict[str, float]:
     """Return cause → probability, with what the whole gap, its places and the lines of shafts and races say."""
     posterior = within_the_floor(attribution.probabilities(), clearest.size.structural)
-    comparisons = [_beside_baseline(compared_pair, c) for c in conditions]
-    posterior = without_multiples(without_silent_races(posterior, comparisons), known, comparisons)
+    posterior = without_multiples(without_silent_races(posterior, conditions), known, conditions)
     return counted_against(posterior, known, gap, clearest.now.frame)
-
-
-def _beside_baseline(looked_for: Callable[..., Result], condition: Condition) -> Result:
-    """Return what a function of `_places` says of a condition beside its baseline."""
-    return looked_for(
-        condition.now,
-        condition.baseline,
-        condition.floor,
-        condition.change,
-        is_reference=condition.reference is not None,
-    )
 
 
 def _places(condition: Condition) -> tuple[GapPlace, ...]:
     try:
-        return _beside_baseline(gap_places, condition)
+        return gap_places(condition)
     except RefusalError:
         return ()
 

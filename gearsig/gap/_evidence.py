@@ -7,10 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gearsig.checks import FloatArray
-from gearsig.gap._change import beyond_the_mesh
-from gearsig.gap._features import ECHO_LAGS_PITCHES, N_QUARTERS, Features
-from gearsig.gap._floors import FLOOR_IN_DEVIATIONS, StructuralFloor, family_members, pooled_scatter
+from gearsig.gap._features import ECHO_LAGS_PITCHES, N_QUARTERS
+from gearsig.gap._floors import family_members
 from gearsig.gap._prediction import Fit, ObservedChange
 from gearsig.gap._reduction import GearFrame, shaft_words
 from gearsig.gap._report import Evidence
@@ -165,7 +163,7 @@ def shaft_signs(cause: str, changes: Sequence[Mapping[str, float]], teeth: tuple
     cause : str
         Name of an effect.
     changes : sequence of mappings
-        Feature → change over its floor, see `over_floors`; one per operating condition.
+        Feature → change over its floor, see `Condition.over_floors`; one per operating condition.
     teeth : (int, int)
         Of driver and driven gear.
     """
@@ -198,38 +196,6 @@ def determined_options(cause: str, changes: Sequence[Mapping[str, float]], teeth
     if signs is None or signs.side is None:
         return {}
     return {"shaft" if cause == "misalignment" else "gear": SIDES[signs.side]}
-
-
-def over_floors(change: Features, floor: StructuralFloor, *, is_reference: bool) -> dict[str, float]:
-    """Return each feature's change over the larger of both floors, with its sign.
-
-    Parameters
-    ----------
-    change : Features
-        Against a reference or a simulation.
-    floor : StructuralFloor
-        Of that comparison.
-    is_reference : bool
-        Whether it is a reference: a level relative to the mesh then counts as far as it changed by itself.
-    """
-    distances, *floors = against_floors(change, floor, is_reference=is_reference)
-    return dict(zip(change.names, (distances / np.maximum(*floors)).tolist(), strict=True))
-
-
-def against_floors(
-    change: Features, floor: StructuralFloor, *, is_reference: bool
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return each feature's distance from healthy machines', its structural floor and its repeatability floor, in dB.
-
-    Parameters
-    ----------
-    change, floor, is_reference
-        As of `over_floors`.
-    """
-    distances = floor.from_centre(change.names, change.values)
-    if is_reference:
-        distances = beyond_the_mesh(change.names, distances)
-    return distances, floor.of(change.names), FLOOR_IN_DEVIATIONS * pooled_scatter(change)
 
 
 def _rises(signs: Sequence[str], side: str, change: Mapping[str, float]) -> list[float]:

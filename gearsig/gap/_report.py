@@ -399,12 +399,16 @@ TOGETHER, MAX_RIVALS = 0.9, 4
 more of them than anybody would look at."""
 
 
+def scaled(weights: Mapping[str, float]) -> dict[str, float]:
+    """Return probabilities in proportion to weights, likeliest first."""
+    total = sum(weights.values())
+    return likeliest_first({name: weight / total for name, weight in weights.items()})
+
+
 def shares_of(levels: Mapping[str, float]) -> dict[str, float]:
     """Return probabilities p_c ∝ exp(level_c), likeliest first."""
     top = max(levels.values())
-    weights = {name: exp(level - top) for name, level in levels.items()}
-    total = sum(weights.values())
-    return {name: weight / total for name, weight in likeliest_first(weights).items()}
+    return scaled({name: exp(level - top) for name, level in levels.items()})
 
 
 def rivals(causes: Sequence[GapCause]) -> tuple[str, ...]:

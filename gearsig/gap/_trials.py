@@ -473,7 +473,7 @@ def try_effects(
     where = " and ".join(c.facts.name for c in conditions)
     candidates = {name: worth_simulating(twin.candidates(name), determined[name]) for name in determined}
     further_settings: dict[str, Sequence[Added]] = {}
-    if isinstance(twin, HasFurtherSettings) and any(condition.reference is not None for condition in conditions):
+    if isinstance(twin, HasFurtherSettings) and any(condition.has_reference for condition in conditions):
         further_settings = {
             n: [a for a in twin.further_settings(n) if determined[n].items() <= a.options.items()] for n in determined
         }
@@ -639,7 +639,7 @@ def _distances(bank: Bank, kept: Sequence[Added], condition: Condition, shows_in
     usual = -floor.from_centre(floor.names, np.zeros(len(floor.names)))
     simulated = dict(zip(names, bank.healthy.tolist(), strict=True))
     base_names, base = whole_and_parts(condition.baseline)
-    if condition.reference is not None:
+    if condition.has_reference:
         compared, baseline = bank.change_names, base[0]
     else:
         compared, baseline = names, condition.learned.credibility * base[0] + usual

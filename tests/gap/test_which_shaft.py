@@ -14,17 +14,17 @@ from gearsig.gap import (
     SIDES,
     SIGNS,
     Added,
+    Condition,
+    ConditionFacts,
     GapPlace,
     OperatingCondition,
     PlaceKind,
     ReducedRecording,
     ShaftSigns,
     cause_place,
-    change_features,
     determined_options,
     gear_frame,
     load_learned,
-    over_floors,
     reduce_recording,
     shaft_signs,
 )
@@ -120,8 +120,8 @@ def healthy(point: OperatingCondition) -> ReducedRecording:
 
 
 def simulated(*added: Added, point: OperatingCondition = POINT) -> dict[str, float]:
-    floor = load_learned().floor(with_reference=True)
-    return over_floors(change_features(run(*added, noise=2, point=point), healthy(point)), floor, is_reference=True)
+    now, reference = run(*added, noise=2, point=point), healthy(point)
+    return Condition(ConditionFacts("now", point, 0.0, 0.0, 0.0), now, reference, reference, load_learned()).over_floors
 
 
 @pytest.mark.slow
