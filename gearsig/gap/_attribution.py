@@ -173,11 +173,6 @@ def load_gap_calibration(*, with_reference: bool) -> GapCalibration:
     )
 
 
-def is_calibrated(file: Path = CALIBRATION_FILE) -> bool:
-    """Whether a calibration's numbers were fitted to blind cases, or are only a start."""
-    return int(calibration_values(file)["provenance"]["n_cases"]) > 0
-
-
 @cache
 def calibration_values(file: Path = CALIBRATION_FILE) -> dict[str, Any]:
     """Return what a calibration's file holds, "with_reference", "without_reference" and "provenance"."""

@@ -361,15 +361,6 @@ def observed(condition: Condition, index: int, n: int, change: Features | None =
     return ObservedChange(index, structural.from_centre(used.names, used.values)[:n], floors[:n])
 
 
-def halves(reduced: ReducedRecording) -> tuple[ReducedRecording, ReducedRecording]:
-    """Return the blocks of revolutions with even and with odd numbers."""
-    n = reduced.n_blocks
-    first = second = reduced
-    for block in reversed(range(n)):
-        first, second = (first.without(block), second) if block % 2 else (first, second.without(block))
-    return first, second
-
-
 # --------------------
 # What can be noticed when recordings are not of the machine that they are said to be of.
 # --------------------

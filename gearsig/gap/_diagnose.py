@@ -13,7 +13,7 @@ import numpy as np
 from gearsig.checks import closest_match_hint, listed, short
 from gearsig.errors import GearsigError, InputError, RefusalError
 from gearsig.formatting import odds_text
-from gearsig.gap._attribution import Attribution, attribute, counted_against, is_calibrated
+from gearsig.gap._attribution import Attribution, attribute, counted_against
 from gearsig.gap._conditions import Condition, Stage, conditions_of, simulated, warnings_of
 from gearsig.gap._curves import angle_curves, average_curves, spectrum_curves
 from gearsig.gap._evidence import CRACK, evidence_of
@@ -59,11 +59,6 @@ from gearsig.processes import one_pool, start_early
 from gearsig.recording import Recording, check_recording, metres_per_second_squared
 from gearsig.rig import Rig
 from gearsig.severity import CrackEstimate, estimate_crack
-
-UNCALIBRATED = (
-    "The probabilities are not calibrated on blind cases yet, and how often they are right has not been measured: "
-    "take them as a ranking only."
-)
 
 USER_EFFECT_MESSAGE = (
     "The recognition has never seen “{title}”: it was simulated, fitted and scored on held-out data like the likeliest "
@@ -242,7 +237,6 @@ def diagnose_gap(
         (None, ()) if named is None else _after_and_next(causes, known, tried, twin, conditions, clearest)
     )
 
-    uncalibrated = () if is_calibrated() else (UNCALIBRATED,)
     reference = clearest.reference
     return GapReport(
         rig=rig.name,
@@ -273,7 +267,6 @@ def diagnose_gap(
         ),
         averages=() if reference is None else average_curves(clearest.now, reference, unit=_unit(recording.recording)),
         notes=(
-            *uncalibrated,
             *(() if labels is None else (labels.text,)),
             *(() if clearest.path is None else (clearest.path.facts.text,)),
             *left_out,

@@ -483,7 +483,7 @@ def whole_and_parts(reduced: ReducedRecording) -> tuple[tuple[str, ...], FloatAr
     """Return names and values, (1 + n_blocks, n): of the whole, and without each of its blocks; computed once."""
     if "features" not in reduced.kept:
         names, values = once(reduced)
-        parts = [once(reduced.without(b))[1] for b in range(reduced.n_blocks)]
+        parts = [once(part)[1] for part in reduced.leaving_one_out()]
         reduced.kept["features"] = names, np.stack([values, *parts])
     rows: tuple[tuple[str, ...], FloatArray] = reduced.kept["features"]
     return rows

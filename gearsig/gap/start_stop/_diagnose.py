@@ -23,7 +23,6 @@ import numpy as np
 from gearsig.checks import FloatArray
 from gearsig.errors import GearsigError, RefusalError
 from gearsig.formatting import readable
-from gearsig.gap._attribution import is_calibrated
 from gearsig.gap._conditions import Stage
 from gearsig.gap._evidence import CRACK, MIN_SIGN_FLOORS, evidence_of_feature
 from gearsig.gap._features import jackknife_variance
@@ -50,7 +49,6 @@ from gearsig.gap._report import (
 )
 from gearsig.gap._simulator import Added, DriveSimulator, GapEffect, OperatingCondition
 from gearsig.gap.start_stop._attribution import (
-    FLOORS_FILE,
     RIPPLE,
     DriveEvidence,
     FittedDriveCause,
@@ -223,8 +221,6 @@ def _messages(
     evidence: DriveEvidence,
 ) -> Iterator[str]:
     """Say what could not be told, what was taken for granted, and what the recording would not show."""
-    if not is_calibrated(FLOORS_FILE):
-        yield "The probabilities are not calibrated yet: take them as a ranking only."
     known = set.intersection(*(set(tellable(c, effects)) for c in every))
     missing = [effects[name].title for name in TRIED if name in effects and name not in known]
     if missing:
