@@ -170,7 +170,19 @@ def diagnose_gap(
         _refuse_further(learn, run_up, "a machine that starts and stops")
         return diagnose_start_stop(recordings, references, simulator, allowed, tell)
     refuse_start_stop(recordings, simulator.name)
-    rig, recordings, references, run_ups, learn = _on_stage(rig, recordings, references, run_ups, learn, stage)
+    if stage or len(rig.pairs) > 1:
+        rig = with_stage(rig, stage)
+        recordings, references, run_ups = (
+            [_on_stage(recording, stage) for recording in some] for some in (recordings, references, run_ups)
+        )
+        learn = [
+            replace(
+                item,
+                recording=_on_stage(item.recording, stage),
+                reference=item.reference and _on_stage(item.reference, stage),
+            )
+            for item in learn
+        ]
     prepared, healthy = [PreparedRecording(r) for r in recordings], [PreparedRecording(r) for r in references]
     if is_gearless(rig):
         _refuse_further(learn, run_up, "a rig without gears")
@@ -228,7 +240,6 @@ def diagnose_gap(
     cause_list, depths = _with_crack_depth(cause_list, recording, reference_of, tried)
     causes = in_order(cause_list, outcome)
     named = causes[0] if outcome in NAMING else None
-    warnings = (*warnings, *unbounded_fits(causes, outcome))
     fitted = None if named is None else named.fitted
 
     # 7. The twin with the effect, and what would tell more.
@@ -237,7 +248,6 @@ def diagnose_gap(
         (None, ()) if named is None else _after_and_next(causes, known, tried, twin, conditions, clearest)
     )
 
-    reference = clearest.reference
     return GapReport(
         rig=rig.name,
         simulator=simulator.name,
@@ -255,17 +265,19 @@ def diagnose_gap(
             clearest.simulated,
             after,
             structural=learned.floor(with_reference=False),
-            reference=reference,
-            reference_structural=None if reference is None else learned.floor(with_reference=True),
+            reference=clearest.reference,
+            reference_structural=learned.floor(with_reference=True) if clearest.has_reference else None,
             unit=_unit(recording.recording),
         ),
         angles=angle_curves(
             clearest.now,
             clearest.simulated,
             after,
-            healthy=reference,
+            healthy=clearest.reference,
         ),
-        averages=() if reference is None else average_curves(clearest.now, reference, unit=_unit(recording.recording)),
+        averages=()
+        if clearest.reference is None
+        else average_curves(clearest.now, clearest.reference, unit=_unit(recording.recording)),
         notes=(
             *(() if labels is None else (labels.text,)),
             *(() if clearest.path is None else (clearest.path.facts.text,)),
@@ -283,7 +295,7 @@ def diagnose_gap(
             *(_encoder_messages(tooth_errors, known) if named is not None else ()),
         ),
         twin_toml="" if fitted is None else _preset(twin, clearest, causes[0], fitted),
-        warnings=warnings,
+        warnings=(*warnings, *unbounded_fits(causes, outcome)),
         labelled=labels,
         next_steps=next_steps(
             outcome,
@@ -367,29 +379,9 @@ def _check_distinct(recordings: Sequence[Recording]) -> None:
         by_digest[digest] = recording.name
 
 
-def _on_stage(
-    rig: Rig,
-    recordings: Sequence[Recording],
-    references: Sequence[Recording],
-    run_ups: Sequence[Recording],
-    learn: Sequence[LabelledRecording],
-    stage: str,
-) -> tuple[Rig, Sequence[Recording], Sequence[Recording], Sequence[Recording], Sequence[LabelledRecording]]:
-    """Return everything with the pair that is asked for as the rig's first."""
-    if not stage and len(rig.pairs) < 2:
-        return rig, recordings, references, run_ups, learn
-
-    def chosen(recording: Recording) -> Recording:
-        return replace(recording, rig=None if recording.rig is None else with_stage(recording.rig, stage))
-
-    labelled = [
-        replace(
-            item, recording=chosen(item.recording), reference=None if item.reference is None else chosen(item.reference)
-        )
-        for item in learn
-    ]
-    recordings, references, run_ups = ([*map(chosen, some)] for some in (recordings, references, run_ups))
-    return with_stage(rig, stage), recordings, references, run_ups, labelled
+def _on_stage(recording: Recording, stage: str) -> Recording:
+    """Return a recording with the pair that is asked for as its rig's first."""
+    return replace(recording, rig=recording.rig and with_stage(recording.rig, stage))
 
 
 def _labelled_facts(

@@ -56,10 +56,13 @@ class Feature:
     side: str = ""
     detail: str = ""
 
-    @classmethod
-    def of(cls, name: str) -> Feature:
+    @staticmethod
+    @cache
+    def of(name: str) -> Feature:
         """Return the feature of a name, as tables keep it."""
-        return _feature_of(name)
+        family, _, remainder = name.partition(".")
+        side, _, detail = remainder.partition(".")
+        return Feature(family, side, detail) if side in SIDES else Feature(family, "", remainder)
 
     def __str__(self) -> str:
         return ".".join(part for part in (self.family, self.side, self.detail) if part)
@@ -92,13 +95,6 @@ class Feature:
 
 
 _OTHER_SIDE = {"driver": "driven", "driven": "driver"}
-
-
-@cache
-def _feature_of(name: str) -> Feature:
-    family, _, remainder = name.partition(".")
-    side, _, detail = remainder.partition(".")
-    return Feature(family, side, detail) if side in SIDES else Feature(family, "", remainder)
 
 
 def line_features(reduced: ReducedRecording, channel: str) -> Iterator[NamedValue]:

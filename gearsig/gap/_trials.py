@@ -803,15 +803,11 @@ def cause_place(
 def _is_clear(tried: TriedEffect, conditions: Sequence[Condition]) -> bool:
     """Whether the fit is worse on the other shaft by more than chance."""
     observations = observed_changes(conditions)
-    costs = [fit_effect(paths, observations).cost for paths in _by_shaft(tried.paths)]
-    return len(costs) < len(SIDES) or max(costs) - min(costs) > INTERVAL_COST
-
-
-def _by_shaft(paths: Sequence[EffectPath]) -> list[list[EffectPath]]:
-    paths_of_shafts = [
-        [path for path in paths if path.options.get("gear", path.options.get("shaft")) == side] for side in SIDES
+    by_shaft = [
+        [path for path in tried.paths if path.options.get("gear", path.options.get("shaft")) == side] for side in SIDES
     ]
-    return [some for some in paths_of_shafts if some]
+    costs = [fit_effect(paths, observations).cost for paths in by_shaft if paths]
+    return len(costs) < len(SIDES) or max(costs) - min(costs) > INTERVAL_COST
 
 
 def at_its_tooth(added: Added, frame: GearFrame, places: Sequence[GapPlace]) -> Added:
