@@ -52,12 +52,10 @@ from gearsig.gap._diagnose import diagnose_gap, effects_without_place
 from gearsig.gap._evidence import (
     SIGNS,
     TOOTH_FAULTS,
-    ShaftSigns,
     determined_options,
     evidence_of,
     evidence_of_feature,
     feature_words,
-    shaft_signs,
 )
 from gearsig.gap._features import Feature, Features, burst_features, features_of, once
 from gearsig.gap._floors import (
@@ -283,7 +281,6 @@ __all__ = [
     "Recogniser",
     "Reduced",
     "ReducedRecording",
-    "ShaftSigns",
     "Shrinkage",
     "SimulatedWaveform",
     "SpectrumCurves",
@@ -382,7 +379,6 @@ __all__ = [
     "score_of",
     "segment_changes",
     "severity_unit",
-    "shaft_signs",
     "shares_of",
     "shrinkage",
     "soft_size",

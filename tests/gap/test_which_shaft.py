@@ -20,13 +20,11 @@ from gearsig.gap import (
     OperatingCondition,
     PlaceKind,
     ReducedRecording,
-    ShaftSigns,
     cause_place,
     determined_options,
     gear_frame,
     load_learned,
     reduce_recording,
-    shaft_signs,
 )
 from gearsig.rig import GearPair, OperatingPoint, Rig, Shaft
 from sims.registry import gap_simulator
@@ -55,14 +53,17 @@ def test_signs_that_rose_on_one_shaft_put_it_there(cause: str, side: str) -> Non
 
 
 def test_what_no_shaft_has_to_itself_cannot_be_told() -> None:
-    assert shaft_signs("tooth_wear", [{}], TEETH) is None
+    assert determined_options("tooth_wear", [on_both("unbalance")], TEETH) == {}
     assert determined_options("backlash", [{}], TEETH) == {}
 
 
 @given(st.floats(0.0, 20.0), st.floats(0.0, 20.0))
 def test_exchanged_shafts_exchange_the_answer(one: float, other: float) -> None:
-    side, turned = ShaftSigns((one, other)).side, ShaftSigns((other, one)).side
-    assert (side is None and turned is None) or side == 1 - (turned or 0)
+    def put_on(*rises: float) -> str:
+        change = {sign.format(side): by for side, by in zip(SIDES, rises, strict=True) for sign in SIGNS["unbalance"]}
+        return determined_options("unbalance", [change], TEETH).get("gear", "")
+
+    assert {put_on(one, other), put_on(other, one)} in ({""}, set(SIDES))
 
 
 def test_signs_on_both_shafts_cannot_be_told_but_for_an_order_that_one_shaft_cannot_have() -> None:
