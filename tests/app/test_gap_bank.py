@@ -15,7 +15,7 @@ from gearsig.gap import (
     OperatingCondition,
     TwinRun,
     banks_of,
-    change_once,
+    change_features,
     conditions_of,
     once,
     reduce_recording,
@@ -100,7 +100,7 @@ def test_changes_are_those_of_the_features_against_the_healthy_run() -> None:
         return reduce_recording(run, RIG)
 
     np.testing.assert_array_equal(found.healthy, once(gathered())[1])
-    np.testing.assert_array_equal(found.changes[1], change_once(gathered(STRONG), gathered())[1])
+    np.testing.assert_array_equal(found.changes[1], change_features(gathered(STRONG), gathered()).values)
 
 
 def test_what_cannot_be_simulated_is_left_out() -> None:

@@ -25,8 +25,6 @@ from gearsig.gap import (
     difference_features,
     gap_places,
     locate_all_round,
-    locate_mesh,
-    locate_tail,
     reduce_recording,
     without_multiples,
     without_silent_races,
@@ -232,8 +230,8 @@ def test_clipping_is_told_from_a_stray_peak() -> None:
     recording = record(seed=1)
     clipped = reduce_recording(replace(recording, samples=np.clip(recording.samples, -4.0, 4.0)), RIG)
     figures = {"raw.near_the_extreme": 20.0, "raw.kurtosis": -1.0}
-    assert "as clipping makes them" in locate_tail(compared(figures, clipped)).title
-    assert "clipping" not in locate_tail(compared(figures)).title
+    assert "as clipping makes them" in gap_places(compared(figures, clipped))[0].title
+    assert "clipping" not in gap_places(compared(figures))[0].title
 
 
 def compared(change_db: dict[str, float], now: ReducedRecording | None = None) -> Condition:
@@ -260,10 +258,8 @@ def test_the_figure_of_a_place_is_the_one_that_was_scored() -> None:
 
 
 def test_mesh_lines_that_hardly_moved_give_way_to_what_was_scored() -> None:
-    spot = locate_mesh(compared({"mesh.total": 0.2, "mesh.share.2": -4.0, "line.half_mesh": 0.0}))
-    assert spot is not None
+    (spot,) = gap_places(compared({"mesh.total": 0.2, "mesh.share.2": -4.0, "line.half_mesh": 0.0}))
     assert (spot.title, spot.change_db) == ("mesh harmonic 2 over all, down by 4 dB", -4.0)
     assert spot.orders == (2.0 * TEETH[0],)
-    spread = locate_mesh(compared({"mesh.total": 0.2, "alike.mesh.spread": 3.0, "line.half_mesh": 0.0}))
-    assert spread is not None
+    (spread,) = gap_places(compared({"mesh.total": 0.2, "alike.mesh.spread": 3.0, "line.half_mesh": 0.0}))
     assert spread.title == "what lies beside the mesh harmonics, which themselves hardly moved"
