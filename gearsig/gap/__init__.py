@@ -10,6 +10,7 @@ from gearsig.gap._attribution import (
     load_gap_calibration,
     with_likelihoods,
     with_unknown_shared,
+    within_the_floor,
 )
 from gearsig.gap._change import (
     beyond_the_mesh,
@@ -158,7 +159,6 @@ from gearsig.gap._report import (
     shares_of,
     stance_words,
     unbounded_fits,
-    within_the_floor,
 )
 from gearsig.gap._simulator import (
     Added,

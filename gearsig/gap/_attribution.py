@@ -29,6 +29,7 @@ from gearsig.gap._report import (
     UNKNOWN,
     GapOutcome,
     GapPlace,
+    Interval,
     PlaceKind,
     Shrinkage,
     group_probabilities,
@@ -405,6 +406,22 @@ def _forest(
     allowed = {NONE, UNKNOWN, *(effects or known)} & set(conditions[0].learned.causes)
     per_condition = [c.recogniser.probabilities(c.change, c.tooth_load_n_per_mm, known.values()) for c in conditions]
     return joint_probabilities(per_condition, [c.tooth_load_n_per_mm for c in conditions], allowed)
+
+
+def within_the_floor(probabilities: Mapping[str, float], size: Interval) -> dict[str, float]:
+    """Return the probabilities with that of an unknown cause given to none, where the whole gap is within its floor.
+
+    Parameters
+    ----------
+    probabilities : mapping
+        Cause → probability.
+    size : Interval
+        Of the whole gap, in structural floors.
+    """
+    if size.high > 1.0:
+        return dict(probabilities)
+    moved = {NONE: probabilities[NONE] + probabilities[UNKNOWN], UNKNOWN: 0.0}
+    return likeliest_first({**probabilities, **moved})
 
 
 # --------------------

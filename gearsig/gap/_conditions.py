@@ -32,7 +32,6 @@ from gearsig.gap._reduction import (
     DRIVEN,
     DRIVER,
     NOMINAL_REVOLUTIONS,
-    GearFrame,
     ReducedRecording,
     reduce_recording,
     shaft_words,
@@ -509,7 +508,7 @@ def strange_teeth(now: ReducedRecording, name: str) -> list[str]:
         return []
     message = (
         f"{name}: only {percent(share)} of what repeats with a shaft lies at mesh harmonics of the rig's "
-        f"{_teeth(now.frame)} teeth. Is it a recording of this machine?"
+        f"{'/'.join(map(str, now.frame.teeth))} teeth. Is it a recording of this machine?"
     )
     return [message]
 
@@ -554,10 +553,6 @@ def _mesh_share(now: ReducedRecording, side: int) -> float:
             float(power[above & (orders_from_mesh(orders, teeth) <= NEAR_MESH)].sum()) / total if total > 0 else 1.0
         )
     return float(np.mean(shares))
-
-
-def _teeth(frame: GearFrame) -> str:
-    return "/".join(str(z) for z in frame.teeth)
 
 
 CLEAR_WITHOUT = 3.0

@@ -13,7 +13,7 @@ import numpy as np
 from gearsig.checks import closest_match_hint, listed, short
 from gearsig.errors import GearsigError, InputError, RefusalError
 from gearsig.formatting import odds_text
-from gearsig.gap._attribution import Attribution, attribute, counted_against
+from gearsig.gap._attribution import Attribution, attribute, counted_against, within_the_floor
 from gearsig.gap._conditions import Condition, Stage, conditions_of, simulated, warnings_of
 from gearsig.gap._curves import angle_curves, average_curves, spectrum_curves
 from gearsig.gap._evidence import CRACK, evidence_of
@@ -39,9 +39,8 @@ from gearsig.gap._report import (
     most_probable_two,
     named_cause,
     unbounded_fits,
-    within_the_floor,
 )
-from gearsig.gap._simulator import Added, CanRunUp, DriveSimulator, GapEffect, GapSimulator, Twin, as_tried
+from gearsig.gap._simulator import CanRunUp, DriveSimulator, GapEffect, GapSimulator, Twin, as_tried
 from gearsig.gap._tooth_error import ToothErrorEvidence, has_encoders, mean_log_likelihoods, tooth_error_evidence
 from gearsig.gap._trials import (
     PROCESSES,
@@ -294,7 +293,11 @@ def diagnose_gap(
             *_waveform_messages(tried, known, clearest),
             *(_encoder_messages(tooth_errors, known) if named is not None else ()),
         ),
-        twin_toml="" if fitted is None else _preset(twin, clearest, causes[0], fitted),
+        twin_toml=""
+        if fitted is None
+        else twin.preset_toml(
+            clearest.facts.point, (fitted,), (fitted_words(causes[0], fitted.severity, clearest.facts.name),)
+        ),
         warnings=(*warnings, *unbounded_fits(causes, outcome)),
         labelled=labels,
         next_steps=next_steps(
@@ -561,11 +564,6 @@ def _with_crack_depth(
     return [changed if cause is crack else cause for cause in causes], [message]
 
 
-def _preset(twin: Twin, condition: Condition, cause: GapCause, fitted: Added) -> str:
-    note = fitted_words(cause, fitted.severity, condition.facts.name)
-    return twin.preset_toml(condition.facts.point, (fitted,), (note,))
-
-
 def _after_and_next(
     causes: Sequence[GapCause],
     known: Mapping[str, GapEffect],
@@ -575,22 +573,11 @@ def _after_and_next(
     clearest: Condition,
 ) -> tuple[ReducedRecording | None, tuple[NextRecording, ...]]:
     """Return the twin with the likeliest effect, as it was fitted, and what would tell more: both at once."""
-    fitted = causes[0].fitted
+    fitted, pair = causes[0].fitted, most_probable_two(causes)
+    next_ones: tuple[NextRecording, ...] = ()
     with ThreadPoolExecutor(1) as executor:
         after = executor.submit(simulated, twin, clearest.facts, clearest.now, (fitted,)) if fitted else None
-        next_ones = _next(causes, known, tried, twin, conditions)
+        if pair is not None and not is_settled(causes) and all(name in tried for name in pair):
+            (first, second), titles = (tried[name] for name in pair), (known[pair[0]].title, known[pair[1]].title)
+            next_ones = next_recordings(first, second, titles, twin, conditions)
     return (after.result() if after else None), next_ones
-
-
-def _next(
-    causes: Sequence[GapCause],
-    known: Mapping[str, GapEffect],
-    tried: Mapping[str, TriedEffect],
-    twin: Twin,
-    conditions: Sequence[Condition],
-) -> tuple[NextRecording, ...]:
-    pair = most_probable_two(causes)
-    if pair is None or is_settled(causes) or any(name not in tried for name in pair):
-        return ()
-    first, second = pair
-    return next_recordings(tried[first], tried[second], (known[first].title, known[second].title), twin, conditions)

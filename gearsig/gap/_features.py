@@ -254,8 +254,8 @@ FLOOR_WIDTH = 48
 """Lines whose median is the floor."""
 LOWEST_STRANGE = 0.4
 """Order of the driver below which a line may be the window's or the speed's."""
-BEARING_FAMILIES = {"outer": ("outer", 1.0), "inner": ("inner", 1.0), "ball": ("spin", 2.0), "cage": ("cage", 1.0)}
-"""Family → the bearing's order that it counts, and how often; a ball strikes with both sides."""
+BEARING_FAMILIES = ("outer", "inner", "ball", "cage")
+"""See `BearingFrame.families`."""
 
 
 def floor_ratio(power: FloatArray) -> FloatArray:
@@ -305,8 +305,8 @@ def envelope_ratios(reduced: ReducedRecording, sums: ChannelSums) -> FloatArray:
 def _families(
     frame: GearFrame, levels: FloatArray, step: float, known: Sequence[float], name: str
 ) -> Iterator[NamedValue]:
-    for kind, (attribute, factor) in BEARING_FAMILIES.items():
-        orders = [getattr(b, attribute) * factor for b in frame.bearings]
+    for kind in BEARING_FAMILIES:
+        orders = [bearing.families[kind] for bearing in frame.bearings]
         scores = [_family(levels, o, N_FAMILY, step, known, SLIP) for o in orders if np.isfinite(o)]
         yield f"{name}.{kind}", max(scores, default=0.0)
 

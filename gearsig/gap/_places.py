@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
+from gearsig.formatting import named
 from gearsig.gap._change import (
     difference_residuals,
     lines_of_shaft,
@@ -17,7 +18,6 @@ from gearsig.gap._change import (
 from gearsig.gap._conditions import Condition
 from gearsig.gap._evidence import feature_words
 from gearsig.gap._features import (
-    BEARING_FAMILIES,
     LOWEST_STRANGE,
     MAX_SHAFT_ORDERS,
     N_FAMILY,
@@ -170,8 +170,7 @@ def _silent_races(condition: Condition) -> set[str]:
     rises = [(_widened(levels.now) - levels.baseline, levels, floor) for levels, floor in floors]
     silent = set()
     for effect, kind in RACES.items():
-        attribute, factor = BEARING_FAMILIES[kind]
-        orders = [getattr(bearing, attribute) * factor for bearing in condition.now.frame.bearings]
+        orders = [bearing.families[kind] for bearing in condition.now.frame.bearings]
         known = [order for order in orders if np.isfinite(order)]
         heard = any(_family_rise(rise, o, levels)[0] >= floor for o in known for rise, levels, floor in rises)
         if known and not heard:
@@ -361,17 +360,12 @@ def _best_race(condition: Condition, levels: LineLevels) -> _StrongestRise:
     races = [_StrongestRise("", 0.0, (), 0)]
     now, baseline = _widened(levels.now), levels.baseline
     for bearing in condition.now.frame.bearings:
-        for kind, (attribute, factor) in BEARING_FAMILIES.items():
-            order = getattr(bearing, attribute) * factor
+        for kind, order in bearing.families.items():
             if np.isfinite(order):
                 rise, row, slipped = _family_rise(now - baseline, order, levels)
-                words = f"of the {RACE_WORDS[kind]} of {_bearing(bearing.name)} (order {slipped:.3g})"
+                words = f"of the {RACE_WORDS[kind]} of {named('bearing', bearing.name)} (order {slipped:.3g})"
                 races.append(_StrongestRise(words, rise, _multiples(slipped, N_FAMILY), row))
     return max(races, key=lambda family: family.rise_db)
-
-
-def _bearing(name: str) -> str:
-    return name if "bearing" in name.lower() else f"bearing {name}"
 
 
 def _family_rise(rise: FloatArray, order: float, levels: LineLevels) -> tuple[float, int, float]:
@@ -438,9 +432,9 @@ def _order_words(condition: Condition, order: float) -> str:
         if abs(order - max(round(order / turns), 1) * turns) <= min(step, 0.1 * turns):
             return f"at order {order:.4g}, a multiple of {shaft_words(frame, side)}"
     for bearing in condition.now.frame.bearings:
-        for kind, (attribute, factor) in BEARING_FAMILIES.items():
-            if -SLIP < order / (getattr(bearing, attribute) * factor) - 1.0 < UPWARDS:
-                return f"at order {order:.4g}, that of the {RACE_WORDS[kind]} of {_bearing(bearing.name)}"
+        for kind, of_family in bearing.families.items():
+            if -SLIP < order / of_family - 1.0 < UPWARDS:
+                return f"at order {order:.4g}, that of the {RACE_WORDS[kind]} of {named('bearing', bearing.name)}"
     nor = "and no bearing" if condition.now.frame.bearings else "(the rig names no bearing)"
     return f"at order {order:.4g}, which belongs to no shaft {nor}"
 

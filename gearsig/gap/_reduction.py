@@ -50,6 +50,11 @@ class BearingFrame:
     spin: float
     cage: float
 
+    @property
+    def families(self) -> dict[str, float]:
+        """Family of lines → the order that it counts: a ball strikes with both sides."""
+        return {"outer": self.outer, "inner": self.inner, "ball": 2.0 * self.spin, "cage": self.cage}
+
 
 @dataclass(frozen=True)
 class GearFrame:

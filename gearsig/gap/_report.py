@@ -10,7 +10,7 @@ from math import exp, inf, isfinite, isinf, nan
 import numpy as np
 
 from gearsig.checks import FloatArray
-from gearsig.formatting import odds_text, percent, readable
+from gearsig.formatting import enumerated, odds_text, percent, readable
 from gearsig.gap._simulator import Added, GapEffect, OperatingCondition, same_load, same_speed
 from gearsig.results import Result, verdict_html
 
@@ -806,8 +806,7 @@ def _kind_and_rivals(report: GapReport, rivals: Sequence[str]) -> str:
 
 
 def _or_text(report: GapReport, names: Sequence[str]) -> str:
-    *titles, last = (_titled(report, name) for name in names)
-    return f"{', '.join(titles)} or {last}" if titles else last
+    return enumerated([_titled(report, name) for name in names], "or")
 
 
 def _which_unknown(report: GapReport) -> str:
@@ -854,22 +853,6 @@ def is_settled(causes: Sequence[GapCause]) -> bool:
     """Whether of all effects one alone is likely."""
     probabilities = sorted((c.probability for c in causes if c.is_effect), reverse=True)
     return len(probabilities) > 1 and probabilities[1] < SETTLED <= probabilities[0]
-
-
-def within_the_floor(probabilities: Mapping[str, float], size: Interval) -> dict[str, float]:
-    """Return the probabilities with that of an unknown cause given to none, where the whole gap is within its floor.
-
-    Parameters
-    ----------
-    probabilities : mapping
-        Cause → probability.
-    size : Interval
-        Of the whole gap, in structural floors.
-    """
-    if size.high > 1.0:
-        return dict(probabilities)
-    moved = {NONE: probabilities[NONE] + probabilities[UNKNOWN], UNKNOWN: 0.0}
-    return likeliest_first({**probabilities, **moved})
 
 
 def unbounded_fits(causes: Sequence[GapCause], outcome: GapOutcome) -> list[str]:
