@@ -38,7 +38,7 @@ from gearsig.gap._report import (
     shares_of,
 )
 from gearsig.gap._simulator import GapEffect, Twin
-from gearsig.gap._trials import TriedEffect, refuse_where_none_ran, try_effects
+from gearsig.gap._trials import TriedEffect, try_effects
 
 CALIBRATION_FILE = Path(__file__).with_name("calibration.json")
 
@@ -395,7 +395,6 @@ def attribute(
         likely += [name for name in TOOTH_FAULTS if name in first and name in known and name not in likely]
     likely += untrained
     tried = try_effects([known[name] for name in likely], twin, conditions, cache, on_progress, fresh=fresh)
-    refuse_where_none_ran(tried, likely, twin)
     return replace(attribution, tried=tried, untrained=tuple(untrained))
 
 

@@ -610,8 +610,7 @@ def conditions_of(
     def condition_of(recording: PreparedRecording) -> tuple[Condition, list[str]]:
         name = recording.recording.name
         tell(f"simulating the healthy machine at the point of {name}", 0.05 + 0.15 * next(done) / len(recordings))
-        condition, notes = _condition(recording, healthy, twin, learned, on_read)
-        return replace(condition, path=path), notes
+        return _condition(recording, healthy, twin, learned, path, on_read)
 
     conditions = readable(recordings, condition_of, "recording", messages)
     if not references:
@@ -693,6 +692,7 @@ def _condition(
     healthy: Sequence[HealthyReference],
     twin: Twin,
     learned: Learned,
+    path: MeasuredPath | None,
     on_read: Callable[[ConditionFacts, ReducedRecording], object],
 ) -> tuple[Condition, list[str]]:
     """Return a recording beside its reference and the healthy twin at its point, and what is worth a remark."""
@@ -714,7 +714,7 @@ def _condition(
         messages += [f"{name}: {reversed_text(turned)}"] if turned else []
     check_steady(now, reference)
     on_read(facts, now)
-    condition = Condition(facts, now, simulated(twin, facts, now), reference, learned)
+    condition = Condition(facts, now, simulated(twin, facts, now), reference, learned, path)
     if reference is not None:
         messages += strange_pattern(now, reference, name)
         messages += _strange_reference(condition)

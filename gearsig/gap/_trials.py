@@ -443,6 +443,11 @@ def try_effects(
     -------
     dict
         Effect → how it was tried: its fit, its shrinkage on held-out data, and its waveform where that is of one tooth.
+
+    Raises
+    ------
+    RefusalError
+        If the rig has a place for some of the effects, and none of them can be simulated there.
     """
     if not effects:
         return {}
@@ -479,6 +484,11 @@ def try_effects(
             tried_effects[name] = TriedEffect(
                 name, paths, fit_effect(paths, observed_changes(conditions)), shrink, match
             )
+    placed = [name for name, some in candidates.items() if some]
+    if placed and not tried_effects:
+        raise RefusalError(
+            f"none of {', '.join(placed)} can be simulated on this rig", remedy="describe the rig more fully"
+        )
     shares = closed_shares(fits, folds)
     return {
         name: replace(tried, shrinkage=replace(tried.shrinkage, of_all=shares.get(name)))
@@ -651,15 +661,6 @@ def _left_out_changes(condition: Condition, index: int, n: int) -> tuple[tuple[O
         tuple(replace(base, distances=base.distances + row[:n] - values) for row in rows)
         for rows in condition.change.left_out
     )
-
-
-def refuse_where_none_ran(tried: dict[str, TriedEffect], names: Sequence[str], twin: Twin) -> None:
-    """Refuse where the rig has a place for some of the effects, and none of them could be simulated there."""
-    placed = [name for name in names if twin.candidates(name)]
-    if placed and not tried:
-        raise RefusalError(
-            f"none of {', '.join(placed)} can be simulated on this rig", remedy="describe the rig more fully"
-        )
 
 
 # --------------------

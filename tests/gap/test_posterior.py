@@ -8,17 +8,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gearsig.errors import RefusalError
 from gearsig.gap import (
     NONE,
     UNKNOWN,
-    Added,
     GapCalibration,
     GapEffect,
     GapOutcome,
     joint_probabilities,
     load_gap_calibration,
-    refuse_where_none_ran,
     with_unknown_shared,
 )
 
@@ -168,16 +165,3 @@ def test_nothing_is_lost_and_only_unknown_gives(scores: dict[str, float]) -> Non
     assert (found["clipping"], found[NONE]) == (0.3, 0.2)
     best = max(scores, key=scores.__getitem__, default="")
     assert all(found[best] >= found[name] for name in scores)
-
-
-class OnlyGears:
-    """A twin whose rig names no bearing."""
-
-    def candidates(self, effect: str) -> list[Added]:
-        return [] if effect.startswith("bearing") else [Added(effect, 1.0)]
-
-
-def test_effects_that_the_rig_has_no_place_for_are_no_reason_to_refuse() -> None:
-    refuse_where_none_ran({}, ["bearing_clearance"], OnlyGears())  # type: ignore[arg-type]  # asked for candidates alone
-    with pytest.raises(RefusalError, match="none of tooth_wear can be simulated"):
-        refuse_where_none_ran({}, ["bearing_clearance", "tooth_wear"], OnlyGears())  # type: ignore[arg-type]  # the same

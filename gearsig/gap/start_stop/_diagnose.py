@@ -76,7 +76,7 @@ def diagnose_start_stop(
     references: Sequence[Recording],
     simulator: DriveSimulator,
     effects: Mapping[str, GapEffect],
-    tell: Stage = lambda *_: None,
+    tell: Stage,
 ) -> GapReport:
     """Diagnose the gap between start–stop recordings of one machine and its simulated drive; see `diagnose_gap`.
 
