@@ -110,16 +110,10 @@ def gear_frame(rig: Rig) -> GearFrame:
     ratios = (1.0, teeth[0] / teeth[1])
     bearings = []
     for bearing in rig.bearings:
-        if bearing.shaft not in shafts:
-            continue
-        side = shafts.index(bearing.shaft)
-        orders_of_shaft = {name: order * ratios[side] for name, order in bearing.orders().items()}
-        nan = float("nan")
-        bearings.append(
-            BearingFrame(
-                bearing.name, side, *(orders_of_shaft.get(name, nan) for name in ("BPFO", "BPFI", "BSF", "FTF"))
-            )
-        )
+        if bearing.shaft in shafts:
+            side, known = shafts.index(bearing.shaft), bearing.orders()
+            per_driver = (known.get(name, float("nan")) * ratios[side] for name in ("BPFO", "BPFI", "BSF", "FTF"))
+            bearings.append(BearingFrame(bearing.name, side, *per_driver))
     return GearFrame(pair, shafts, teeth, tuple(bearings), background_orders(rig))
 
 
