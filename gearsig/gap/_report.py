@@ -806,7 +806,8 @@ def _kind_and_rivals(report: GapReport, rivals: Sequence[str]) -> str:
 
 
 def _or_text(report: GapReport, names: Sequence[str]) -> str:
-    return enumerated([_titled(report, name) for name in names], "or")
+    titles = {cause.name: f"{cause.title} ({odds_text(cause.probability)})" for cause in report.causes}
+    return enumerated([titles.get(name, name.replace("_", " ")) for name in names], "or")
 
 
 def _which_unknown(report: GapReport) -> str:
@@ -882,11 +883,6 @@ def _which_undecided(report: GapReport) -> str:
 def _severity(cause: GapCause, severity: Interval) -> str:
     """Write a severity with three digits, without an exponent, and its unit."""
     return f"{float(f'{severity.value:.3g}'):.12g} {severity_unit(cause.unit)}".rstrip()
-
-
-def _titled(report: GapReport, name: str) -> str:
-    cause = {c.name: c for c in report.causes}.get(name)
-    return f"{cause.title} ({odds_text(cause.probability)})" if cause is not None else name.replace("_", " ")
 
 
 def _shrinkage_text(report: GapReport) -> str:

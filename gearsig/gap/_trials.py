@@ -291,9 +291,9 @@ def banks_of(
     return [{name: bank for name, bank in zip(candidates, in_order, strict=False) if bank is not None} for _ in runs]
 
 
-def rounded(point: OperatingCondition) -> OperatingCondition:
-    """Return the point at which a bank is made."""
-    return OperatingCondition(*(float(f"{v:.{POINT_DIGITS}g}") for v in (point.speed_rpm, point.torque_nm)))
+def rounded(point: OperatingCondition, n_digits: int = POINT_DIGITS) -> OperatingCondition:
+    """Return the point with so many digits: that at which a bank is made, or one that is easily set."""
+    return OperatingCondition(*(float(f"{value:.{n_digits}g}") for value in (point.speed_rpm, point.torque_nm)))
 
 
 def bank_key(run: TwinRun, candidates: Sequence[Added]) -> str:
@@ -555,18 +555,13 @@ def _settings(bank: Bank, effect: GapEffect, teeth: Sequence[int]) -> Iterator[t
         simulated = [
             (added, sidebands[:, side])
             for added, sidebands in zip(bank.added, bank.sidebands, strict=True)
-            if _side(added) == side and (not effect.is_on_every_tooth or "tooth" in added.options)
+            if added.options.get("gear") == SIDES[side] and (not effect.is_on_every_tooth or "tooth" in added.options)
         ]
         for added, sidebands in with_profiles_between(simulated, effect, teeth[side]):
             yield added, side, sidebands, 0
         if effect.is_on_every_tooth and simulated:
             first, sidebands = simulated[0]
             yield Added(first.name, first.severity, {"gear": SIDES[side]}), side, sidebands, teeth[side]
-
-
-def _side(added: Added) -> int | None:
-    gear = added.options.get("gear")
-    return SIDES.index(str(gear)) if gear in SIDES else None
 
 
 def on_shaft(
