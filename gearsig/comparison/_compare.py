@@ -137,14 +137,14 @@ def compare(
         *check_live(prepared[0], [p.simulated for p in pairs], "simulation"),
         *check_live(prepared[1], [p.recorded for p in pairs], "recording"),
     )
-    machine = common_machine(simulated, recorded, rig)
-    rig, reference = machine.recorded, machine.recorded.reference_shaft
+    simulated_rig, rig, names, machine_notes = common_machine(simulated, recorded, rig)
+    reference = rig.reference_shaft
     # Revolutions of each shaft per revolution of the reference shaft, which comes first.
     ratios = {reference: 1.0} | {name: ratio for name in rig.shaft_names if (ratio := rig.ratio(name)) is not None}
-    simulated_rig = replace(machine.simulated, speed=usable_speed(machine.simulated, simulated))
+    simulated_rig = replace(simulated_rig, speed=usable_speed(simulated_rig, simulated))
     factors = {p.simulated: p.factor for p in pairs}
     sides = (
-        make_side(prepared[0].with_rig(simulated_rig), factors, machine.names, ratios, "simulation"),
+        make_side(prepared[0].with_rig(simulated_rig), factors, names, ratios, "simulation"),
         make_side(prepared[1].with_rig(rig), {p.recorded: 1.0 for p in pairs}, {}, ratios, "recording"),
     )
     lines = _common_lines(sides, ratios)
@@ -173,7 +173,7 @@ def compare(
         highest_order=highest,
         alignments=alignments,
         channels=compared,
-        notes=(*machine.notes, *problems, *notes_of(*sides, alignments, compared, ratios)),
+        notes=(*machine_notes, *problems, *notes_of(*sides, alignments, compared, ratios)),
         verdict=verdict_of(compared, alignments),
         findings=findings_of(compared),
     )

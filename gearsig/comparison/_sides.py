@@ -269,30 +269,19 @@ def check_live(side: PreparedRecording, channels: Sequence[str], side_name: str)
     return tuple(f"The {side_name}: {p.text}; what differs may be no more than that." for p in problems)
 
 
-@dataclass(frozen=True)
-class ComparedRigs:
-    """Both sides' rigs.
-
-    Parameters
-    ----------
-    simulated, recorded : Rig
-        Empty where nothing is known. Orders are counted as in `recorded`.
-    names : dict
-        Of shafts: as in the recording's rig → as in the simulation's.
-    notes : tuple of str
-    """
-
-    simulated: Rig
-    recorded: Rig
-    names: dict[str, str]
-    notes: tuple[str, ...]
-
-
-def common_machine(simulated: Recording, recorded: Recording, rig: Rig | None) -> ComparedRigs:
+def common_machine(
+    simulated: Recording, recorded: Recording, rig: Rig | None
+) -> tuple[Rig, Rig, dict[str, str], list[str]]:
     """Return the rigs of both sides after checking that they have the same gears.
 
     A side without a rig takes the other's gears, but not its sensors and its tachometer: those belong to a measurement.
     A simulation that states no speed takes the rig's, where that is constant.
+
+    Returns
+    -------
+    (Rig, Rig, dict, list of str)
+        The simulation's, and the recording's, which orders are counted by, empty where nothing is known; the shafts'
+        names in the first by those in the second; what is to be said of it.
 
     Raises
     ------
@@ -317,7 +306,7 @@ def common_machine(simulated: Recording, recorded: Recording, rig: Rig | None) -
     ):
         rpm = f"{simulated_rig.speed.speed_rpm:g} rpm"
         notes.append(f"The simulation has no tachometer: it is taken to run at {rpm}, as the rig file says.")
-    return ComparedRigs(simulated_rig, recorded_rig, _shaft_names(simulated_rig, recorded_rig), tuple(notes))
+    return simulated_rig, recorded_rig, _shaft_names(simulated_rig, recorded_rig), notes
 
 
 def gears_only(rig: Rig, speed: SpeedSource | None = None) -> Rig:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cache
 from math import exp
 from pathlib import Path
@@ -29,22 +29,21 @@ from gearsig.gap._report import (
     UNKNOWN,
     GapOutcome,
     GapPlace,
+    Interval,
     PlaceKind,
     Shrinkage,
     group_probabilities,
     likeliest_first,
+    scaled,
     shares_of,
 )
 from gearsig.gap._simulator import GapEffect, Twin
-from gearsig.gap._trials import TriedEffect, refuse_where_none_ran, try_effects
+from gearsig.gap._trials import TriedEffect, try_effects
 
 CALIBRATION_FILE = Path(__file__).with_name("calibration.json")
 
 SIZES = (0.3, 6.0)
 """Structural floors that a gap's size counts from and to."""
-
-_NUMBERS = ("sharpness", "shrink_weight", "neutral_shrink", "none_bias", "unknown_bias", "named_from", "apart")
-_FURTHER = {"sharper": 0.0, "none_slope": 0.0, "several": 1.0}
 
 
 @dataclass(frozen=True)
@@ -89,14 +88,15 @@ class GapCalibration:
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> GapCalibration:
         """Build it from what a JSON file holds."""
-        biases = {name: float(value) for name, value in values.get("effect_biases", {}).items()}
-        further = {name: float(values.get(name, usual)) for name, usual in _FURTHER.items()}
-        return cls(**{name: float(values[name]) for name in _NUMBERS}, effect_biases=biases, **further)
+        return cls(**{field.name: values[field.name] for field in fields(cls) if field.name in values})
 
     def to_mapping(self) -> dict[str, Any]:
         """Return plain values, for a JSON file."""
-        numbers: dict[str, Any] = {name: round(float(getattr(self, name)), 4) for name in (*_NUMBERS, *_FURTHER)}
-        return numbers | ({"effect_biases": dict(self.effect_biases)} if self.effect_biases else {})
+        numbers = asdict(self)
+        biases = numbers.pop("effect_biases")
+        return {name: round(float(value), 4) for name, value in numbers.items()} | (
+            {"effect_biases": biases} if biases else {}
+        )
 
     def probabilities(
         self, forest: Mapping[str, float], scores: Mapping[str, float], size: float = 1.0, n_conditions: int = 1
@@ -172,11 +172,6 @@ def load_gap_calibration(*, with_reference: bool) -> GapCalibration:
     return GapCalibration.from_mapping(
         calibration_values()["with_reference" if with_reference else "without_reference"]
     )
-
-
-def is_calibrated(file: Path = CALIBRATION_FILE) -> bool:
-    """Whether a calibration's numbers were fitted to blind cases, or are only a start."""
-    return int(calibration_values(file)["provenance"]["n_cases"]) > 0
 
 
 @cache
@@ -384,7 +379,7 @@ def attribute(
         If the rig has a place for some of the likeliest effects, and none of them can be simulated there.
     """
     forest = _forest(conditions, effects, known)
-    with_reference = all(c.reference is not None for c in conditions)
+    with_reference = all(c.has_reference for c in conditions)
     size = max(condition.size.structural.value for condition in conditions)
     calibration = load_gap_calibration(with_reference=with_reference)
     evidence = labelled_evidence(conditions, labelled) if labelled else None
@@ -400,7 +395,6 @@ def attribute(
         likely += [name for name in TOOTH_FAULTS if name in first and name in known and name not in likely]
     likely += untrained
     tried = try_effects([known[name] for name in likely], twin, conditions, cache, on_progress, fresh=fresh)
-    refuse_where_none_ran(tried, likely, twin)
     return replace(attribution, tried=tried, untrained=tuple(untrained))
 
 
@@ -411,6 +405,22 @@ def _forest(
     allowed = {NONE, UNKNOWN, *(effects or known)} & set(conditions[0].learned.causes)
     per_condition = [c.recogniser.probabilities(c.change, c.tooth_load_n_per_mm, known.values()) for c in conditions]
     return joint_probabilities(per_condition, [c.tooth_load_n_per_mm for c in conditions], allowed)
+
+
+def within_the_floor(probabilities: Mapping[str, float], size: Interval) -> dict[str, float]:
+    """Return the probabilities with that of an unknown cause given to none, where the whole gap is within its floor.
+
+    Parameters
+    ----------
+    probabilities : mapping
+        Cause → probability.
+    size : Interval
+        Of the whole gap, in structural floors.
+    """
+    if size.high > 1.0:
+        return dict(probabilities)
+    moved = {NONE: probabilities[NONE] + probabilities[UNKNOWN], UNKNOWN: 0.0}
+    return likeliest_first({**probabilities, **moved})
 
 
 # --------------------
@@ -459,8 +469,7 @@ def counted_against(
         if place.structural >= FAR_FROM_HEALTHY:
             for name in (NONE, *([UNKNOWN] if _is_first_of_a_shaft(place, frame) else [])):
                 lowered[name] *= 2.0 * (1.0 - place.share)
-    total = sum(lowered.values())
-    return likeliest_first({name: p / total for name, p in lowered.items()})
+    return scaled(lowered)
 
 
 def _is_first_of_a_shaft(place: GapPlace, frame: GearFrame) -> bool:

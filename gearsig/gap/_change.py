@@ -219,14 +219,13 @@ def change_features(now: ReducedRecording, healthy: ReducedRecording) -> Feature
     """
     (names, after), before = whole_and_parts(now), whole_and_parts(healthy)[1]
     joined, values = _joined(names, after[0] - before[0], now, healthy)
+    parts, healthy_parts = now.leaving_one_out(), healthy.leaving_one_out()
     return _with_scatter(
         joined,
         values,
+        np.stack([_joined(names, v - before[0], part, healthy)[1] for v, part in zip(after[1:], parts, strict=True)]),
         np.stack(
-            [_joined(names, v - before[0], part, healthy)[1] for v, part in zip(after[1:], _parts(now), strict=True)]
-        ),
-        np.stack(
-            [_joined(names, after[0] - v, now, part)[1] for v, part in zip(before[1:], _parts(healthy), strict=True)]
+            [_joined(names, after[0] - v, now, part)[1] for v, part in zip(before[1:], healthy_parts, strict=True)]
         ),
     )
 
@@ -269,10 +268,6 @@ def _with_scatter(names: tuple[str, ...], values: FloatArray, *left_out: FloatAr
     for rows in left_out:
         variance += jackknife_variance(rows)
     return Features(names, values, np.sqrt(variance), left_out)
-
-
-def _parts(reduced: ReducedRecording) -> Iterator[ReducedRecording]:
-    return (reduced.without(block) for block in range(reduced.n_blocks))
 
 
 def _joined(

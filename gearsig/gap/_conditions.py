@@ -16,12 +16,12 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import percent
 from gearsig.gap._change import (
     as_mounted,
+    beyond_the_mesh,
     change_features,
     difference_features,
     lines_of_shaft,
     turned_difference,
 )
-from gearsig.gap._evidence import over_floors
 from gearsig.gap._features import STEPS_PER_TOOTH, Features, decibel, tooth_energy
 from gearsig.gap._floors import FLOOR_IN_DEVIATIONS, GapSize, StructuralFloor, gap_size, pooled_scatter
 from gearsig.gap._path import MeasuredPath, measured_path
@@ -32,7 +32,6 @@ from gearsig.gap._reduction import (
     DRIVEN,
     DRIVER,
     NOMINAL_REVOLUTIONS,
-    GearFrame,
     ReducedRecording,
     reduce_recording,
     shaft_words,
@@ -95,9 +94,14 @@ class Condition:
     path: MeasuredPath | None = field(default=None, repr=False)
 
     @property
+    def has_reference(self) -> bool:
+        """Whether it is compared with a healthy recording of the same machine, and not with the twin."""
+        return self.reference is not None
+
+    @property
     def baseline(self) -> ReducedRecording:
         """What it is compared with."""
-        return self.reference if self.reference is not None else self.simulated
+        return self.simulated if self.reference is None else self.reference
 
     def change_of(self, part: ReducedRecording) -> Features:
         """Return the change of the recording, or of some of its blocks, against what it is compared with.
@@ -127,7 +131,7 @@ class Condition:
     @property
     def recogniser(self) -> Recogniser:
         """By which its change is recognised."""
-        return self.learned.recognisers[self.reference is not None]
+        return self.learned.recognisers[self.has_reference]
 
     @property
     def tooth_load_n_per_mm(self) -> float:
@@ -146,9 +150,31 @@ class Condition:
         return unknown if self.path is None else self.path.gain_scatter(unknown)
 
     @cached_property
+    def change_db(self) -> dict[str, float]:
+        """Feature → distance from healthy machines', in dB.
+
+        With a reference, a level relative to the mesh counts as far as it changed by itself.
+        """
+        names, distances = self.change.names, self.floor.from_centre(self.change.names, self.change.values)
+        held = beyond_the_mesh(names, distances) if self.has_reference else distances
+        return dict(zip(names, held.tolist(), strict=True))
+
+    @cached_property
+    def floors(self) -> tuple[FloatArray, FloatArray]:
+        """Structural and repeatability floor of each feature, in dB, both (n,)."""
+        return self.floor.of(self.change.names), FLOOR_IN_DEVIATIONS * pooled_scatter(self.change)
+
+    @cached_property
     def over_floors(self) -> dict[str, float]:
-        """Changes over the larger of both floors, with their signs."""
-        return over_floors(self.change, self.floor, is_reference=self.reference is not None)
+        """Feature → distance over the larger of both floors, with its sign."""
+        # Healthy machines' differences hold their scatter already; a shorter record's may be larger.
+        ratios = np.array([*self.change_db.values()]) / np.maximum(*self.floors)
+        return dict(zip(self.change.names, ratios.tolist(), strict=True))
+
+    def strongest(self, *beginnings: str) -> str:
+        """Return the feature with the largest change over the floors among those whose names begin so."""
+        sizes = self.over_floors
+        return max((name for name in sizes if name.startswith(beginnings)), key=lambda name: abs(sizes[name]))
 
 
 USUAL_PRESSURE_ANGLE_DEG = 20.0
@@ -334,15 +360,6 @@ def observed(condition: Condition, index: int, n: int, change: Features | None =
     return ObservedChange(index, structural.from_centre(used.names, used.values)[:n], floors[:n])
 
 
-def halves(reduced: ReducedRecording) -> tuple[ReducedRecording, ReducedRecording]:
-    """Return the blocks of revolutions with even and with odd numbers."""
-    n = reduced.n_blocks
-    first = second = reduced
-    for block in reversed(range(n)):
-        first, second = (first.without(block), second) if block % 2 else (first, second.without(block))
-    return first, second
-
-
 # --------------------
 # What can be noticed when recordings are not of the machine that they are said to be of.
 # --------------------
@@ -491,7 +508,7 @@ def strange_teeth(now: ReducedRecording, name: str) -> list[str]:
         return []
     message = (
         f"{name}: only {percent(share)} of what repeats with a shaft lies at mesh harmonics of the rig's "
-        f"{_teeth(now.frame)} teeth. Is it a recording of this machine?"
+        f"{'/'.join(map(str, now.frame.teeth))} teeth. Is it a recording of this machine?"
     )
     return [message]
 
@@ -536,10 +553,6 @@ def _mesh_share(now: ReducedRecording, side: int) -> float:
             float(power[above & (orders_from_mesh(orders, teeth) <= NEAR_MESH)].sum()) / total if total > 0 else 1.0
         )
     return float(np.mean(shares))
-
-
-def _teeth(frame: GearFrame) -> str:
-    return "/".join(str(z) for z in frame.teeth)
 
 
 CLEAR_WITHOUT = 3.0
@@ -597,8 +610,7 @@ def conditions_of(
     def condition_of(recording: PreparedRecording) -> tuple[Condition, list[str]]:
         name = recording.recording.name
         tell(f"simulating the healthy machine at the point of {name}", 0.05 + 0.15 * next(done) / len(recordings))
-        condition, notes = _condition(recording, healthy, twin, learned, on_read)
-        return replace(condition, path=path), notes
+        return _condition(recording, healthy, twin, learned, path, on_read)
 
     conditions = readable(recordings, condition_of, "recording", messages)
     if not references:
@@ -680,6 +692,7 @@ def _condition(
     healthy: Sequence[HealthyReference],
     twin: Twin,
     learned: Learned,
+    path: MeasuredPath | None,
     on_read: Callable[[ConditionFacts, ReducedRecording], object],
 ) -> tuple[Condition, list[str]]:
     """Return a recording beside its reference and the healthy twin at its point, and what is worth a remark."""
@@ -701,7 +714,7 @@ def _condition(
         messages += [f"{name}: {reversed_text(turned)}"] if turned else []
     check_steady(now, reference)
     on_read(facts, now)
-    condition = Condition(facts, now, simulated(twin, facts, now), reference, learned)
+    condition = Condition(facts, now, simulated(twin, facts, now), reference, learned, path)
     if reference is not None:
         messages += strange_pattern(now, reference, name)
         messages += _strange_reference(condition)

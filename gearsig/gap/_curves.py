@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,10 +58,10 @@ def spectrum_curves(
     unit : str
         Of the channels.
     """
-    runs = _Runs(now, before, after, reference)
-    names = tuple(now.channels)
-    averages = (_of_average(side, runs, names, unit) for side in (DRIVER, DRIVEN))
-    spectra = (*averages, _of_residual(runs, names, unit))
+    runs = {"before": before, "after": after, "reference": reference}
+    beside = {name: run for name, run in runs.items() if run is not None}
+    averages = (_of_average(side, now, beside, unit) for side in (DRIVER, DRIVEN))
+    spectra = (*averages, _of_residual(now, beside, unit))
     features = [average_features(side, now.frame.teeth[side], len(spectra[side].orders)) for side in (DRIVER, DRIVEN)]
     features.append(residual_features(now, spectra[2].orders))
     return tuple(
@@ -72,22 +72,6 @@ def spectrum_curves(
         )
         for curves, belonging in zip(spectra, features, strict=True)
     )
-
-
-@dataclass(frozen=True)
-class _Runs:
-    """What is drawn together; `before` and what follows as in `spectrum_curves`."""
-
-    now: ReducedRecording
-    before: ReducedRecording
-    after: ReducedRecording | None
-    reference: ReducedRecording | None
-
-    @property
-    def compared(self) -> dict[str, ReducedRecording]:
-        """What the recording is compared with, by the name of its curve."""
-        named = {"before": self.before, "after": self.after, "reference": self.reference}
-        return {name: run for name, run in named.items() if run is not None}
 
 
 def average_features(side: int, teeth: int, n: int) -> list[str]:
@@ -114,10 +98,10 @@ def residual_features(now: ReducedRecording, orders: FloatArray) -> list[str]:
     return [f"floor.band.{max(int(band), 1)}" for band in bands]
 
 
-def _of_average(side: int, runs: _Runs, names: Sequence[str], unit: str) -> SpectrumCurves:
-    now = runs.now
-    power, noise = _average_power(now, side, names)
-    levels = {name: _average_power(run, side, names) for name, run in runs.compared.items()}
+def _of_average(side: int, now: ReducedRecording, beside: Mapping[str, ReducedRecording], unit: str) -> SpectrumCurves:
+    """Return a shaft's average of a recording, and of what is drawn beside it, by the name of its curve."""
+    power, noise = _average_power(now, side, now.channels)
+    levels = {name: _average_power(run, side, now.channels) for name, run in beside.items()}
     last = int((N_MESH_HARMONICS + BEYOND) * now.frame.teeth[side])
     n = min(last + 1, len(power), *(len(level) for level, _ in levels.values()))
     floors = {name: np.sqrt(_RARE * (noise[:n] + level[:n])) for name, (_, level) in levels.items()}
@@ -133,7 +117,7 @@ def _of_average(side: int, runs: _Runs, names: Sequence[str], unit: str) -> Spec
     )
 
 
-def _average_power(reduced: ReducedRecording, side: int, names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
+def _average_power(reduced: ReducedRecording, side: int, names: Iterable[str]) -> tuple[FloatArray, FloatArray]:
     """Return lines' power, as squares of peaks, and that of their noise: means over channels."""
     averages = [reduced.average(name, side) for name in names]
     n = averages[0].highest + 1
@@ -142,14 +126,13 @@ def _average_power(reduced: ReducedRecording, side: int, names: Sequence[str]) -
     return power, noise
 
 
-def _of_residual(runs: _Runs, names: Sequence[str], unit: str) -> SpectrumCurves:
-    now = runs.now
-    power = _residual_power(now, names)
-    highest = (run.highest_order for run in (now, runs.before, runs.reference) if run is not None)
-    top = min((N_MESH_HARMONICS + BEYOND) * now.frame.teeth[DRIVER], *highest)
+def _of_residual(now: ReducedRecording, beside: Mapping[str, ReducedRecording], unit: str) -> SpectrumCurves:
+    power = _residual_power(now, now.channels)
+    highest = (run.highest_order for name, run in beside.items() if name != "after")
+    top = min((N_MESH_HARMONICS + BEYOND) * now.frame.teeth[DRIVER], now.highest_order, *highest)
     orders = np.arange(min(len(power), int(top / now.order_step) + 1)) * now.order_step
     measured = power[: len(orders)]
-    residuals = {name: (run.order_step, _residual_power(run, names)) for name, run in runs.compared.items()}
+    residuals = {name: (run.order_step, _residual_power(run, now.channels)) for name, run in beside.items()}
     # 2: squares of peaks from mean squares.
     amplitudes = {
         name: np.sqrt(2.0 * np.interp(orders, np.arange(len(values)) * step, values))
@@ -163,11 +146,11 @@ def _of_residual(runs: _Runs, names: Sequence[str], unit: str) -> SpectrumCurves
         np.sqrt(2.0 * measured),
         **{"after": NOTHING, **amplitudes},
         floor=floor,
-        reference_floor=floor if runs.reference is not None else NOTHING,
+        reference_floor=floor if "reference" in beside else NOTHING,
     )
 
 
-def _residual_power(reduced: ReducedRecording, names: Sequence[str]) -> FloatArray:
+def _residual_power(reduced: ReducedRecording, names: Iterable[str]) -> FloatArray:
     power: FloatArray = np.mean([reduced.channels[name].residual_power.mean(axis=0) for name in names], axis=0)
     return power
 

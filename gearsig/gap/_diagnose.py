@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 
 from gearsig.checks import closest_match_hint, listed, short
 from gearsig.errors import GearsigError, InputError, RefusalError
 from gearsig.formatting import odds_text
-from gearsig.gap._attribution import Attribution, attribute, counted_against, is_calibrated
+from gearsig.gap._attribution import Attribution, attribute, counted_against, within_the_floor
 from gearsig.gap._conditions import Condition, Stage, conditions_of, simulated, warnings_of
 from gearsig.gap._curves import angle_curves, average_curves, spectrum_curves
 from gearsig.gap._evidence import CRACK, evidence_of
@@ -22,13 +21,7 @@ from gearsig.gap._gearless import diagnose_gearless, place_of_unexpected, unexpe
 from gearsig.gap._inputs import is_gearless, twin_rig, with_stage
 from gearsig.gap._labelled import LabelledRecording, labelled_changes
 from gearsig.gap._next_recording import next_recordings, next_steps
-from gearsig.gap._places import (
-    compared_pair,
-    gap_places,
-    ranked_places,
-    without_multiples,
-    without_silent_races,
-)
+from gearsig.gap._places import gap_places, ranked_places, without_multiples, without_silent_races
 from gearsig.gap._population import load_learned
 from gearsig.gap._reduction import ReducedRecording
 from gearsig.gap._report import (
@@ -46,9 +39,8 @@ from gearsig.gap._report import (
     most_probable_two,
     named_cause,
     unbounded_fits,
-    within_the_floor,
 )
-from gearsig.gap._simulator import Added, CanRunUp, DriveSimulator, GapEffect, GapSimulator, Twin, as_tried
+from gearsig.gap._simulator import CanRunUp, DriveSimulator, GapEffect, GapSimulator, Twin, as_tried
 from gearsig.gap._tooth_error import ToothErrorEvidence, has_encoders, mean_log_likelihoods, tooth_error_evidence
 from gearsig.gap._trials import (
     PROCESSES,
@@ -60,17 +52,12 @@ from gearsig.gap._trials import (
     start_healthy_trial,
     steps_of,
 )
-from gearsig.gap.start_stop._diagnose import diagnose_start_stop, drive_report, refuse_start_stop
+from gearsig.gap.start_stop._diagnose import diagnose_start_stop, refuse_start_stop
 from gearsig.prepared import PreparedRecording
 from gearsig.processes import one_pool, start_early
 from gearsig.recording import Recording, check_recording, metres_per_second_squared
 from gearsig.rig import Rig
 from gearsig.severity import CrackEstimate, estimate_crack
-
-UNCALIBRATED = (
-    "The probabilities are not calibrated on blind cases yet, and how often they are right has not been measured: "
-    "take them as a ranking only."
-)
 
 USER_EFFECT_MESSAGE = (
     "The recognition has never seen “{title}”: it was simulated, fitted and scored on held-out data like the likeliest "
@@ -103,9 +90,6 @@ NOT_NEARER = (
     "With {title} the twin comes no nearer to data that it was not fitted to: no severity is given, and no twin with "
     "the effect. What speaks for it is how the recordings changed, by recognition alone."
 )
-
-
-Result = TypeVar("Result")
 
 
 @one_pool(PROCESSES)
@@ -183,9 +167,21 @@ def diagnose_gap(
     # 2. Machines that start and stop are compared by their motion, those without gears by their bearings alone.
     if isinstance(simulator, DriveSimulator):
         _refuse_further(learn, run_up, "a machine that starts and stops")
-        return drive_report(diagnose_start_stop(recordings, references, simulator, allowed, tell))
+        return diagnose_start_stop(recordings, references, simulator, allowed, tell)
     refuse_start_stop(recordings, simulator.name)
-    rig, recordings, references, run_ups, learn = _on_stage(rig, recordings, references, run_ups, learn, stage)
+    if stage or len(rig.pairs) > 1:
+        rig = with_stage(rig, stage)
+        recordings, references, run_ups = (
+            [_on_stage(recording, stage) for recording in some] for some in (recordings, references, run_ups)
+        )
+        learn = [
+            replace(
+                item,
+                recording=_on_stage(item.recording, stage),
+                reference=item.reference and _on_stage(item.reference, stage),
+            )
+            for item in learn
+        ]
     prepared, healthy = [PreparedRecording(r) for r in recordings], [PreparedRecording(r) for r in references]
     if is_gearless(rig):
         _refuse_further(learn, run_up, "a rig without gears")
@@ -243,7 +239,6 @@ def diagnose_gap(
     cause_list, depths = _with_crack_depth(cause_list, recording, reference_of, tried)
     causes = in_order(cause_list, outcome)
     named = causes[0] if outcome in NAMING else None
-    warnings = (*warnings, *unbounded_fits(causes, outcome))
     fitted = None if named is None else named.fitted
 
     # 7. The twin with the effect, and what would tell more.
@@ -252,8 +247,6 @@ def diagnose_gap(
         (None, ()) if named is None else _after_and_next(causes, known, tried, twin, conditions, clearest)
     )
 
-    uncalibrated = () if is_calibrated() else (UNCALIBRATED,)
-    reference = clearest.reference
     return GapReport(
         rig=rig.name,
         simulator=simulator.name,
@@ -271,19 +264,20 @@ def diagnose_gap(
             clearest.simulated,
             after,
             structural=learned.floor(with_reference=False),
-            reference=reference,
-            reference_structural=None if reference is None else learned.floor(with_reference=True),
+            reference=clearest.reference,
+            reference_structural=learned.floor(with_reference=True) if clearest.has_reference else None,
             unit=_unit(recording.recording),
         ),
         angles=angle_curves(
             clearest.now,
             clearest.simulated,
             after,
-            healthy=reference,
+            healthy=clearest.reference,
         ),
-        averages=() if reference is None else average_curves(clearest.now, reference, unit=_unit(recording.recording)),
+        averages=()
+        if clearest.reference is None
+        else average_curves(clearest.now, clearest.reference, unit=_unit(recording.recording)),
         notes=(
-            *uncalibrated,
             *(() if labels is None else (labels.text,)),
             *(() if clearest.path is None else (clearest.path.facts.text,)),
             *left_out,
@@ -299,14 +293,18 @@ def diagnose_gap(
             *_waveform_messages(tried, known, clearest),
             *(_encoder_messages(tooth_errors, known) if named is not None else ()),
         ),
-        twin_toml="" if fitted is None else _preset(twin, clearest, causes[0], fitted),
-        warnings=warnings,
+        twin_toml=""
+        if fitted is None
+        else twin.preset_toml(
+            clearest.facts.point, (fitted,), (fitted_words(causes[0], fitted.severity, clearest.facts.name),)
+        ),
+        warnings=(*warnings, *unbounded_fits(causes, outcome)),
         labelled=labels,
         next_steps=next_steps(
             outcome,
             causes,
             [condition.facts.point for condition in conditions],
-            has_reference=all(condition.reference is not None for condition in conditions),
+            has_reference=all(condition.has_reference for condition in conditions),
             has_encoders=has_encoders(recording.recording),
             is_labelled=labels is not None,
             has_run_up=clearest.path is not None or not isinstance(as_tried(twin), CanRunUp),
@@ -384,29 +382,9 @@ def _check_distinct(recordings: Sequence[Recording]) -> None:
         by_digest[digest] = recording.name
 
 
-def _on_stage(
-    rig: Rig,
-    recordings: Sequence[Recording],
-    references: Sequence[Recording],
-    run_ups: Sequence[Recording],
-    learn: Sequence[LabelledRecording],
-    stage: str,
-) -> tuple[Rig, Sequence[Recording], Sequence[Recording], Sequence[Recording], Sequence[LabelledRecording]]:
-    """Return everything with the pair that is asked for as the rig's first."""
-    if not stage and len(rig.pairs) < 2:
-        return rig, recordings, references, run_ups, learn
-
-    def chosen(recording: Recording) -> Recording:
-        return replace(recording, rig=None if recording.rig is None else with_stage(recording.rig, stage))
-
-    labelled = [
-        replace(
-            item, recording=chosen(item.recording), reference=None if item.reference is None else chosen(item.reference)
-        )
-        for item in learn
-    ]
-    recordings, references, run_ups = ([*map(chosen, some)] for some in (recordings, references, run_ups))
-    return with_stage(rig, stage), recordings, references, run_ups, labelled
+def _on_stage(recording: Recording, stage: str) -> Recording:
+    """Return a recording with the pair that is asked for as its rig's first."""
+    return replace(recording, rig=recording.rig and with_stage(recording.rig, stage))
 
 
 def _labelled_facts(
@@ -521,25 +499,13 @@ def _posterior(
 ) -> dict[str, float]:
     """Return cause → probability, with what the whole gap, its places and the lines of shafts and races say."""
     posterior = within_the_floor(attribution.probabilities(), clearest.size.structural)
-    comparisons = [_beside_baseline(compared_pair, c) for c in conditions]
-    posterior = without_multiples(without_silent_races(posterior, comparisons), known, comparisons)
+    posterior = without_multiples(without_silent_races(posterior, conditions), known, conditions)
     return counted_against(posterior, known, gap, clearest.now.frame)
-
-
-def _beside_baseline(looked_for: Callable[..., Result], condition: Condition) -> Result:
-    """Return what a function of `_places` says of a condition beside its baseline."""
-    return looked_for(
-        condition.now,
-        condition.baseline,
-        condition.floor,
-        condition.change,
-        is_reference=condition.reference is not None,
-    )
 
 
 def _places(condition: Condition) -> tuple[GapPlace, ...]:
     try:
-        return _beside_baseline(gap_places, condition)
+        return gap_places(condition)
     except RefusalError:
         return ()
 
@@ -598,11 +564,6 @@ def _with_crack_depth(
     return [changed if cause is crack else cause for cause in causes], [message]
 
 
-def _preset(twin: Twin, condition: Condition, cause: GapCause, fitted: Added) -> str:
-    note = fitted_words(cause, fitted.severity, condition.facts.name)
-    return twin.preset_toml(condition.facts.point, (fitted,), (note,))
-
-
 def _after_and_next(
     causes: Sequence[GapCause],
     known: Mapping[str, GapEffect],
@@ -612,22 +573,11 @@ def _after_and_next(
     clearest: Condition,
 ) -> tuple[ReducedRecording | None, tuple[NextRecording, ...]]:
     """Return the twin with the likeliest effect, as it was fitted, and what would tell more: both at once."""
-    fitted = causes[0].fitted
+    fitted, pair = causes[0].fitted, most_probable_two(causes)
+    next_ones: tuple[NextRecording, ...] = ()
     with ThreadPoolExecutor(1) as executor:
         after = executor.submit(simulated, twin, clearest.facts, clearest.now, (fitted,)) if fitted else None
-        next_ones = _next(causes, known, tried, twin, conditions)
+        if pair is not None and not is_settled(causes) and all(name in tried for name in pair):
+            (first, second), titles = (tried[name] for name in pair), (known[pair[0]].title, known[pair[1]].title)
+            next_ones = next_recordings(first, second, titles, twin, conditions)
     return (after.result() if after else None), next_ones
-
-
-def _next(
-    causes: Sequence[GapCause],
-    known: Mapping[str, GapEffect],
-    tried: Mapping[str, TriedEffect],
-    twin: Twin,
-    conditions: Sequence[Condition],
-) -> tuple[NextRecording, ...]:
-    pair = most_probable_two(causes)
-    if pair is None or is_settled(causes) or any(name not in tried for name in pair):
-        return ()
-    first, second = pair
-    return next_recordings(tried[first], tried[second], (known[first].title, known[second].title), twin, conditions)

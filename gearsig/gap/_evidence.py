@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from gearsig.checks import FloatArray
-from gearsig.gap._change import beyond_the_mesh
-from gearsig.gap._features import ECHO_LAGS_PITCHES, N_QUARTERS, Features
-from gearsig.gap._floors import FLOOR_IN_DEVIATIONS, StructuralFloor, family_members, pooled_scatter
+from gearsig.gap._features import ECHO_LAGS_PITCHES, N_QUARTERS
+from gearsig.gap._floors import family_members
 from gearsig.gap._prediction import Fit, ObservedChange
 from gearsig.gap._reduction import GearFrame, shaft_words
 from gearsig.gap._report import Evidence
@@ -130,50 +127,40 @@ MIN_SHAFT_RATIO = 1.5
 """The signs on the one shaft over those on the other."""
 
 
-@dataclass(frozen=True)
-class ShaftSigns:
-    """How far a cause's signs rose on either shaft.
+def determined_options(cause: str, changes: Sequence[Mapping[str, float]], teeth: tuple[int, int]) -> dict[str, str]:
+    """Return the option of the effect that says which shaft it is on, {"gear": "driven"}, say; empty: cannot be told.
 
-    Parameters
-    ----------
-    rise : (float, float)
-        Root mean square of the signs that rose, in floors: driver, driven.
-    slow : int or None
-        The shaft whose sign the other cannot make, while its own sign falls on an order of this one; see `_slow`.
-    """
-
-    rise: tuple[float, float]
-    slow: int | None = None
-
-    @property
-    def side(self) -> int | None:
-        """0: driver, 1: driven, None: cannot be told."""
-        if self.slow is not None and MIN_SHAFT_RATIO * self.rise[self.slow] > self.rise[1 - self.slow]:
-            return self.slow if self.rise[self.slow] >= CLEAR else None
-        larger = int(np.argmax(self.rise))
-        larger_rise, smaller_rise = self.rise[larger], self.rise[1 - larger]
-        return larger if larger_rise >= CLEAR and larger_rise >= MIN_SHAFT_RATIO * smaller_rise else None
-
-
-def shaft_signs(cause: str, changes: Sequence[Mapping[str, float]], teeth: tuple[int, int]) -> ShaftSigns | None:
-    """Compare a cause's signs on both shafts; None for a cause that no shaft has to itself.
-
-    r_s = √(mean over conditions and signs of min(max(u, 0), 6)²), u a sign's change on shaft s in floors.
+    A cause's signs on both shafts are compared, r_s = √(mean over conditions and signs of min(max(u, 0), 6)²), u a
+    sign's change on shaft s in floors. A cause that no shaft has to itself has none.
 
     Parameters
     ----------
     cause : str
         Name of an effect.
     changes : sequence of mappings
-        Feature → change over its floor, see `over_floors`; one per operating condition.
+        Feature → change over its floor, see `Condition.over_floors`; one per operating condition.
     teeth : (int, int)
         Of driver and driven gear.
     """
-    if cause not in SIGNS:
-        return None
-    rises = ([rise for change in changes for rise in _rises(SIGNS[cause], side, change)] for side in SIDES)
-    driver, driven = (float(np.sqrt(np.mean(np.square(rise)))) if rise else 0.0 for rise in rises)
-    return ShaftSigns((driver, driven), _slow(cause, teeth))
+    rises = []
+    for side in SIDES:
+        names = [sign.format(side) for sign in SIGNS.get(cause, ())]
+        risen = [float(np.clip(change[name], 0.0, MAX_RISE)) for change in changes for name in names if name in change]
+        rises.append(float(np.sqrt(np.mean(np.square(risen)))) if risen else 0.0)
+    shaft = _shaft(rises, _slow(cause, teeth))
+    return {} if shaft is None else {"shaft" if cause == "misalignment" else "gear": SIDES[shaft]}
+
+
+def _shaft(rises: Sequence[float], slow: int | None) -> int | None:
+    """Return the shaft on which a cause's signs rose: 0: driver, 1: driven, None: cannot be told.
+
+    `slow` is the shaft whose sign the other cannot make, while its own sign falls on an order of this one; see `_slow`.
+    """
+    if slow is not None and MIN_SHAFT_RATIO * rises[slow] > rises[1 - slow]:
+        return slow if rises[slow] >= CLEAR else None
+    larger = int(np.argmax(rises))
+    is_clear = rises[larger] >= CLEAR and rises[larger] >= MIN_SHAFT_RATIO * rises[1 - larger]
+    return larger if is_clear else None
 
 
 def _slow(cause: str, teeth: tuple[int, int]) -> int | None:
@@ -184,58 +171,6 @@ def _slow(cause: str, teeth: tuple[int, int]) -> int | None:
     slow = int(np.argmax(teeth))
     ratio, remainder = divmod(teeth[slow], teeth[1 - slow])
     return slow if not remainder and FIRST_ORDER.get(cause, 1) % ratio else None
-
-
-def determined_options(cause: str, changes: Sequence[Mapping[str, float]], teeth: tuple[int, int]) -> dict[str, str]:
-    """Return the option of the effect that says which shaft it is on, {"gear": "driven"}, say; empty: cannot be told.
-
-    Parameters
-    ----------
-    cause, changes, teeth
-        As of `shaft_signs`.
-    """
-    signs = shaft_signs(cause, changes, teeth)
-    if signs is None or signs.side is None:
-        return {}
-    return {"shaft" if cause == "misalignment" else "gear": SIDES[signs.side]}
-
-
-def over_floors(change: Features, floor: StructuralFloor, *, is_reference: bool) -> dict[str, float]:
-    """Return each feature's change over the larger of both floors, with its sign.
-
-    Parameters
-    ----------
-    change : Features
-        Against a reference or a simulation.
-    floor : StructuralFloor
-        Of that comparison.
-    is_reference : bool
-        Whether it is a reference: a level relative to the mesh then counts as far as it changed by itself.
-    """
-    distances, *floors = against_floors(change, floor, is_reference=is_reference)
-    return dict(zip(change.names, (distances / np.maximum(*floors)).tolist(), strict=True))
-
-
-def against_floors(
-    change: Features, floor: StructuralFloor, *, is_reference: bool
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return each feature's distance from healthy machines', its structural floor and its repeatability floor, in dB.
-
-    Parameters
-    ----------
-    change, floor, is_reference
-        As of `over_floors`.
-    """
-    distances = floor.from_centre(change.names, change.values)
-    if is_reference:
-        distances = beyond_the_mesh(change.names, distances)
-    return distances, floor.of(change.names), FLOOR_IN_DEVIATIONS * pooled_scatter(change)
-
-
-def _rises(signs: Sequence[str], side: str, change: Mapping[str, float]) -> list[float]:
-    """Return how far each sign that the comparison has rose on one shaft, `MAX_RISE` at most."""
-    names = [sign.format(side) for sign in signs]
-    return [float(np.clip(change[name], 0.0, MAX_RISE)) for name in names if name in change]
 
 
 # --------------------

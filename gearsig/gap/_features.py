@@ -56,10 +56,13 @@ class Feature:
     side: str = ""
     detail: str = ""
 
-    @classmethod
-    def of(cls, name: str) -> Feature:
+    @staticmethod
+    @cache
+    def of(name: str) -> Feature:
         """Return the feature of a name, as tables keep it."""
-        return _feature_of(name)
+        family, _, remainder = name.partition(".")
+        side, _, detail = remainder.partition(".")
+        return Feature(family, side, detail) if side in SIDES else Feature(family, "", remainder)
 
     def __str__(self) -> str:
         return ".".join(part for part in (self.family, self.side, self.detail) if part)
@@ -92,13 +95,6 @@ class Feature:
 
 
 _OTHER_SIDE = {"driver": "driven", "driven": "driver"}
-
-
-@cache
-def _feature_of(name: str) -> Feature:
-    family, _, remainder = name.partition(".")
-    side, _, detail = remainder.partition(".")
-    return Feature(family, side, detail) if side in SIDES else Feature(family, "", remainder)
 
 
 def line_features(reduced: ReducedRecording, channel: str) -> Iterator[NamedValue]:
@@ -258,8 +254,8 @@ FLOOR_WIDTH = 48
 """Lines whose median is the floor."""
 LOWEST_STRANGE = 0.4
 """Order of the driver below which a line may be the window's or the speed's."""
-BEARING_FAMILIES = {"outer": ("outer", 1.0), "inner": ("inner", 1.0), "ball": ("spin", 2.0), "cage": ("cage", 1.0)}
-"""Family → the bearing's order that it counts, and how often; a ball strikes with both sides."""
+BEARING_FAMILIES = ("outer", "inner", "ball", "cage")
+"""See `BearingFrame.families`."""
 
 
 def floor_ratio(power: FloatArray) -> FloatArray:
@@ -309,8 +305,8 @@ def envelope_ratios(reduced: ReducedRecording, sums: ChannelSums) -> FloatArray:
 def _families(
     frame: GearFrame, levels: FloatArray, step: float, known: Sequence[float], name: str
 ) -> Iterator[NamedValue]:
-    for kind, (attribute, factor) in BEARING_FAMILIES.items():
-        orders = [getattr(b, attribute) * factor for b in frame.bearings]
+    for kind in BEARING_FAMILIES:
+        orders = [bearing.families[kind] for bearing in frame.bearings]
         scores = [_family(levels, o, N_FAMILY, step, known, SLIP) for o in orders if np.isfinite(o)]
         yield f"{name}.{kind}", max(scores, default=0.0)
 
@@ -483,7 +479,7 @@ def whole_and_parts(reduced: ReducedRecording) -> tuple[tuple[str, ...], FloatAr
     """Return names and values, (1 + n_blocks, n): of the whole, and without each of its blocks; computed once."""
     if "features" not in reduced.kept:
         names, values = once(reduced)
-        parts = [once(reduced.without(b))[1] for b in range(reduced.n_blocks)]
+        parts = [once(part)[1] for part in reduced.leaving_one_out()]
         reduced.kept["features"] = names, np.stack([values, *parts])
     rows: tuple[tuple[str, ...], FloatArray] = reduced.kept["features"]
     return rows

@@ -100,7 +100,7 @@ def labelled_changes(
     fresh : bool
         Compute anew what the folder holds.
     """
-    ways = sorted({c.reference is not None for c in conditions})
+    ways = sorted({c.has_reference for c in conditions})
     channels = tuple(conditions[0].now.channels)
     shared = [read_healthy(recording)[0] for recording in references]
     changes_of_labels, messages = list[LabelledChange](), list[str]()
@@ -240,7 +240,7 @@ def labelled_evidence(conditions: Sequence[Condition], labelled: Sequence[Labell
     ratios: dict[str, list[float]] = {label: [] for label in labels}
     alike: dict[str, list[float]] = {}
     for condition in conditions:
-        way, recogniser, load = condition.reference is not None, condition.recogniser, condition.tooth_load_n_per_mm
+        way, recogniser, load = condition.has_reference, condition.recogniser, condition.tooth_load_n_per_mm
         row = within_reach(recogniser.input_row(condition.change, load))
         unlabelled = recogniser.probabilities(condition.change, load)
         for label in labels:

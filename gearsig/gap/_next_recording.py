@@ -22,7 +22,7 @@ from gearsig.gap._report import (
     NextStep,
 )
 from gearsig.gap._simulator import HasFurtherPlaces, OperatingCondition, Twin, point_text, same_condition
-from gearsig.gap._trials import PROCESSES, Reduced, Task, TriedEffect, TwinRun, finished_runs, n_compared
+from gearsig.gap._trials import PROCESSES, Reduced, Task, TriedEffect, TwinRun, finished_runs, n_compared, rounded
 
 FACTORS = ((1.0, 0.3), (1.0, 0.6), (0.6, 1.0), (1.4, 1.0))
 """Speeds and torques that are looked at, over those of the first recording, beside the recordings' own."""
@@ -66,9 +66,8 @@ def next_recordings(
     base = conditions[0].facts
     measured, places = twin.with_further_sensors() if isinstance(twin, HasFurtherPlaces) else (twin, {})
     present_points = [condition.facts.point for condition in conditions]
-    points = _distinct(
-        [*present_points, *(_rounded(v * base.point.speed_rpm, t * base.point.torque_nm) for v, t in FACTORS)]
-    )
+    further = [OperatingCondition(v * base.point.speed_rpm, t * base.point.torque_nm) for v, t in FACTORS]
+    points = _distinct([*present_points, *(rounded(point, 2) for point in further)])
     runs = [
         TwinRun(
             measured,
@@ -98,11 +97,6 @@ def next_recordings(
             )
             recordings.append(NextRecording(point, (first.name, second.name), apart, now, text, place))
     return tuple(sorted(recordings, key=lambda of_first: -of_first.standard_deviations)[:5])
-
-
-def _rounded(speed_rpm: float, torque_nm: float) -> OperatingCondition:
-    """Return a point that is easily set."""
-    return OperatingCondition(*(float(f"{value:.2g}") for value in (speed_rpm, torque_nm)))
 
 
 def _distinct(points: Sequence[OperatingCondition]) -> list[OperatingCondition]:

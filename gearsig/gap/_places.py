@@ -9,14 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
+from gearsig.formatting import named
 from gearsig.gap._change import (
     difference_residuals,
     lines_of_shaft,
     turned_difference,
 )
-from gearsig.gap._evidence import against_floors, feature_words
+from gearsig.gap._conditions import Condition
+from gearsig.gap._evidence import feature_words
 from gearsig.gap._features import (
-    BEARING_FAMILIES,
     LOWEST_STRANGE,
     MAX_SHAFT_ORDERS,
     N_FAMILY,
@@ -24,19 +25,13 @@ from gearsig.gap._features import (
     N_SIDEBAND_HARMONICS,
     SLIP,
     Feature,
-    Features,
     envelope_ratios,
     residual_ratios,
     tooth_energy,
 )
-from gearsig.gap._floors import (
-    Family,
-    StructuralFloor,
-    family_members,
-    family_size,
-)
+from gearsig.gap._floors import Family, family_members, family_size
 from gearsig.gap._reduction import DRIVER, N_MAINS_HARMONICS, N_MESH_HARMONICS, GearFrame, ReducedRecording, shaft_words
-from gearsig.gap._report import GapPlace, PlaceKind, likeliest_first
+from gearsig.gap._report import GapPlace, PlaceKind, scaled
 from gearsig.gap._simulator import GapEffect
 from gearsig.prepared import MAINS_TOLERANCE
 from gearsig.recording import MAINS_HZ
@@ -106,7 +101,7 @@ MISSED_RACE = 0.2
 """Probability that a damaged race shows, and has no lines of its own: as `MISSED_FAULT`, of bearings alone."""
 
 
-def without_silent_races(probabilities: Mapping[str, float], comparisons: Sequence[ComparedPair]) -> dict[str, float]:
+def without_silent_races(probabilities: Mapping[str, float], conditions: Sequence[Condition]) -> dict[str, float]:
     """Return the probabilities with those of races lowered whose lines rose in none of the recordings.
 
     Balls that roll over a spall make lines at the race's own order. A tooth that strikes once a turn makes lines at all
@@ -117,13 +112,11 @@ def without_silent_races(probabilities: Mapping[str, float], comparisons: Sequen
     ----------
     probabilities : mapping
         Cause → probability.
-    comparisons : sequence of ComparedPair
-        One per recording, of one rig.
+    conditions : sequence of Condition
+        Of one rig.
     """
-    silent = set(RACES).intersection(*(_silent_races(comparison) for comparison in comparisons))
-    weighted = {name: p * (MISSED_RACE if name in silent else 1.0) for name, p in probabilities.items()}
-    total = sum(weighted.values())
-    return likeliest_first({name: p / total for name, p in weighted.items()})
+    silent = set(RACES).intersection(*(_silent_races(condition) for condition in conditions))
+    return scaled({name: p * (MISSED_RACE if name in silent else 1.0) for name, p in probabilities.items()})
 
 
 MULTIPLES_OF_ONE = 0.2
@@ -134,7 +127,7 @@ CLEAR_MULTIPLE, STRONG_MULTIPLE = 2.0, 0.1
 
 
 def without_multiples(
-    probabilities: Mapping[str, float], effects: Mapping[str, GapEffect], comparisons: Sequence[ComparedPair]
+    probabilities: Mapping[str, float], effects: Mapping[str, GapEffect], conditions: Sequence[Condition]
 ) -> dict[str, float]:
     """Return the probabilities with those of forces that turn with a shaft lowered where its multiples rose as well.
 
@@ -147,40 +140,37 @@ def without_multiples(
         Cause → probability.
     effects : mapping
         Effect → whether it is such a force.
-    comparisons : sequence of ComparedPair
-        One per recording, of one rig.
+    conditions : sequence of Condition
+        Of one rig.
     """
-    if not any(_multiples_rose(comparison) for comparison in comparisons):
+    if not any(_multiples_rose(condition) for condition in conditions):
         return dict(probabilities)
     turning = {name for name, effect in effects.items() if effect.turns_with_shaft}
-    weighted = {name: p * (MULTIPLES_OF_ONE if name in turning else 1.0) for name, p in probabilities.items()}
-    total = sum(weighted.values())
-    return likeliest_first({name: p / total for name, p in weighted.items()})
+    return scaled({name: p * (MULTIPLES_OF_ONE if name in turning else 1.0) for name, p in probabilities.items()})
 
 
-def _multiples_rose(comparison: ComparedPair) -> bool:
-    side = max(SIDES, key=lambda side: comparison.size[f"shaft.{side}.1"])
-    averages = comparison.now.averages(SIDES.index(side))
+def _multiples_rose(condition: Condition) -> bool:
+    side = max(SIDES, key=lambda side: condition.over_floors[f"shaft.{side}.1"])
+    averages = condition.now.averages(SIDES.index(side))
     power = np.mean([np.abs(average.lines[:4]) ** 2 for average in averages], axis=0)
     return any(
-        comparison.size[f"shaft.{side}.{k}"] >= CLEAR_MULTIPLE and power[k] >= STRONG_MULTIPLE * power[1]
+        condition.over_floors[f"shaft.{side}.{k}"] >= CLEAR_MULTIPLE and power[k] >= STRONG_MULTIPLE * power[1]
         for k in (2, 3)
     )
 
 
-def _silent_races(comparison: ComparedPair) -> set[str]:
+def _silent_races(condition: Condition) -> set[str]:
     """Return the effects whose race has no lines that rose, and more than the shafts' own in the envelope did.
 
     Of a race that the rig file does not describe nothing is known.
     """
-    envelope, residual = _envelope_levels(comparison), _residual_levels(comparison)
-    of_shafts = max(family.rise_db for family in _shafts(comparison, envelope))
+    envelope, residual = _envelope_levels(condition), _residual_levels(condition)
+    of_shafts = max(family.rise_db for family in _shafts(condition, envelope))
     floors = ((envelope, max(MIN_OF_A_FAMILY_DB, of_shafts)), (residual, MIN_OF_A_FAMILY_DB))
     rises = [(_widened(levels.now) - levels.baseline, levels, floor) for levels, floor in floors]
     silent = set()
     for effect, kind in RACES.items():
-        attribute, factor = BEARING_FAMILIES[kind]
-        orders = [getattr(bearing, attribute) * factor for bearing in comparison.now.frame.bearings]
+        orders = [bearing.families[kind] for bearing in condition.now.frame.bearings]
         known = [order for order in orders if np.isfinite(order)]
         heard = any(_family_rise(rise, o, levels)[0] >= floor for o in known for rise, levels, floor in rises)
         if known and not heard:
@@ -189,62 +179,8 @@ def _silent_races(comparison: ComparedPair) -> set[str]:
 
 
 # --------------------
-# Where exactly within one family of features: the comparison that is searched, and what is found. Sizes come later.
+# Where exactly within one family of features. Sizes come later.
 # --------------------
-
-
-@dataclass(frozen=True)
-class ComparedPair:
-    """A recording and what it is compared with.
-
-    Parameters
-    ----------
-    now, baseline : ReducedRecording
-    is_reference : bool
-        Whether `baseline` is a healthy recording of the same machine; otherwise a simulation.
-    change_db : mapping
-        Feature → change from what healthy machines change by.
-    size : mapping
-        Feature → the same over the floors, with its sign.
-    """
-
-    now: ReducedRecording
-    baseline: ReducedRecording
-    is_reference: bool
-    change_db: Mapping[str, float]
-    size: Mapping[str, float]
-
-    def strongest(self, *beginnings: str) -> str:
-        """Return the feature with the largest change over the floors among those whose names begin so."""
-        return max((name for name in self.size if name.startswith(beginnings)), key=lambda name: abs(self.size[name]))
-
-
-def compared_pair(
-    now: ReducedRecording,
-    baseline: ReducedRecording,
-    structural: StructuralFloor,
-    change: Features,
-    *,
-    is_reference: bool,
-) -> ComparedPair:
-    """Return a recording beside what it is compared with; parameters as of `gap_places`."""
-    distances, *floors = against_floors(change, structural, is_reference=is_reference)
-    return _with_sizes(now, baseline, change.names, distances, floors, is_reference=is_reference)
-
-
-def _with_sizes(
-    now: ReducedRecording,
-    baseline: ReducedRecording,
-    names: Sequence[str],
-    distances: FloatArray,
-    floors: Sequence[FloatArray],
-    *,
-    is_reference: bool,
-) -> ComparedPair:
-    # Healthy machines' differences hold their scatter already; a shorter record's may be larger.
-    ratios = distances / np.maximum(*floors)
-    change_db, size = (dict(zip(names, values.tolist(), strict=True)) for values in (distances, ratios))
-    return ComparedPair(now, baseline, is_reference, change_db, size)
 
 
 def by_decibels(change_db: float) -> str:
@@ -286,7 +222,7 @@ _LINE_WIDTH = 3
 
 @dataclass(frozen=True)
 class LineLevels:
-    """Lines over their floor, in dB and not below 0, of both sides of a comparison.
+    """Lines over their floor, in dB and not below 0, of a recording and of what it is compared with.
 
     Parameters
     ----------
@@ -312,13 +248,13 @@ class _StrongestRise:
     row: int
 
 
-def locate_envelope(comparison: ComparedPair) -> GapPlace:
+def locate_envelope(condition: Condition) -> GapPlace:
     """Return whose order modulates what no shaft repeats."""
-    now, names = comparison.now, tuple(comparison.now.channels)
-    levels = _envelope_levels(comparison)
-    levels, sign = _with_rising_change(levels, comparison.size[comparison.strongest("envelope.")])
-    family = _family_or_line(_best_race(comparison, levels), _strongest(comparison, levels, fundamental=True))
-    family = max(family, *_shafts(comparison, levels), key=lambda candidate: candidate.rise_db)
+    now, names = condition.now, tuple(condition.now.channels)
+    levels = _envelope_levels(condition)
+    levels, sign = _with_rising_change(levels, condition.over_floors[condition.strongest("envelope.")])
+    family = _family_or_line(_best_race(condition, levels), _strongest(condition, levels, fundamental=True))
+    family = max(family, *_shafts(condition, levels), key=lambda candidate: candidate.rise_db)
     bands = now.bands_hz * len(names)
     change = sign * family.rise_db
     title = f"envelope lines {family.words}, {by_decibels(change)} in {band_words(bands[family.row])}"
@@ -326,65 +262,65 @@ def locate_envelope(comparison: ComparedPair) -> GapPlace:
     return GapPlace(PlaceKind.ENVELOPE, title, change, orders=family.orders, band_hz=bands[family.row], channel=channel)
 
 
-def locate_line(comparison: ComparedPair) -> GapPlace:
+def locate_line(condition: Condition) -> GapPlace:
     """Return which line of the residual changed most: the supply's, a bearing's, or a strange one."""
-    strongest = comparison.strongest("line.outer", "line.inner", "line.ball", "line.cage", "line.strange", "hum")
-    levels, sign = _with_rising_change(_residual_levels(comparison), comparison.size[strongest])
-    line = _strongest(comparison, levels, fundamental=False)
-    if strongest == "hum" or (_is_mains_order(comparison, line.orders[0]) and comparison.size["hum"] > 1.0):
-        return _hum(comparison)
-    return _line(comparison, _family_or_line(_best_race(comparison, levels), line), sign)
+    strongest = condition.strongest("line.outer", "line.inner", "line.ball", "line.cage", "line.strange", "hum")
+    levels, sign = _with_rising_change(_residual_levels(condition), condition.over_floors[strongest])
+    line = _strongest(condition, levels, fundamental=False)
+    if strongest == "hum" or (_is_mains_order(condition, line.orders[0]) and condition.over_floors["hum"] > 1.0):
+        return _hum(condition)
+    return _line(condition, _family_or_line(_best_race(condition, levels), line), sign)
 
 
-def line_within(comparison: ComparedPair, band_hz: tuple[float, float], change_db: float) -> GapPlace | None:
+def line_within(condition: Condition, band_hz: tuple[float, float], change_db: float) -> GapPlace | None:
     """Return the line that makes up most of what a band of the residual has more; None where it is noise."""
     if change_db <= 0:
         return None
-    now = comparison.now
+    now = condition.now
     powers = [
         np.stack([g.channels[name].residual_power.mean(axis=0) for name in now.channels])
-        for g in (now, comparison.baseline)
+        for g in (now, condition.baseline)
     ]
     orders = np.arange(powers[0].shape[1]) * now.order_step
     within = (orders * now.speed_hz >= band_hz[0]) & (orders * now.speed_hz <= band_hz[1])
     row, peak = (int(i) for i in np.unravel_index(int(np.argmax(np.where(within, powers[0], 0.0))), powers[0].shape))
     line = powers[0][row, max(peak - _LINE_WIDTH, 0) : peak + _LINE_WIDTH + 1].sum()
-    old = np.arange(powers[1].shape[1]) * comparison.baseline.order_step * now.speed_hz
+    old = np.arange(powers[1].shape[1]) * condition.baseline.order_step * now.speed_hz
     before = powers[1][row, (old >= band_hz[0]) & (old <= band_hz[1])].sum()
     if line < MAX_OF_A_BAND * max(float(powers[0][row, within].sum() - before), 1e-300):
         return None
     order = float(orders[peak])
-    levels = _residual_levels(comparison)
+    levels = _residual_levels(condition)
     rise = float((levels.now - levels.baseline)[row, min(peak, len(levels.taken) - 1)])
-    place = _line(comparison, _StrongestRise(_order_words(comparison, order), rise, (order,), row), 1.0)
+    place = _line(condition, _StrongestRise(_order_words(condition, order), rise, (order,), row), 1.0)
     # What no average of the gears holds of the mesh, as it swells and fades, is theirs all the same.
-    is_of_the_mesh = _mesh_harmonic(comparison, order) is not None
+    is_of_the_mesh = _mesh_harmonic(condition, order) is not None
     return replace(place, kind=PlaceKind.BAND, band_hz=band_hz) if is_of_the_mesh else place
 
 
-def _line(comparison: ComparedPair, line: _StrongestRise, sign: float) -> GapPlace:
+def _line(condition: Condition, line: _StrongestRise, sign: float) -> GapPlace:
     change = sign * line.rise_db
-    title = f"line {line.words} ({hertz(line.orders[0] * comparison.now.speed_hz)}), {by_decibels(change)}"
-    return GapPlace(PlaceKind.LINE, title, change, orders=line.orders, channel=list(comparison.now.channels)[line.row])
+    title = f"line {line.words} ({hertz(line.orders[0] * condition.now.speed_hz)}), {by_decibels(change)}"
+    return GapPlace(PlaceKind.LINE, title, change, orders=line.orders, channel=list(condition.now.channels)[line.row])
 
 
-def _envelope_levels(comparison: ComparedPair) -> LineLevels:
-    now, before = comparison.now, comparison.baseline
+def _envelope_levels(condition: Condition) -> LineLevels:
+    now, before = condition.now, condition.baseline
     ratios = [np.concatenate([envelope_ratios(g, g.channels[name]) for name in now.channels]) for g in (now, before)]
-    return _levels(comparison, ratios, now.cycle_step, before.cycle_step)
+    return _levels(condition, ratios, now.cycle_step, before.cycle_step)
 
 
-def _residual_levels(comparison: ComparedPair) -> LineLevels:
-    now, before = comparison.now, comparison.baseline
+def _residual_levels(condition: Condition) -> LineLevels:
+    now, before = condition.now, condition.baseline
     ratios = [residual_ratios(g, [g.channels[name] for name in now.channels]) for g in (now, before)]
-    return _levels(comparison, ratios, now.order_step, before.order_step)
+    return _levels(condition, ratios, now.order_step, before.order_step)
 
 
-def _levels(comparison: ComparedPair, ratios: list[FloatArray], step: float, step_before: float) -> LineLevels:
+def _levels(condition: Condition, ratios: list[FloatArray], step: float, step_before: float) -> LineLevels:
     now, before_db = (10.0 * np.log10(np.maximum(rows, 1.0)) for rows in ratios)
     orders = np.arange(min(now.shape[1], int(before_db.shape[1] * step_before / step))) * step
     before = _widened(before_db)
-    shafts = np.array(comparison.now.frame.shaft_orders)[:, None]
+    shafts = np.array(condition.now.frame.shaft_orders)[:, None]
     away = np.abs(orders / shafts - np.rint(orders / shafts)) * shafts
     return LineLevels(
         now[:, : len(orders)],
@@ -419,22 +355,17 @@ def _family_or_line(family: _StrongestRise, line: _StrongestRise) -> _StrongestR
     return family if is_multiple or family.rise_db > MIN_SHARE_OF_A_FAMILY * line.rise_db else line
 
 
-def _best_race(comparison: ComparedPair, levels: LineLevels) -> _StrongestRise:
+def _best_race(condition: Condition, levels: LineLevels) -> _StrongestRise:
     """Return the bearing's family whose lines rose most."""
     races = [_StrongestRise("", 0.0, (), 0)]
     now, baseline = _widened(levels.now), levels.baseline
-    for bearing in comparison.now.frame.bearings:
-        for kind, (attribute, factor) in BEARING_FAMILIES.items():
-            order = getattr(bearing, attribute) * factor
+    for bearing in condition.now.frame.bearings:
+        for kind, order in bearing.families.items():
             if np.isfinite(order):
                 rise, row, slipped = _family_rise(now - baseline, order, levels)
-                words = f"of the {RACE_WORDS[kind]} of {_bearing(bearing.name)} (order {slipped:.3g})"
+                words = f"of the {RACE_WORDS[kind]} of {named('bearing', bearing.name)} (order {slipped:.3g})"
                 races.append(_StrongestRise(words, rise, _multiples(slipped, N_FAMILY), row))
     return max(races, key=lambda family: family.rise_db)
-
-
-def _bearing(name: str) -> str:
-    return name if "bearing" in name.lower() else f"bearing {name}"
 
 
 def _family_rise(rise: FloatArray, order: float, levels: LineLevels) -> tuple[float, int, float]:
@@ -456,14 +387,14 @@ def _family_rise(rise: FloatArray, order: float, levels: LineLevels) -> tuple[fl
     return float(max(second[row, best], 0.0)), int(row), float(slips[best])
 
 
-def _shafts(comparison: ComparedPair, levels: LineLevels) -> list[_StrongestRise]:
+def _shafts(condition: Condition, levels: LineLevels) -> list[_StrongestRise]:
     """Return the shafts' families, where the features say that they changed."""
     families, rise = [], _widened(levels.now) - levels.baseline
-    for side, order in enumerate(comparison.now.frame.shaft_orders):
+    for side, order in enumerate(condition.now.frame.shaft_orders):
         lines = np.rint(order * np.arange(1, N_SHAFT_FAMILY + 1) / levels.step).astype(np.intp)
         means = rise[:, lines[lines < rise.shape[1]]].mean(axis=1)
-        felt = abs(comparison.size[f"envelope.{SIDES[side]}_shaft"]) > 1.0
-        words = f"at multiples of {shaft_words(comparison.now.frame, side)}"
+        felt = abs(condition.over_floors[f"envelope.{SIDES[side]}_shaft"]) > 1.0
+        words = f"at multiples of {shaft_words(condition.now.frame, side)}"
         families.append(
             _StrongestRise(words, float(means.max()) if felt else 0.0, _multiples(order, 3), int(np.argmax(means)))
         )
@@ -474,7 +405,7 @@ def _multiples(order: float, n: int) -> tuple[float, ...]:
     return tuple(float(k * order) for k in range(1, n + 1))
 
 
-def _strongest(comparison: ComparedPair, levels: LineLevels, *, fundamental: bool) -> _StrongestRise:
+def _strongest(condition: Condition, levels: LineLevels, *, fundamental: bool) -> _StrongestRise:
     """Return the line that rose most of those at no multiple of a shaft's order."""
     rise = np.where(levels.taken, -np.inf, levels.now - levels.baseline)
     row, line = (int(i) for i in np.unravel_index(int(np.argmax(rise)), rise.shape))
@@ -482,29 +413,29 @@ def _strongest(comparison: ComparedPair, levels: LineLevels, *, fundamental: boo
     if fundamental:
         line = _fundamental(levels.now[row], line)
     order = line * levels.step
-    return _StrongestRise(_order_words(comparison, order), change, (order,), row)
+    return _StrongestRise(_order_words(condition, order), change, (order,), row)
 
 
-def _mesh_harmonic(comparison: ComparedPair, order: float) -> int | None:
+def _mesh_harmonic(condition: Condition, order: float) -> int | None:
     """Return the number of the mesh harmonic that lies at an order."""
-    mesh = comparison.now.frame.teeth[DRIVER]
+    mesh = condition.now.frame.teeth[DRIVER]
     k = max(round(order / mesh), 1)
-    return k if abs(order - k * mesh) <= 1.5 * comparison.now.order_step else None
+    return k if abs(order - k * mesh) <= 1.5 * condition.now.order_step else None
 
 
-def _order_words(comparison: ComparedPair, order: float) -> str:
+def _order_words(condition: Condition, order: float) -> str:
     """Return whose order it is by itself, without a family of multiples."""
-    frame, step = comparison.now.frame, 1.5 * comparison.now.order_step
-    if (k := _mesh_harmonic(comparison, order)) is not None:
+    frame, step = condition.now.frame, 1.5 * condition.now.order_step
+    if (k := _mesh_harmonic(condition, order)) is not None:
         return f"at order {order:.4g}, {'that' if k == 1 else f'{k} times that'} of the mesh"
     for side, turns in enumerate(frame.shaft_orders):
         if abs(order - max(round(order / turns), 1) * turns) <= min(step, 0.1 * turns):
             return f"at order {order:.4g}, a multiple of {shaft_words(frame, side)}"
-    for bearing in comparison.now.frame.bearings:
-        for kind, (attribute, factor) in BEARING_FAMILIES.items():
-            if -SLIP < order / (getattr(bearing, attribute) * factor) - 1.0 < UPWARDS:
-                return f"at order {order:.4g}, that of the {RACE_WORDS[kind]} of {_bearing(bearing.name)}"
-    nor = "and no bearing" if comparison.now.frame.bearings else "(the rig names no bearing)"
+    for bearing in condition.now.frame.bearings:
+        for kind, of_family in bearing.families.items():
+            if -SLIP < order / of_family - 1.0 < UPWARDS:
+                return f"at order {order:.4g}, that of the {RACE_WORDS[kind]} of {named('bearing', bearing.name)}"
+    nor = "and no bearing" if condition.now.frame.bearings else "(the rig names no bearing)"
     return f"at order {order:.4g}, which belongs to no shaft {nor}"
 
 
@@ -518,18 +449,18 @@ def _fundamental(level: FloatArray, line: int) -> int:
     return line
 
 
-def _is_mains_order(comparison: ComparedPair, order: float) -> bool:
-    speed_hz = comparison.now.speed_hz
+def _is_mains_order(condition: Condition, order: float) -> bool:
+    speed_hz = condition.now.speed_hz
     lines = np.array([k * supply for supply in MAINS_HZ for k in range(1, N_MAINS_HARMONICS + 1)])
     # Twice what a supply wanders: the order was found on a grid of lines, at a mean speed.
-    width = np.maximum(2.0 * MAINS_TOLERANCE * lines, comparison.now.order_step * speed_hz)
+    width = np.maximum(2.0 * MAINS_TOLERANCE * lines, condition.now.order_step * speed_hz)
     return bool((np.abs(order * speed_hz - lines) < width).any())
 
 
-def _hum(comparison: ComparedPair) -> GapPlace:
-    now = comparison.now
+def _hum(condition: Condition) -> GapPlace:
+    now = condition.now
     supply = MAINS_HZ[int(np.argmax(now.hum))]
-    change = comparison.change_db["hum"]
+    change = condition.change_db["hum"]
     orders = tuple(k * supply / now.speed_hz for k in range(1, N_MAINS_HARMONICS + 1))
     return GapPlace(
         PlaceKind.LINE, f"mains hum at {supply:g} Hz and multiples, {by_decibels(change)}", change, orders=orders
@@ -551,15 +482,15 @@ EXPLAINED = 0.5
 """Of the largest change of power, what a shaft's own lines must hold of it."""
 
 
-def locate_mesh(comparison: ComparedPair) -> GapPlace | None:
+def locate_mesh(condition: Condition) -> GapPlace | None:
     """Return the mesh harmonic that changed most."""
-    frame = comparison.now.frame
-    if comparison.strongest("mesh", "line.half_mesh") in ("mesh.half", "line.half_mesh"):
-        half = comparison.change_db[comparison.strongest("mesh.half", "line.half_mesh")]
+    frame = condition.now.frame
+    if condition.strongest("mesh", "line.half_mesh") in ("mesh.half", "line.half_mesh"):
+        half = condition.change_db[condition.strongest("mesh.half", "line.half_mesh")]
         return GapPlace(
             PlaceKind.MESH, f"half the mesh order, {by_decibels(half)}", half, orders=(frame.teeth[0] / 2.0,)
         )
-    lines_of_both = _lines_of_both(comparison, DRIVER, relative=not comparison.is_reference)
+    lines_of_both = _lines_of_both(condition, DRIVER, relative=not condition.has_reference)
     lines = [
         k * frame.teeth[0]
         for k in range(1, N_MESH_HARMONICS + 1)
@@ -570,19 +501,19 @@ def locate_mesh(comparison: ComparedPair) -> GapPlace | None:
         return None
     row, best, change = strongest
     if abs(change) < MIN_CHANGE_DB:  # the lines hardly moved: what was scored is a ratio, of harmonics or of sensors
-        scored = comparison.strongest("mesh.", "alike.")
-        change = comparison.change_db[scored]
+        scored = condition.strongest("mesh.", "alike.")
+        change = condition.change_db[scored]
         title = f"{feature_words(scored, frame)}, {by_decibels(change)}"
         if scored.startswith("alike."):
             title = "what lies beside the mesh harmonics, which themselves hardly moved"
         return GapPlace(PlaceKind.MESH, title, change, orders=_harmonic_order(scored, frame))
-    total = comparison.change_db["mesh.total"]
-    alike = comparison.is_reference and abs(total) > 0.7 * abs(change) and total * change > 0
+    total = condition.change_db["mesh.total"]
+    alike = condition.has_reference and abs(total) > 0.7 * abs(change) and total * change > 0
     every = f"mesh harmonics, together {by_decibels(total)}, " if alike else "mesh harmonics, "
     title = f"{every}most at {_times(best + 1)}mesh ({by_decibels(change)})"
-    if not comparison.is_reference:
+    if not condition.has_reference:
         title += " against the other harmonics"
-    return GapPlace(PlaceKind.MESH, title, change, orders=(float(lines[best]),), channel=_channel(comparison, row))
+    return GapPlace(PlaceKind.MESH, title, change, orders=(float(lines[best]),), channel=_channel(condition, row))
 
 
 def _harmonic_order(feature: str, frame: GearFrame) -> tuple[float, ...]:
@@ -591,10 +522,10 @@ def _harmonic_order(feature: str, frame: GearFrame) -> tuple[float, ...]:
     return (float(int(harmonic) * frame.teeth[DRIVER]),) if harmonic.isdigit() else ()
 
 
-def locate_sidebands(comparison: ComparedPair, side: int) -> GapPlace | None:
+def locate_sidebands(condition: Condition, side: int) -> GapPlace | None:
     """Return about which mesh harmonic a shaft's sidebands changed most, and which of them."""
-    now, before = _lines_of_both(comparison, side, relative=not comparison.is_reference)
-    frame = comparison.now.frame
+    now, before = _lines_of_both(condition, side, relative=not condition.has_reference)
+    frame = condition.now.frame
     teeth, n = frame.teeth[side], now.power.shape[1]
     reach = min(FURTHEST_SIDEBAND, teeth // 2)
     groups = [
@@ -611,15 +542,15 @@ def locate_sidebands(comparison: ComparedPair, side: int) -> GapPlace | None:
     carrier = (best + 1) * teeth
     title += _spacing_text([abs(line - carrier) for line in lines])
     orders = tuple(float(line * frame.shaft_orders[side]) for line in lines)
-    return GapPlace(PlaceKind.SIDEBANDS, title, change, orders=orders, channel=_channel(comparison, row))
+    return GapPlace(PlaceKind.SIDEBANDS, title, change, orders=orders, channel=_channel(condition, row))
 
 
-def locate_shaft(comparison: ComparedPair, side: int) -> GapPlace | None:
+def locate_shaft(condition: Condition, side: int) -> GapPlace | None:
     """Return the low order of a shaft that changed most."""
-    lines_of_both = _lines_of_both(comparison, side, relative=False)
-    frame = comparison.now.frame
+    lines_of_both = _lines_of_both(condition, side, relative=False)
+    frame = condition.now.frame
     last = min(MAX_SHAFT_ORDERS, frame.teeth[side] - 3, lines_of_both[0].power.shape[1] - 1)
-    scored = Feature.of(comparison.strongest(f"shaft.{SIDES[side]}"))
+    scored = Feature.of(condition.strongest(f"shaft.{SIDES[side]}"))
     first = scored.detail.partition(".")[0]  # the order, or "strongest" or "low"
     groups = [[int(first)]] if first.isdigit() else [[order] for order in range(1, last + 1)]
     strongest = _strongest_group(*lines_of_both, groups)
@@ -629,7 +560,7 @@ def locate_shaft(comparison: ComparedPair, side: int) -> GapPlace | None:
     order = groups[best][0]
     title = f"order {order} of {shaft_words(frame, side)}, {by_decibels(change)}"
     change_order = (order * frame.shaft_orders[side],)
-    return GapPlace(PlaceKind.SHAFT, title, change, orders=change_order, channel=_channel(comparison, row))
+    return GapPlace(PlaceKind.SHAFT, title, change, orders=change_order, channel=_channel(condition, row))
 
 
 @dataclass(frozen=True)
@@ -652,10 +583,10 @@ class _Lines:
         return _Lines(*sums)
 
 
-def _lines_of_both(comparison: ComparedPair, side: int, *, relative: bool) -> tuple[_Lines, _Lines]:
+def _lines_of_both(condition: Condition, side: int, *, relative: bool) -> tuple[_Lines, _Lines]:
     """Return the lines of both on the same orders; `relative` to each channel's mesh harmonics."""
-    names = tuple(comparison.now.channels)
-    now, before = (_lines(run, names, side, relative=relative) for run in (comparison.now, comparison.baseline))
+    names = tuple(condition.now.channels)
+    now, before = (_lines(run, names, side, relative=relative) for run in (condition.now, condition.baseline))
     n = min(now.power.shape[1], before.power.shape[1])
     return now.first(n), before.first(n)
 
@@ -705,8 +636,8 @@ def _times(harmonic: int) -> str:
     return "" if harmonic == 1 else f"{harmonic} × "
 
 
-def _channel(comparison: ComparedPair, row: int) -> str:
-    return list(comparison.now.channels)[row]
+def _channel(condition: Condition, row: int) -> str:
+    return list(condition.now.channels)[row]
 
 
 # --------------------
@@ -720,52 +651,52 @@ CLIPPED_SHARE = 1e-3
 """Share of samples within half a percent of the extreme; of a vibration with random peaks, some 1e-5 lie there."""
 
 
-def locate_band(comparison: ComparedPair) -> GapPlace:
+def locate_band(condition: Condition) -> GapPlace:
     """Return the band of the residual that changed most: its level, or how impulsive it is."""
-    name = comparison.strongest("floor.band", "floor.kurtosis")
+    name = condition.strongest("floor.band", "floor.kurtosis")
     kind, _, number = Feature.of(name).detail.partition(".")
-    band = comparison.now.bands_hz[int(number) - 1]
-    change = comparison.change_db[name]
-    tone = line_within(comparison, band, change) if kind == "band" else None
+    band = condition.now.bands_hz[int(number) - 1]
+    change = condition.change_db[name]
+    tone = line_within(condition, band, change) if kind == "band" else None
     if tone is not None:
         return tone
     quantity = "noise" if kind == "band" else "kurtosis of the noise"
     title = f"{quantity} between {band_words(band).replace(' to ', ' and ')}, {by_decibels(change)}"
-    channel = _most_changed_channel(comparison, int(number) - 1, kurtosis=kind != "band")
+    channel = _most_changed_channel(condition, int(number) - 1, kurtosis=kind != "band")
     return GapPlace(PlaceKind.BAND, title, change, band_hz=band, channel=channel, follows=kind != "band")
 
 
-def _most_changed_channel(comparison: ComparedPair, band: int, *, kurtosis: bool) -> str:
+def _most_changed_channel(condition: Condition, band: int, *, kurtosis: bool) -> str:
     """Return the channel on which the band changed most."""
 
     def change(name: str) -> float:
-        band_moments = [g.channels[name].moments.mean(axis=0)[band] for g in (comparison.now, comparison.baseline)]
+        band_moments = [g.channels[name].moments.mean(axis=0)[band] for g in (condition.now, condition.baseline)]
         figures = [fourth / max(square**2, 1e-300) if kurtosis else square for square, fourth in band_moments]
         return abs(float(np.log(max(figures[0], 1e-300) / max(figures[1], 1e-300))))
 
-    return max(comparison.now.channels, key=change)
+    return max(condition.now.channels, key=change)
 
 
-def locate_speed(comparison: ComparedPair) -> GapPlace | None:
+def locate_speed(condition: Condition) -> GapPlace | None:
     """Return what the speed does otherwise; None where it hardly does anything."""
-    name = comparison.strongest("speed.")
-    change = comparison.change_db[name]
-    drift, swing, _, frequency_hz = comparison.now.speed
-    if max(abs(drift), swing, *(abs(figure) for figure in comparison.baseline.speed[:2])) < MIN_SPEED_CHANGE:
+    name = condition.strongest("speed.")
+    change = condition.change_db[name]
+    drift, swing, _, frequency_hz = condition.now.speed
+    if max(abs(drift), swing, *(abs(figure) for figure in condition.baseline.speed[:2])) < MIN_SPEED_CHANGE:
         return None
     if name == "speed.drift":
         return GapPlace(PlaceKind.SPEED, f"speed drifts by {100 * drift:.2g} % along the record", change)
     title = f"speed swings by {100 * swing:.2g} % rms, most at {frequency_hz:.2g} Hz"
-    return GapPlace(PlaceKind.SPEED, title, change, orders=(frequency_hz / comparison.now.speed_hz,))
+    return GapPlace(PlaceKind.SPEED, title, change, orders=(frequency_hz / condition.now.speed_hz,))
 
 
-def locate_tail(comparison: ComparedPair) -> GapPlace:
+def locate_tail(condition: Condition) -> GapPlace:
     """Return how the amplitudes are distributed otherwise."""
-    name = comparison.strongest("raw.near", "raw.kurtosis")
-    change = comparison.change_db[name]
-    channel = max(comparison.now.channels, key=lambda c: float(comparison.now.channels[c].tail[:, 2].mean()))
+    name = condition.strongest("raw.near", "raw.kurtosis")
+    change = condition.change_db[name]
+    channel = max(condition.now.channels, key=lambda c: float(condition.now.channels[c].tail[:, 2].mean()))
     if name == "raw.near_the_extreme":
-        piled = float(comparison.now.channels[channel].tail[:, 2].mean()) > CLIPPED_SHARE
+        piled = float(condition.now.channels[channel].tail[:, 2].mean()) > CLIPPED_SHARE
         clipping = ", as clipping makes them" if change > 0 and piled else ""
         title = f"samples close to the largest amplitude{clipping}, {by_decibels(change)}"
         return GapPlace(PlaceKind.TAIL, title, change, channel=channel, follows=not clipping)
@@ -844,20 +775,20 @@ def _pattern(
     return ToothPattern(energy, lines, synchronous / max(whole, 1e-300))
 
 
-def locate_tooth(comparison: ComparedPair, side: int) -> GapPlace | None:
+def locate_tooth(condition: Condition, side: int) -> GapPlace | None:
     """Return the angle and tooth that stands out, or that the teeth's pattern changed all round.
 
     None where most of the pattern is noise, or leaks into the average.
     """
-    frame, now = comparison.now.frame, comparison.now
+    frame, now = condition.now.frame, condition.now
     pattern = (
-        changed_pattern(now, comparison.baseline, side) if comparison.is_reference else pattern_of_recording(now, side)
+        changed_pattern(now, condition.baseline, side) if condition.has_reference else pattern_of_recording(now, side)
     )
     shaft, name = shaft_words(frame, side), list(now.channels)[int(np.argmax(pattern.energy.max(axis=1)))]
     if pattern.synchronous_share < MIN_SYNCHRONOUS_SHARE:
         return None
     if pattern.prominence < STANDS_OUT:
-        return locate_all_round(comparison, side, shaft, name)
+        return locate_all_round(condition, side, shaft, name)
     place, teeth = pattern.place_rev, frame.teeth[side]
     above, angle = 10.0 * float(np.log10(pattern.prominence)), 360.0 * place
     tooth = int(place * teeth) % teeth + 1 if now.marks[side] else None
@@ -866,13 +797,13 @@ def locate_tooth(comparison: ComparedPair, side: int) -> GapPlace | None:
     return GapPlace(PlaceKind.TOOTH, title, above, angle_deg=angle, tooth=tooth, channel=name)
 
 
-def locate_all_round(comparison: ComparedPair, side: int, shaft: str, channel: str) -> GapPlace:
+def locate_all_round(condition: Condition, side: int, shaft: str, channel: str) -> GapPlace:
     """Return that no tooth in particular stands out, with the figure of the feature that was scored."""
-    scored = comparison.strongest(*(f"{kind}.{SIDES[side]}." for kind in ("tooth", "change", "surprise")))
+    scored = condition.strongest(*(f"{kind}.{SIDES[side]}." for kind in ("tooth", "change", "surprise")))
     level = f"tooth.{SIDES[side]}.level"
-    if not scored.endswith(ALL_ROUND) and abs(comparison.size[level]) > 1.0:
+    if not scored.endswith(ALL_ROUND) and abs(condition.over_floors[level]) > 1.0:
         scored = level
-    change = comparison.change_db[scored]
+    change = condition.change_db[scored]
     if not scored.endswith(ALL_ROUND):
         title = f"shape of the teeth's pattern of {shaft}, no tooth in particular"
         return GapPlace(PlaceKind.TOOTH, title, change, channel=channel, follows=True)
@@ -888,14 +819,7 @@ REPEATING = ("floor.to_signal", "floor.total", "raw.level")
 """Features that only repeat what others say of a place."""
 
 
-def gap_places(
-    now: ReducedRecording,
-    baseline: ReducedRecording,
-    structural: StructuralFloor,
-    change: Features,
-    *,
-    is_reference: bool,
-) -> tuple[GapPlace, ...]:
+def gap_places(condition: Condition) -> tuple[GapPlace, ...]:
     """Return where a recording differs, largest share first; last what only follows from other places.
 
     A place is a family of features; its size s_f is their mean of high order over the floors, and its share
@@ -905,33 +829,25 @@ def gap_places(
 
     Parameters
     ----------
-    now : ReducedRecording
-    baseline : ReducedRecording
-        A healthy recording of the same machine, or its simulation.
-    structural : StructuralFloor
-    change : Features
-        What `change_features` or `difference_features` made of the two.
-    is_reference : bool
-        Whether `baseline` is a recording of the same machine: the teeth's patterns can then be subtracted.
+    condition : Condition
 
     Raises
     ------
     RefusalError
         If the reference was taken at another speed.
     """
-    distances, *floors = against_floors(change, structural, is_reference=is_reference)
-    comparison = _with_sizes(now, baseline, change.names, distances, floors, is_reference=is_reference)
-    ratios = np.array([*comparison.size.values()])
-    members = {family: _located_rows(change.names, rows) for family, rows in family_members(change.names).items()}
+    names, now = condition.change.names, condition.now
+    distances, ratios = (np.array([*by_name.values()]) for by_name in (condition.change_db, condition.over_floors))
+    members = {family: _located_rows(names, rows) for family, rows in family_members(names).items()}
     energies = {family: max(family_size(ratios[rows]) ** 2 - 1.0, 0.0) for family, rows in members.items()}
     min_energy = MIN_SHARE * sum(energies.values())
-    spots = {family: _spot(comparison, family) for family, energy in energies.items() if energy > min_energy}
+    spots = {family: _spot(condition, family) for family, energy in energies.items() if energy > min_energy}
     following = {family for family, spot in spots.items() if spot is not None and spot.follows}
     total = sum(energy for family, energy in energies.items() if family not in following)
     places = []
     for family, spot in spots.items():
         if spot is not None:
-            sizes = [family_size(distances[members[family]] / floor[members[family]]) for floor in floors]
+            sizes = [family_size(distances[members[family]] / floor[members[family]]) for floor in condition.floors]
             share = float("nan") if family in following else energies[family] / total
             shaft = now.frame.shafts[SIDES.index(family[1])] if family[1] else ""
             places.append(replace(spot, structural=sizes[0], repeatability=sizes[1], share=share, shaft=shaft))
@@ -955,7 +871,7 @@ def _located_rows(names: tuple[str, ...], rows: np.ndarray) -> np.ndarray:
     return np.array(kept, dtype=np.intp)
 
 
-def _spot(comparison: ComparedPair, family: Family) -> GapPlace | None:
+def _spot(condition: Condition, family: Family) -> GapPlace | None:
     kind, shaft = family
     of_a_shaft = {PlaceKind.SIDEBANDS: locate_sidebands, PlaceKind.SHAFT: locate_shaft, PlaceKind.TOOTH: locate_tooth}
     plain = {
@@ -966,4 +882,4 @@ def _spot(comparison: ComparedPair, family: Family) -> GapPlace | None:
         PlaceKind.SPEED: locate_speed,
         PlaceKind.TAIL: locate_tail,
     }
-    return of_a_shaft[kind](comparison, SIDES.index(shaft)) if kind in of_a_shaft else plain[kind](comparison)
+    return of_a_shaft[kind](condition, SIDES.index(shaft)) if kind in of_a_shaft else plain[kind](condition)

@@ -111,12 +111,6 @@ class Population:
         return replace(self, **{name: getattr(self, name)[rows] for name in by_row})
 
     @cached_property
-    def reference_floor(self) -> StructuralFloor:
-        """By how much healthy machines differ from themselves on another day."""
-        healthy = self.causes == NONE
-        return StructuralFloor.of_healthy(self.change_names, self.changes[healthy])
-
-    @cached_property
     def credibility(self) -> FloatArray:
         """How much of what the simulation says of each feature holds for healthy machines, 0 to 1, (n_features,)."""
         healthy = self.causes == NONE
@@ -134,15 +128,10 @@ class Population:
         scatter: FloatArray = np.hypot(self.feature_scatter, self.credibility * self.simulated_scatter)
         return scatter
 
-    @cached_property
-    def simulation_floor(self) -> StructuralFloor:
-        """By how much healthy machines differ from what a simulation that knows their rig file lets expect."""
-        healthy = self.causes == NONE
-        return StructuralFloor.of_healthy(self.feature_names, self.gaps[healthy])
-
     def floor(self, *, with_reference: bool) -> StructuralFloor:
-        """Return the floor of one way of comparing."""
-        return self.reference_floor if with_reference else self.simulation_floor
+        """Return how far healthy machines differ from themselves on another day, or from what their simulation says."""
+        names, rows = (self.change_names, self.changes) if with_reference else (self.feature_names, self.gaps)
+        return StructuralFloor.of_healthy(names, rows[self.causes == NONE])
 
 
 @contextmanager

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
-from gearsig.errors import InputError
 from gearsig.gap._features import Feature, jackknife_variance
 from gearsig.gap._floors import FLOOR_IN_DEVIATIONS, family_members, t_quantile
 from gearsig.gap._report import MIN_PREDICTED, Interval, Shrinkage
@@ -196,16 +195,8 @@ def fit_effect(paths: Iterable[EffectPath], observed: Sequence[ObservedChange]) 
         The effect with each set of options.
     observed : sequence of ObservedChange
         Of one or several conditions.
-
-    Raises
-    ------
-    InputError
-        If there is no path.
     """
-    fits = [fit_path(path, observed) for path in paths]
-    if not fits:
-        raise InputError("the effect has no candidate that can be simulated", remedy="describe the rig more fully")
-    return min(fits, key=lambda fit: fit.cost)
+    return min((fit_path(path, observed) for path in paths), key=lambda fit: fit.cost)
 
 
 def fit_path(path: EffectPath, observed: Sequence[ObservedChange]) -> Fit:
@@ -480,55 +471,11 @@ class Fold:
     again: tuple[tuple[ObservedChange, ...], ...] = ()
 
 
-@dataclass(frozen=True)
-class _Score:
-    """How an effect did on one fold.
-
-    Parameters
-    ----------
-    sizes : (float, float, float)
-        Before and after in floors, and the shrink.
-    variances : array, (3,)
-        Of the sizes.
-    slope : float
-        Of observed over predicted.
-    placebo : float
-        The best one's shrink.
-    n_placebos : int
-    predicted : float
-        Largest change that the fit predicts, in floors.
-    """
-
-    sizes: tuple[float, float, float]
-    variances: FloatArray
-    slope: float
-    placebo: float
-    n_placebos: int
-    predicted: float
-
-
 def affected_features(fit: Fit, observed: ObservedChange) -> FloatArray:
     """Return 1 for the features that the fitted effect changes, 0 for the others; its strongest one at least."""
     predicted = np.abs(fit.at(observed.condition) / observed.floors)
     used: FloatArray = (predicted >= min(MIN_AFFECTED, float(predicted.max()))).astype(np.float64)
     return used
-
-
-def fold_fits(paths: Sequence[EffectPath], folds: Sequence[Fold]) -> list[Fit]:
-    """Return an effect's fit to the part of each fold that it is not scored on.
-
-    Parameters
-    ----------
-    paths : sequence of EffectPath
-        The effect with each set of options.
-    folds : sequence of Fold
-
-    Returns
-    -------
-    list of Fit
-        One per fold.
-    """
-    return [fit_effect(paths, fold.fitted) for fold in folds]
 
 
 def closed_shares(fits: Mapping[str, Sequence[Fit]], folds: Sequence[Fold]) -> dict[str, float]:
@@ -540,7 +487,7 @@ def closed_shares(fits: Mapping[str, Sequence[Fit]], folds: Sequence[Fold]) -> d
     Parameters
     ----------
     fits : mapping
-        Effect → its fit to each fold, see `fold_fits`.
+        Effect → its fit to the part of each fold that it is not scored on.
     folds : sequence of Fold
     """
     shares: dict[str, list[float]] = {name: [] for name in fits}
@@ -560,10 +507,12 @@ def _largest_predicted(fit: Fit, scored: ObservedChange) -> float:
     return float(np.abs(fit.at(scored.condition) / scored.floors).max())
 
 
+HELD_OUT = "other revolutions of the same recordings"
+
+
 def shrinkage(
     paths: Sequence[EffectPath],
     folds: Sequence[Fold],
-    held_out: str,
     excluded: Sequence[EffectPath] = (),
     fits: Sequence[Fit] = (),
 ) -> Shrinkage:
@@ -582,37 +531,30 @@ def shrinkage(
     paths : sequence of EffectPath
         Of the effect.
     folds : sequence of Fold
-    held_out : str
     excluded : sequence of EffectPath
         Of the effect where the recordings tell that it is not: on the other shaft, say. They serve as placebos.
     fits : sequence of Fit
-        As `fold_fits` returns them, where they are known.
+        To the part of each fold that is not scored, where they are known.
     """
-    known = fits or fold_fits(paths, folds)
-    folds, scores = _folds_that_show(
-        folds, [_score(paths, fold, excluded, fit) for fold, fit in zip(folds, known, strict=True)]
-    )
-    before, after, shrink = np.mean([score.sizes for score in scores], axis=0).tolist()
-    n_blocks = min((len(group) for fold in folds for group in fold.again), default=2)
-    variances = np.mean([score.variances for score in scores], axis=0)
+    pairs = list(zip(folds, fits or [fit_effect(paths, fold.fitted) for fold in folds], strict=True))
+    shown = [(fold, fit) for fold, fit in pairs if _largest_predicted(fit, fold.scored) >= MIN_PREDICTED] or pairs
+    scores = [_score(fold, fit) for fold, fit in shown]
+    before, after, shrink = np.mean([sizes for sizes, _, _ in scores], axis=0).tolist()
+    n_blocks = min((len(group) for fold, _ in shown for group in fold.again), default=2)
+    variances = np.mean([variances for _, variances, _ in scores], axis=0)
     wide = (t_quantile(max(n_blocks - 1, 1)) * np.sqrt(variances)).tolist()
+    placebos = [_placebos((*paths, *excluded), fold, fit) for fold, fit in shown]
     return Shrinkage(
         Interval.around(before, wide[0], low=0.0),
         Interval.around(after, wide[1], low=0.0),
         Interval.around(shrink, wide[2], high=1.0),
-        float(np.mean([score.slope for score in scores])),
-        float(np.mean([score.placebo for score in scores])),
-        held_out,
-        n_placebos=max(score.n_placebos for score in scores),
-        elsewhere=_mean([_shrink_across_conditions(paths, fold) for fold in folds]),
-        predicted=max(score.predicted for score in scores),
+        float(np.mean([slope for _, _, slope in scores])),
+        float(np.mean([max(shrinks, default=0.0) for shrinks in placebos])),
+        HELD_OUT,
+        n_placebos=max(map(len, placebos)),
+        elsewhere=_mean([_shrink_across_conditions(paths, fold) for fold, _ in shown]),
+        predicted=max(_largest_predicted(fit, fold.scored) for fold, fit in shown),
     )
-
-
-def _folds_that_show(folds: Sequence[Fold], scores: Sequence[_Score]) -> tuple[Sequence[Fold], Sequence[_Score]]:
-    """Return the folds in which the effect shows on the simulator, and their scores; all where it does in none."""
-    shown = [i for i, score in enumerate(scores) if score.predicted >= MIN_PREDICTED] or range(len(scores))
-    return [folds[i] for i in shown], [scores[i] for i in shown]
 
 
 def _mean(values: Sequence[float | None]) -> float | None:
@@ -635,25 +577,20 @@ def _shrink_across_conditions(paths: Sequence[EffectPath], fold: Fold) -> float 
     return _before_and_after(fit, fold.scored, affected_features(fit, fold.scored))[2]
 
 
-def _score(paths: Sequence[EffectPath], fold: Fold, excluded: Sequence[EffectPath], fit: Fit) -> _Score:
+def _score(fold: Fold, fit: Fit) -> tuple[tuple[float, float, float], FloatArray, float]:
+    """Return before, after and shrink on one fold, their variances, (3,), and the slope of observed over predicted."""
     used = affected_features(fit, fold.scored)
-    wrong = [fit_path(path, fold.fitted) for path in (*paths, *excluded) if path.options != fit.path.options]
-    placebos = [
-        _before_and_after(wrong_fit, fold.scored, used)[2]
-        for wrong_fit in wrong
-        if not _is_alike(fit, wrong_fit, fold.scored)
-    ]
     variances = np.zeros(3)
     for group in fold.again:
         variances += jackknife_variance(np.array([_before_and_after(fit, change, used) for change in group]))
-    return _Score(
-        _before_and_after(fit, fold.scored, used),
-        variances,
-        _slope(fit, fold.scored, used),
-        max(placebos, default=0.0),
-        len(placebos),
-        _largest_predicted(fit, fold.scored),
-    )
+    return _before_and_after(fit, fold.scored, used), variances, _slope(fit, fold.scored, used)
+
+
+def _placebos(paths: Sequence[EffectPath], fold: Fold, fit: Fit) -> list[float]:
+    """Return what the effect shrinks the gap by where it is not, but for places that predict the same."""
+    used = affected_features(fit, fold.scored)
+    wrong = [fit_path(path, fold.fitted) for path in paths if path.options != fit.path.options]
+    return [_before_and_after(w, fold.scored, used)[2] for w in wrong if not _is_alike(fit, w, fold.scored)]
 
 
 def _is_alike(first: Fit, second: Fit, scored: ObservedChange) -> bool:

@@ -50,6 +50,11 @@ class BearingFrame:
     spin: float
     cage: float
 
+    @property
+    def families(self) -> dict[str, float]:
+        """Family of lines → the order that it counts: a ball strikes with both sides."""
+        return {"outer": self.outer, "inner": self.inner, "ball": 2.0 * self.spin, "cage": self.cage}
+
 
 @dataclass(frozen=True)
 class GearFrame:
@@ -105,16 +110,10 @@ def gear_frame(rig: Rig) -> GearFrame:
     ratios = (1.0, teeth[0] / teeth[1])
     bearings = []
     for bearing in rig.bearings:
-        if bearing.shaft not in shafts:
-            continue
-        side = shafts.index(bearing.shaft)
-        orders_of_shaft = {name: order * ratios[side] for name, order in bearing.orders().items()}
-        nan = float("nan")
-        bearings.append(
-            BearingFrame(
-                bearing.name, side, *(orders_of_shaft.get(name, nan) for name in ("BPFO", "BPFI", "BSF", "FTF"))
-            )
-        )
+        if bearing.shaft in shafts:
+            side, known = shafts.index(bearing.shaft), bearing.orders()
+            per_driver = (known.get(name, float("nan")) * ratios[side] for name in ("BPFO", "BPFI", "BSF", "FTF"))
+            bearings.append(BearingFrame(bearing.name, side, *per_driver))
     return GearFrame(pair, shafts, teeth, tuple(bearings), background_orders(rig))
 
 
@@ -182,7 +181,7 @@ MIN_APART = 3
 
 @dataclass(frozen=True)
 class ChannelSums:
-    """Sums of one channel, one row per block; leaving a row out gives the jackknife's replicate.
+    """Sums of one channel, one row per block.
 
     Parameters
     ----------
@@ -212,17 +211,12 @@ class ChannelSums:
         """Number of blocks."""
         return len(self.residual_power)
 
-    def without(self, block: int) -> ChannelSums:
-        """Return the sums with one block left out."""
-        keep = np.arange(self.n_blocks) != block
-        return replace(
-            self,
-            lines=(self.lines[0][keep], self.lines[1][keep]),
-            counts=(self.counts[0][keep], self.counts[1][keep]),
-            residual_power=self.residual_power[keep],
-            envelope_power=self.envelope_power[keep],
-            moments=self.moments[keep],
-            tail=self.tail[keep],
+    def of_blocks(self, kept: NDArray[np.bool_] | slice) -> ChannelSums:
+        """Return the sums over some of the blocks."""
+        (driver, driven), (n_driver, n_driven) = self.lines, self.counts
+        further = (self.residual_power, self.envelope_power, self.moments, self.tail)
+        return ChannelSums(
+            (driver[kept], driven[kept]), (n_driver[kept], n_driven[kept]), *(rows[kept] for rows in further)
         )
 
 
@@ -380,9 +374,13 @@ class ReducedRecording:
         """Of the slower shaft."""
         return self.n_revolutions * min(self.frame.shaft_orders)
 
-    def without(self, block: int) -> ReducedRecording:
-        """Return the recording with one block of revolutions left out."""
-        return self.with_channels({name: sums.without(block) for name, sums in self.channels.items()})
+    def of_blocks(self, kept: NDArray[np.bool_] | slice) -> ReducedRecording:
+        """Return the recording with some of its blocks of revolutions."""
+        return self.with_channels({name: sums.of_blocks(kept) for name, sums in self.channels.items()})
+
+    def leaving_one_out(self) -> Iterator[ReducedRecording]:
+        """Yield the recording without each of its blocks, the jackknife's replicates."""
+        return (self.of_blocks(np.arange(self.n_blocks) != block) for block in range(self.n_blocks))
 
     def with_channels(self, channels: dict[str, ChannelSums]) -> ReducedRecording:
         """Return the recording with other sums."""

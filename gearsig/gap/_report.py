@@ -10,7 +10,7 @@ from math import exp, inf, isfinite, isinf, nan
 import numpy as np
 
 from gearsig.checks import FloatArray
-from gearsig.formatting import odds_text, percent, readable
+from gearsig.formatting import enumerated, odds_text, percent, readable
 from gearsig.gap._simulator import Added, GapEffect, OperatingCondition, same_load, same_speed
 from gearsig.results import Result, verdict_html
 
@@ -399,12 +399,16 @@ TOGETHER, MAX_RIVALS = 0.9, 4
 more of them than anybody would look at."""
 
 
+def scaled(weights: Mapping[str, float]) -> dict[str, float]:
+    """Return probabilities in proportion to weights, likeliest first."""
+    total = sum(weights.values())
+    return likeliest_first({name: weight / total for name, weight in weights.items()})
+
+
 def shares_of(levels: Mapping[str, float]) -> dict[str, float]:
     """Return probabilities p_c ∝ exp(level_c), likeliest first."""
     top = max(levels.values())
-    weights = {name: exp(level - top) for name, level in levels.items()}
-    total = sum(weights.values())
-    return {name: weight / total for name, weight in likeliest_first(weights).items()}
+    return scaled({name: exp(level - top) for name, level in levels.items()})
 
 
 def rivals(causes: Sequence[GapCause]) -> tuple[str, ...]:
@@ -802,8 +806,8 @@ def _kind_and_rivals(report: GapReport, rivals: Sequence[str]) -> str:
 
 
 def _or_text(report: GapReport, names: Sequence[str]) -> str:
-    *titles, last = (_titled(report, name) for name in names)
-    return f"{', '.join(titles)} or {last}" if titles else last
+    titles = {cause.name: f"{cause.title} ({odds_text(cause.probability)})" for cause in report.causes}
+    return enumerated([titles.get(name, name.replace("_", " ")) for name in names], "or")
 
 
 def _which_unknown(report: GapReport) -> str:
@@ -852,22 +856,6 @@ def is_settled(causes: Sequence[GapCause]) -> bool:
     return len(probabilities) > 1 and probabilities[1] < SETTLED <= probabilities[0]
 
 
-def within_the_floor(probabilities: Mapping[str, float], size: Interval) -> dict[str, float]:
-    """Return the probabilities with that of an unknown cause given to none, where the whole gap is within its floor.
-
-    Parameters
-    ----------
-    probabilities : mapping
-        Cause → probability.
-    size : Interval
-        Of the whole gap, in structural floors.
-    """
-    if size.high > 1.0:
-        return dict(probabilities)
-    moved = {NONE: probabilities[NONE] + probabilities[UNKNOWN], UNKNOWN: 0.0}
-    return likeliest_first({**probabilities, **moved})
-
-
 def unbounded_fits(causes: Sequence[GapCause], outcome: GapOutcome) -> list[str]:
     """Say of what is named which effects the fit can give no size, not even tell from nothing at all."""
     named = rivals(causes) if outcome is GapOutcome.CANNOT_SEPARATE else [causes[0].name] if outcome in NAMING else ()
@@ -895,11 +883,6 @@ def _which_undecided(report: GapReport) -> str:
 def _severity(cause: GapCause, severity: Interval) -> str:
     """Write a severity with three digits, without an exponent, and its unit."""
     return f"{float(f'{severity.value:.3g}'):.12g} {severity_unit(cause.unit)}".rstrip()
-
-
-def _titled(report: GapReport, name: str) -> str:
-    cause = {c.name: c for c in report.causes}.get(name)
-    return f"{cause.title} ({odds_text(cause.probability)})" if cause is not None else name.replace("_", " ")
 
 
 def _shrinkage_text(report: GapReport) -> str:

@@ -17,7 +17,7 @@ from gearsig.cache import keep, made_folder, modules_digest, read_arrays
 from gearsig.checks import FloatArray, positive
 from gearsig.errors import GearsigError, RefusalError
 from gearsig.gap._change import change_once
-from gearsig.gap._conditions import SEED, Condition, halves, observed, trial_length_s
+from gearsig.gap._conditions import SEED, Condition, observed, trial_length_s
 from gearsig.gap._evidence import SIGNS, SINGLE_TOOTH_FAULTS, TOOTH_FAULTS, determined_options
 from gearsig.gap._features import once, whole_and_parts
 from gearsig.gap._floors import UNPREDICTED, gap_size, shown_in
@@ -31,7 +31,6 @@ from gearsig.gap._prediction import (
     ObservedChange,
     closed_shares,
     fit_effect,
-    fold_fits,
     paths_of,
     shrinkage,
     transplanted,
@@ -41,8 +40,6 @@ from gearsig.gap._report import ConditionFacts, GapCause, GapPlace, GapStep, Int
 from gearsig.gap._simulator import Added, GapEffect, HasFurtherSettings, OperatingCondition, Twin, as_tried
 from gearsig.gap._waveform import (
     BETWEEN,
-    N_HARMONICS,
-    OFFSETS,
     PROFILE_SCATTER,
     WaveformMatch,
     compare_waveform,
@@ -97,16 +94,14 @@ class Task:
     run: TwinRun
     added: Added | None
     further: tuple[str, ...] = ()
-    by_waveform: bool = False
-    """Whether its sidebands are all that is asked for."""
 
 
 @dataclass(frozen=True)
 class Reduced:
     """One simulation's features, of a healthy one only, and its change against the healthy run.
 
-    `sidebands` are the change's, see `mesh_sidebands`; by waveform there are no others. `alone` has each channel's own
-    change where there are further channels; they have no part in `change`.
+    `sidebands` are the change's, see `mesh_sidebands`. `alone` has each channel's own change where there are further
+    channels; they have no part in `change`.
     """
 
     names: tuple[str, ...]
@@ -184,8 +179,6 @@ def _reduced(task: Task, known: Known) -> Reduced | str:
             now, healthy = now.of_channels(of_the_rig), healthy.of_channels(of_the_rig)
         names, values = once(healthy) if task.added is None else ((), np.empty(0))
         sidebands = mesh_sidebands(now, healthy, is_turned=False)
-        if task.by_waveform:
-            return Reduced((), np.empty(0), (), np.empty(0), sidebands)
         return Reduced(names, values, *change_once(now, healthy), sidebands, alone)
     except GearsigError as error:
         return str(error)
@@ -228,7 +221,7 @@ class Bank:
     added : tuple of Added
         The candidates that could be simulated.
     changes : array, (n_added, n_changes)
-        Each candidate's run against the healthy run; not a number where only its waveform is looked at.
+        Each candidate's run against the healthy run.
     sidebands : complex array, (n_added, n_channels, 2, n_harmonics, n_offsets)
         The same beside the mesh harmonics, see `mesh_sidebands`.
     """
@@ -245,7 +238,6 @@ def banks_of(
     runs: Sequence[TwinRun],
     candidates: Mapping[str, Sequence[Added]],
     *,
-    by_waveform: Mapping[str, Sequence[Added]] | None = None,
     folder: Path | None,
     processes: int = 2,
     fresh: bool = False,
@@ -259,8 +251,6 @@ def banks_of(
         Twin, point, length of what is simulated; the point is rounded to `POINT_DIGITS` digits.
     candidates : mapping
         Effect → its settings that are simulated; each effect has a file of its own.
-    by_waveform : mapping or None
-        Effect → further ones, of which only the waveform is looked at.
     folder : Path or None
         Where they are kept; None: nowhere.
     processes : int
@@ -278,17 +268,14 @@ def banks_of(
         If the healthy machine cannot be simulated or its recording is too short for the features.
     """
     folder = None if folder is None else made_folder(folder, "choose another with --cache")
-    further = by_waveform or {}
     requests: dict[str, tuple[TwinRun, list[Task]]] = {}
     keys = []
     for run in runs:
         positive(run.duration_s, "duration_s", "s")
         at = replace(run, point=rounded(run.point))
-        for name, added in candidates.items():
-            keys.append(bank_key(at, added, further.get(name, ())))
-            tasks = [Task(at, setting) for setting in added]
-            tasks += [Task(at, setting, by_waveform=True) for setting in further.get(name, ())]
-            requests[keys[-1]] = at, tasks
+        for added in candidates.values():
+            keys.append(bank_key(at, added))
+            requests[keys[-1]] = at, [Task(at, setting) for setting in added]
     banks = {key: None if folder is None or fresh else read_bank(_bank_path(folder, key), key) for key in requests}
     missing = {key: requests[key] for key, bank in banks.items() if bank is None}
     healthy = {run.key: run for run, _ in missing.values()}
@@ -304,14 +291,14 @@ def banks_of(
     return [{name: bank for name, bank in zip(candidates, in_order, strict=False) if bank is not None} for _ in runs]
 
 
-def rounded(point: OperatingCondition) -> OperatingCondition:
-    """Return the point at which a bank is made."""
-    return OperatingCondition(*(float(f"{v:.{POINT_DIGITS}g}") for v in (point.speed_rpm, point.torque_nm)))
+def rounded(point: OperatingCondition, n_digits: int = POINT_DIGITS) -> OperatingCondition:
+    """Return the point with so many digits: that at which a bank is made, or one that is easily set."""
+    return OperatingCondition(*(float(f"{value:.{n_digits}g}") for value in (point.speed_rpm, point.torque_nm)))
 
 
-def bank_key(run: TwinRun, candidates: Sequence[Added], by_waveform: Sequence[Added] = ()) -> str:
+def bank_key(run: TwinRun, candidates: Sequence[Added]) -> str:
     """Return all that a bank's numbers depend on, as text."""
-    settings = [[_plain(added) for added in some] for some in (candidates, by_waveform)]
+    settings = [_plain(added) for added in candidates]
     lengths = [run.duration_s, run.sampling_rate_hz]
     known = [run.twin.key, features_digest(), [run.point.speed_rpm, run.point.torque_nm], settings, lengths]
     return json.dumps(known, sort_keys=True)
@@ -325,17 +312,15 @@ def _assembled(candidates: Sequence[Added], healthy: Reduced | str, rows: Sequen
     kept = [
         (added, row)
         for added, row in zip(candidates, rows, strict=True)
-        if isinstance(row, Reduced) and row.change_names in (names, ())
+        if isinstance(row, Reduced) and row.change_names == names
     ]
-    unknown = np.full(len(names), np.nan)
-    changes = np.array([row.change if row.change_names else unknown for _, row in kept]).reshape(len(kept), len(names))
     sidebands = np.array([row.sidebands for _, row in kept], dtype=np.complex128)
     return Bank(
         healthy.names,
         names,
         healthy.values,
         tuple(added for added, _ in kept),
-        changes,
+        np.array([row.change for _, row in kept]).reshape(len(kept), len(names)),
         sidebands.reshape(len(kept), *healthy.sidebands.shape),
     )
 
@@ -370,13 +355,9 @@ def read_bank(path: Path, key: str) -> Bank | None:
             return None
         names, changes = map(tuple, about["names"])
         added = tuple(Added(name, float(severity), options) for name, severity, options in about["added"])
-        bank = Bank(names, changes, data["healthy"], added, data["changes"], data["sidebands"])
+        return Bank(names, changes, data["healthy"], added, data["changes"], data["sidebands"])
     except (ValueError, KeyError, TypeError, IndexError):
         return None
-    shapes = bank.healthy.shape, bank.changes.shape, (len(bank.sidebands), *bank.sidebands.shape[2:])
-    expected = (len(names),), (len(added), len(changes)), (len(added), len(SIDES), N_HARMONICS, len(OFFSETS))
-    types = [array.dtype for array in (bank.healthy, bank.changes, bank.sidebands)]
-    return bank if shapes == expected and types == [np.float64, np.float64, np.complex128] else None
 
 
 def _plain(added: Added) -> list[Any]:
@@ -385,8 +366,6 @@ def _plain(added: Added) -> list[Any]:
 
 PROCESSES = 2
 """In which one diagnosis is made."""
-
-HELD_OUT = "other revolutions of the same recordings"
 
 
 @dataclass(frozen=True)
@@ -464,6 +443,11 @@ def try_effects(
     -------
     dict
         Effect → how it was tried: its fit, its shrinkage on held-out data, and its waveform where that is of one tooth.
+
+    Raises
+    ------
+    RefusalError
+        If the rig has a place for some of the effects, and none of them can be simulated there.
     """
     if not effects:
         return {}
@@ -472,15 +456,15 @@ def try_effects(
     folds = folds_of(conditions)
     where = " and ".join(c.facts.name for c in conditions)
     candidates = {name: worth_simulating(twin.candidates(name), determined[name]) for name in determined}
-    further_settings: dict[str, Sequence[Added]] = {}
-    if isinstance(twin, HasFurtherSettings) and any(condition.reference is not None for condition in conditions):
-        further_settings = {
-            n: [a for a in twin.further_settings(n) if determined[n].items() <= a.options.items()] for n in determined
+    settings = candidates
+    if isinstance(twin, HasFurtherSettings) and any(condition.has_reference for condition in conditions):
+        settings = {
+            n: [*some, *(a for a in twin.further_settings(n) if determined[n].items() <= a.options.items())]
+            for n, some in candidates.items()
         }
     banks = banks_of(
         [trial_run(twin, condition.facts, condition.now) for condition in conditions],
-        candidates,
-        by_waveform=further_settings,
+        settings,
         folder=cache,
         processes=PROCESSES,
         fresh=fresh,
@@ -494,12 +478,17 @@ def try_effects(
         every = _paths([at[name] for at in banks], candidates[name], conditions, effect.shows_in)
         if every:
             paths, excluded = on_shaft(every, determined[name])
-            fits[name] = fold_fits(paths, folds)
-            shrink = shrinkage(paths, folds, HELD_OUT, excluded, fits[name])
+            fits[name] = [fit_effect(paths, fold.fitted) for fold in folds]
+            shrink = shrinkage(paths, folds, excluded, fits[name])
             match = _match([at[name] for at in banks], conditions, effect) if name in TOOTH_FAULTS else None
             tried_effects[name] = TriedEffect(
                 name, paths, fit_effect(paths, observed_changes(conditions)), shrink, match
             )
+    placed = [name for name, some in candidates.items() if some]
+    if placed and not tried_effects:
+        raise RefusalError(
+            f"none of {', '.join(placed)} can be simulated on this rig", remedy="describe the rig more fully"
+        )
     shares = closed_shares(fits, folds)
     return {
         name: replace(tried, shrinkage=replace(tried.shrinkage, of_all=shares.get(name)))
@@ -566,18 +555,13 @@ def _settings(bank: Bank, effect: GapEffect, teeth: Sequence[int]) -> Iterator[t
         simulated = [
             (added, sidebands[:, side])
             for added, sidebands in zip(bank.added, bank.sidebands, strict=True)
-            if _side(added) == side and (not effect.is_on_every_tooth or "tooth" in added.options)
+            if added.options.get("gear") == SIDES[side] and (not effect.is_on_every_tooth or "tooth" in added.options)
         ]
         for added, sidebands in with_profiles_between(simulated, effect, teeth[side]):
             yield added, side, sidebands, 0
         if effect.is_on_every_tooth and simulated:
             first, sidebands = simulated[0]
             yield Added(first.name, first.severity, {"gear": SIDES[side]}), side, sidebands, teeth[side]
-
-
-def _side(added: Added) -> int | None:
-    gear = added.options.get("gear")
-    return SIDES.index(str(gear)) if gear in SIDES else None
 
 
 def on_shaft(
@@ -639,7 +623,7 @@ def _distances(bank: Bank, kept: Sequence[Added], condition: Condition, shows_in
     usual = -floor.from_centre(floor.names, np.zeros(len(floor.names)))
     simulated = dict(zip(names, bank.healthy.tolist(), strict=True))
     base_names, base = whole_and_parts(condition.baseline)
-    if condition.reference is not None:
+    if condition.has_reference:
         compared, baseline = bank.change_names, base[0]
     else:
         compared, baseline = names, condition.learned.credibility * base[0] + usual
@@ -659,8 +643,8 @@ def folds_of(conditions: Sequence[Condition]) -> list[Fold]:
             [observation for observation in whole if observation.condition != k],
             _left_out_changes(condition, k, n),
         )
-        changes = [condition.change_of(part) for part in halves(condition.now)]
-        first, second = (observed(condition, k, n, change) for change in changes)
+        halves = [condition.now.of_blocks(slice(first, None, 2)) for first in (0, 1)]
+        first, second = (observed(condition, k, n, condition.change_of(half)) for half in halves)
         folds += [Fold((*fitted, first), second, again), Fold((*fitted, second), first, again)]
     return folds
 
@@ -672,15 +656,6 @@ def _left_out_changes(condition: Condition, index: int, n: int) -> tuple[tuple[O
         tuple(replace(base, distances=base.distances + row[:n] - values) for row in rows)
         for rows in condition.change.left_out
     )
-
-
-def refuse_where_none_ran(tried: dict[str, TriedEffect], names: Sequence[str], twin: Twin) -> None:
-    """Refuse where the rig has a place for some of the effects, and none of them could be simulated there."""
-    placed = [name for name in names if twin.candidates(name)]
-    if placed and not tried:
-        raise RefusalError(
-            f"none of {', '.join(placed)} can be simulated on this rig", remedy="describe the rig more fully"
-        )
 
 
 # --------------------
@@ -824,15 +799,11 @@ def cause_place(
 def _is_clear(tried: TriedEffect, conditions: Sequence[Condition]) -> bool:
     """Whether the fit is worse on the other shaft by more than chance."""
     observations = observed_changes(conditions)
-    costs = [fit_effect(paths, observations).cost for paths in _by_shaft(tried.paths)]
-    return len(costs) < len(SIDES) or max(costs) - min(costs) > INTERVAL_COST
-
-
-def _by_shaft(paths: Sequence[EffectPath]) -> list[list[EffectPath]]:
-    paths_of_shafts = [
-        [path for path in paths if path.options.get("gear", path.options.get("shaft")) == side] for side in SIDES
+    by_shaft = [
+        [path for path in tried.paths if path.options.get("gear", path.options.get("shaft")) == side] for side in SIDES
     ]
-    return [some for some in paths_of_shafts if some]
+    costs = [fit_effect(paths, observations).cost for paths in by_shaft if paths]
+    return len(costs) < len(SIDES) or max(costs) - min(costs) > INTERVAL_COST
 
 
 def at_its_tooth(added: Added, frame: GearFrame, places: Sequence[GapPlace]) -> Added:

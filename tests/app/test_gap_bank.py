@@ -13,9 +13,10 @@ from gearsig.gap import (
     Added,
     Bank,
     OperatingCondition,
+    TriedEffect,
     TwinRun,
     banks_of,
-    change_once,
+    change_features,
     conditions_of,
     once,
     reduce_recording,
@@ -100,7 +101,7 @@ def test_changes_are_those_of_the_features_against_the_healthy_run() -> None:
         return reduce_recording(run, RIG)
 
     np.testing.assert_array_equal(found.healthy, once(gathered())[1])
-    np.testing.assert_array_equal(found.changes[1], change_once(gathered(STRONG), gathered())[1])
+    np.testing.assert_array_equal(found.changes[1], change_features(gathered(STRONG), gathered()).values)
 
 
 def test_what_cannot_be_simulated_is_left_out() -> None:
@@ -150,7 +151,7 @@ def test_points_that_hardly_differ_share_a_bank() -> None:
     )
 
 
-@pytest.mark.parametrize("damage", ["cut", "text", "empty", "foreign key", "other arrays", "pickle"])
+@pytest.mark.parametrize("damage", ["cut", "text", "empty", "foreign key", "pickle"])
 def test_a_damaged_or_foreign_file_is_made_again(tmp_path: Path, damage: str) -> None:
     first = bank(tmp_path)
     (path,) = tmp_path.iterdir()
@@ -165,8 +166,6 @@ def test_a_damaged_or_foreign_file_is_made_again(tmp_path: Path, damage: str) ->
         path.write_bytes(b"")
     elif damage == "foreign key":
         np.savez(path, **{**arrays, "about": np.array(str(arrays["about"]).replace("sines 1", "sines 9"))})
-    elif damage == "other arrays":
-        np.savez(path, **{**arrays, "healthy": arrays["healthy"][1:]})
     else:
         np.savez(path, **{**arrays, "healthy": np.array([{}], dtype=object)})
     made = []
@@ -209,6 +208,30 @@ def test_a_folder_that_cannot_be_made_is_named_before_the_work(tmp_path: Path) -
         bank(tmp_path / "file" / "folder", on_progress=_never)
 
 
+def tried(effect: str, twin: Sines) -> dict[str, TriedEffect]:
+    today, healthy = (
+        PreparedRecording(
+            Sines().run(POINT, added, seed=5, duration_s=4.0, sampling_rate_hz=FS, noise=noise).with_name(name)
+        )
+        for added, noise, name in (((STRONG,), 1, "today"), ((), 2, "healthy"))
+    )
+    conditions, _ = conditions_of([today], [healthy], twin)
+    known = replace(gap_simulator("cracked").gap_effects()["unbalance"], name=effect)
+    return try_effects([known], twin, conditions, None, lambda _what, _done: None)
+
+
+def test_effects_that_the_rig_has_no_place_for_are_no_reason_to_refuse() -> None:
+    class OnlyImpossible(Sines):
+        point = POINT
+
+        def candidates(self, effect: str) -> Sequence[Added]:
+            return (IMPOSSIBLE,) if effect == "louder" else ()
+
+    assert tried("bearing", OnlyImpossible()) == {}
+    with pytest.raises(RefusalError, match="none of louder can be simulated"):
+        tried("louder", OnlyImpossible())
+
+
 def test_a_trial_differs_from_the_healthy_run_by_its_effect_only() -> None:
     """Another start or noise would be taken for what the effect changes."""
     runs: list[tuple[tuple[Added, ...], int, int, float]] = []
@@ -220,16 +243,7 @@ def test_a_trial_differs_from_the_healthy_run_by_its_effect_only() -> None:
             runs.append((tuple(added), how["seed"], how.get("noise", 0), how["duration_s"]))
             return super().run(point, added, **how)
 
-    today, healthy = (
-        PreparedRecording(
-            Sines().run(POINT, added, seed=5, duration_s=4.0, sampling_rate_hz=FS, noise=noise).with_name(name)
-        )
-        for added, noise, name in (((STRONG,), 1, "today"), ((), 2, "healthy"))
-    )
-    twin = Noted()
-    conditions, _ = conditions_of([today], [healthy], twin)
-    louder = replace(gap_simulator("cracked").gap_effects()["unbalance"], name="louder")
-    assert "louder" in try_effects([louder], twin, conditions, None, lambda _what, _done: None)
+    assert "louder" in tried("louder", Noted())
     with_effect = [run for run in runs if run[0]]
     assert [added for added, *_ in with_effect] == [(WEAK,), (STRONG,), (IMPOSSIBLE,)]
     compared_with = [run[1:] for run in runs if not run[0] and run[2] == 0]

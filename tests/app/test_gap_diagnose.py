@@ -23,7 +23,6 @@ from gearsig.gap import (
     conditions_of,
     diagnose_gap,
     effects_without_place,
-    is_calibrated,
     once,
     reduce_recording,
     with_channels_of,
@@ -98,8 +97,7 @@ def test_the_gap_shrinks_on_held_out_revolutions(report: GapReport) -> None:
     assert after < before
 
 
-def test_it_says_whether_it_is_calibrated_and_keeps_the_twin(report: GapReport, tmp_path: Path) -> None:
-    assert any("not calibrated" in notice for notice in report.notes) or is_calibrated()
+def test_it_keeps_the_twin(report: GapReport, tmp_path: Path) -> None:
     file = tmp_path / "twin.toml"
     file.write_text(report.twin_toml, encoding="utf-8")
     assert [s.name for s in preset("cracked", str(file)).effects] == ["eccentricity"]

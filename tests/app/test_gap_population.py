@@ -23,7 +23,7 @@ from gearsig.gap import (
     NONE,
     UNKNOWN,
     ReducedRecording,
-    change_once,
+    change_features,
     load_learned,
     load_population,
     once,
@@ -177,7 +177,8 @@ def test_machines_get_sidebands_and_shaft_lines_that_last(seed: int) -> None:
     _, after = once(days[0])
     raised = dict(zip(names, after - before, strict=True))
     assert max(raised[f"shaft.{side}.{n}.to_mesh"] for side in ("driver", "driven") for n in (1, 2, 3)) > 6.0
-    change = dict(zip(*change_once(days[1], days[0]), strict=True))
+    between = change_features(days[1], days[0])
+    change = dict(zip(between.names, between.values, strict=True))
     assert abs(change["sideband.driver.1"]) < 1.0
     assert max(change["change.driver.agreement"], change["change.driven.agreement"]) > 7.0
 
@@ -263,7 +264,8 @@ def test_strong_ones_move_their_own_features(name: str, reference: ReducedRecord
     for seed in STRONG:
         now, strength = with_signature(HEALTHY, name, np.random.default_rng(seed))
         assert strength > 0.6
-        change = dict(zip(*change_once(reduce_recording(now, RIG), reference), strict=True))
+        since = change_features(reduce_recording(now, RIG), reference)
+        change = dict(zip(since.names, since.values, strict=True))
         changes.append(max(change[feature] for feature in EXPECTED[name]))
     assert np.median(changes) > 3.0
 

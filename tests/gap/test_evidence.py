@@ -1,4 +1,4 @@
-"""What speaks for an effect: its own features, predicted beside observed."""
+"""What speaks for an effect: its own features, predicted beside observed; and what features are called."""
 
 from __future__ import annotations
 
@@ -13,7 +13,10 @@ from gearsig.gap import (
     ObservedChange,
     evidence_of,
     evidence_of_feature,
+    family_of,
+    feature_words,
     gear_frame,
+    load_learned,
 )
 from tests.gap.synthetic import RIG
 
@@ -67,3 +70,15 @@ def test_small_predictions_speak_for_an_effect_by_their_size_alone() -> None:
     for observed in (-0.5, 5.0):
         one = evidence_of_feature("level", 0.4, observed, 1.0, min_floors=0.3)
         assert (one.speaks_for, one.is_further) == (False, False)
+
+
+# --------------------
+# Features in words.
+# --------------------
+
+
+def test_every_feature_has_words_of_its_own_and_a_family() -> None:
+    names = load_learned().change_names
+    words = [feature_words(name, gear_frame(RIG)) for name in names]
+    assert len(set(words)) == len(names)
+    assert all(family_of(name) for name in names)

@@ -1,4 +1,6 @@
-"""Features against signals of which they are known."""
+"""Features against signals of which they are known, and the averages and speeds that they are made of."""
+
+from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -6,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gearsig.angle import AngleSignal, ShaftAngle
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
 from gearsig.gap import (
@@ -16,7 +19,9 @@ from gearsig.gap import (
     gear_frame,
     mains_lines,
     reduce_recording,
+    speed_figures,
 )
+from gearsig.orders import average_lines, separate_shafts
 from gearsig.recording import Channel, Recording
 from tests.gap.synthetic import MESH_AMPLITUDES, RATE_HZ, RIG, SPEED_HZ, TEETH, record, ringing
 
@@ -184,3 +189,88 @@ def test_a_mesh_above_what_is_sampled_is_refused() -> None:
     with pytest.raises(RefusalError, match=r"mesh at 545\.1 Hz, above what 1066\.67 Hz"):
         reduce_recording(slow, RIG)
     reduce_recording(replace(whole, samples=whole.samples[:, ::6], sampling_rate_hz=RATE_HZ / 6), RIG)
+
+
+# --------------------
+# What the speed does besides standing still: hunting counts, other shafts' orders seen once a revolution do not.
+# --------------------
+
+
+TURNS_HZ, RATIO = 25.0, 29 / 47
+
+
+def figures(hunting: float, wheel: float, ratio: float = RATIO) -> dict[str, float]:
+    """Of six seconds of an angle that swings by shares of the speed: at 0.7 Hz, and with the wheel's revolutions."""
+    time = np.arange(0.0, 6.0, 1e-4)
+    swing = hunting / (2 * np.pi * 0.7) * np.sin(2 * np.pi * 0.7 * time)
+    swing += wheel / (2 * np.pi * ratio * TURNS_HZ) * np.sin(2 * np.pi * ratio * TURNS_HZ * time)
+    turns = TURNS_HZ * (time + swing)
+    whole = np.arange(np.floor(turns[-1]))
+    at = np.interp(whole, turns, time)
+    angle = ShaftAngle("input", at, whole, np.gradient(whole, at), "pulses")
+    return speed_figures(angle, (ratio,))._asdict()
+
+
+def test_hunting_is_seen() -> None:
+    found = figures(1e-3, 0.0)
+    assert found["swing"] == pytest.approx(1e-3 / np.sqrt(2), rel=0.05)
+    assert found["swing_frequency_hz"] == pytest.approx(0.7, abs=0.05)
+
+
+def test_a_swing_that_no_run_out_makes_stays_where_its_alias_is_another_shafts_order() -> None:
+    found = figures(0.0, 0.02)
+    assert found["swing"] > 2e-3
+    assert found["swing_frequency_hz"] == pytest.approx((1.0 - RATIO) * TURNS_HZ, abs=0.1)
+
+
+@pytest.mark.parametrize("ratio", [RATIO, 0.5, 46 / 23, 1.7])
+def test_what_another_shaft_does_every_revolution_is_no_hunting(ratio: float) -> None:
+    assert figures(0.0, 1e-3, ratio)["swing"] < 1e-5
+    both = figures(1e-3, 1e-3, ratio)
+    assert both["swing"] == pytest.approx(1e-3 / np.sqrt(2), rel=0.05)
+    assert both["swing_frequency_hz"] == pytest.approx(0.7, abs=0.05)
+
+
+# --------------------
+# Averages of both shafts at once: each keeps what is its own, and nothing of the other's.
+# --------------------
+
+
+FRAME = gear_frame(RIG)
+N_REVOLUTIONS, N_ANGLES = 40, 256
+
+
+def over(shaft: str, n_samples: int, wave: np.ndarray) -> AngleSignal:
+    turns = n_samples / N_ANGLES
+    steady = np.array([0.0, 1.0]), np.array([0.0, turns]), np.full(2, turns)
+    return AngleSignal(wave[None], N_ANGLES, ShaftAngle(shaft, *steady, "given"), 0.0, ("v",), ("m/s^2",), 100.0)
+
+
+def signals(driver_order: int, driven_order: int) -> tuple[AngleSignal, AngleSignal]:
+    """A line of each shaft, sampled over the angle of either."""
+    ratio = FRAME.shaft_orders[1]
+    found = []
+    for own in FRAME.shaft_orders:
+        n = int(N_REVOLUTIONS * own) * N_ANGLES
+        driver_turns = np.arange(n) / N_ANGLES / own
+        wave = np.cos(2 * np.pi * driver_order * driver_turns) + np.cos(2 * np.pi * driven_order * ratio * driver_turns)
+        found.append(over(FRAME.shafts[len(found)], n, wave))
+    return found[0], found[1]
+
+
+def test_neighbouring_orders_of_two_shafts_are_told_apart() -> None:
+    # 8 turns of the driver are nearly 13 of the driven gear: their difference is not resolved in few revolutions.
+    separated = separate_shafts(signals(8, 13), TEETH)
+    driver, driven = (np.abs(average_lines(signal).whole[0]) for signal in separated.signals)
+    assert driver[8] == pytest.approx(1.0, abs=0.02)
+    assert driven[13] == pytest.approx(1.0, abs=0.02)
+    assert np.delete(driver, 8).max() < 0.02
+    assert np.delete(driven, 13).max() < 0.02
+    assert np.abs(separated.residual.samples).max() < 0.1
+
+
+def test_the_mesh_stays_in_both_averages() -> None:
+    gathered = reduce_recording(record(), RIG)
+    sums = gathered.channels[next(iter(gathered.channels))]
+    first = [abs(lines.mean(axis=0)[z]) for lines, z in zip(sums.lines, TEETH, strict=True)]
+    assert first[0] == pytest.approx(first[1], rel=0.02)

@@ -1,4 +1,6 @@
-"""The size of a gap: what one number must do with a hundred."""
+"""The size of a gap: what one number must do with a hundred; and how far a simulation is believed."""
+
+from __future__ import annotations
 
 import numpy as np
 import pytest
@@ -7,15 +9,19 @@ from hypothesis import strategies as st
 
 from gearsig.errors import InputError
 from gearsig.gap import (
+    NONE,
     Features,
     PlaceKind,
     StructuralFloor,
+    credibility_of,
     family_members,
     family_of,
     family_size,
     gap_size,
     independent_whole,
+    load_population,
     pooled_scatter,
+    population_file,
     soft_size,
 )
 
@@ -124,3 +130,34 @@ def test_an_unknown_feature_is_an_error() -> None:
         StructuralFloor(("a", "a"), np.ones(2))
     with pytest.raises(InputError, match="2 numbers for 1"):
         StructuralFloor(("a",), np.ones(2))
+
+
+# --------------------
+# How much of what a simulation says of a feature is subtracted.
+# --------------------
+
+
+def test_what_a_simulation_knows_is_subtracted_and_what_it_guesses_is_not() -> None:
+    rng = np.random.default_rng(0)
+    truth, guess = rng.standard_normal((2, 4000))
+    simulated = np.column_stack([truth, guess, truth + guess, -truth])
+    features = np.column_stack([truth + 7.0, truth, truth, truth])
+    assert credibility_of(features, simulated) == pytest.approx([1.0, 0.0, 0.5, 0.0], abs=0.05)
+
+
+def test_a_figure_that_no_simulation_changes_is_not_divided_by() -> None:
+    features = np.random.default_rng(1).standard_normal((50, 2))
+    assert credibility_of(features, np.ones((50, 2))) == pytest.approx([0.0, 0.0])
+
+
+KEPT = population_file()
+
+
+@pytest.mark.skipif(not KEPT.exists(), reason="the population is made by hours of simulation")
+def test_healthy_machines_scatter_less_about_what_is_credible_than_about_all_or_nothing_of_it() -> None:
+    population = load_population(KEPT)
+    healthy = population.causes == NONE
+    own, simulated = population.features[healthy], population.simulated[healthy]
+    left = population.gaps[healthy].std(axis=0)
+    assert np.all(left <= np.minimum(own.std(axis=0), (own - simulated).std(axis=0)) + 1e-9)
+    assert np.median(left / (own - simulated).std(axis=0)) < 0.95

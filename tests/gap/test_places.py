@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,18 +12,19 @@ from gearsig.checks import FloatArray
 from gearsig.gap import (
     DRIVEN,
     DRIVER,
-    ComparedPair,
+    Condition,
+    ConditionFacts,
+    Features,
     GapPlace,
+    OperatingCondition,
     PlaceKind,
     ReducedRecording,
     StructuralFloor,
     beyond_the_mesh,
     change_features,
-    compared_pair,
     difference_features,
     gap_places,
     locate_all_round,
-    locate_mesh,
     reduce_recording,
     without_multiples,
     without_silent_races,
@@ -33,6 +35,7 @@ from tests.gap.synthetic import RIG, SPEED_HZ, TEETH, record, ringing
 Added = Callable[[FloatArray, FloatArray], FloatArray]
 RATIO = TEETH[0] / TEETH[1]
 OUTER = 9 / 2 * (1 - 7.94 / 39.04)
+FACTS = ConditionFacts("now", OperatingCondition(60.0 * SPEED_HZ, 50.0), 100.0, 4.0, 20480.0)
 
 
 @cache
@@ -50,10 +53,16 @@ def floor(is_reference: bool) -> StructuralFloor:
     return StructuralFloor(changes[0].names, np.maximum(3.0 * np.abs(values - centres).max(axis=0), 2.0), centres)
 
 
+def condition_of(now: ReducedRecording, *, is_reference: bool = True) -> Condition:
+    """Return a recording beside a healthy one, which stands for the simulation as well."""
+    floors = {flag: SimpleNamespace(floor=floor(flag)) for flag in (is_reference,)}
+    learned = SimpleNamespace(credibility=1.0, recognisers=floors)
+    return Condition(FACTS, now, healthy(), healthy() if is_reference else None, learned)
+
+
 def places_of(added: Added | None = None, *, is_reference: bool = True, **settings: float) -> tuple[GapPlace, ...]:
     now = reduce_recording(record(added, seed=1, **settings), RIG)
-    change = (change_features if is_reference else difference_features)(now, healthy())
-    return gap_places(now, healthy(), floor(is_reference), change, is_reference=is_reference)
+    return gap_places(condition_of(now, is_reference=is_reference))
 
 
 def tone(order: float, amplitude: float) -> Added:
@@ -64,12 +73,10 @@ def tone(order: float, amplitude: float) -> Added:
 def test_only_a_race_with_lines_of_its_own_is_not_counted_against() -> None:
     """A tooth strikes once a turn, a ball at the race's order: both make the envelope's features of bearings rise."""
 
-    def compared(order: float, level: float) -> ComparedPair:
-        now = reduce_recording(record(lambda _, r: level * ringing(order * r), seed=1), RIG)
-        change = change_features(now, healthy())
-        return compared_pair(now, healthy(), floor(True), change, is_reference=True)
+    def struck(order: float, level: float) -> Condition:
+        return condition_of(reduce_recording(record(lambda _, r: level * ringing(order * r), seed=1), RIG))
 
-    rolling, striking = compared(OUTER, 2.0), compared(1.0, 4.0)
+    rolling, striking = struck(OUTER, 2.0), struck(1.0, 4.0)
     found = {"bearing_outer_race": 0.5, "root_crack": 0.3, "none": 0.2}
     assert without_silent_races(found, [rolling]) == without_silent_races(found, [striking, rolling]) == found
     assert without_silent_races(found, [striking])["bearing_outer_race"] == pytest.approx(0.1 / 0.6)
@@ -79,9 +86,8 @@ def test_only_a_race_with_lines_of_its_own_is_not_counted_against() -> None:
 @pytest.mark.parametrize(("multiples", "expected"), [((1.0,), 0.5), ((1.0, 3.0), 0.1 / 0.6)])
 def test_a_force_that_turns_makes_no_multiples(multiples: tuple[float, ...], expected: float) -> None:
     now = reduce_recording(record(lambda _, r: sum(2.0 * np.cos(2 * np.pi * k * r) for k in multiples), seed=1), RIG)
-    compared = compared_pair(now, healthy(), floor(True), change_features(now, healthy()), is_reference=True)
     found, known = {"unbalance": 0.5, "misalignment": 0.3, "unknown": 0.2}, {"unbalance", "misalignment"}
-    lowered = without_multiples(found, {name: as_gap_effect(effect(name)) for name in known}, [compared])
+    lowered = without_multiples(found, {name: as_gap_effect(effect(name)) for name in known}, [condition_of(now)])
     assert lowered["unbalance"] == pytest.approx(expected)
 
 
@@ -221,18 +227,20 @@ def test_few_lines_of_noise_pass_for_a_shafts_own() -> None:
 
 
 def test_clipping_is_told_from_a_stray_peak() -> None:
-    from gearsig.gap import ComparedPair, locate_tail
-
     recording = record(seed=1)
     clipped = reduce_recording(replace(recording, samples=np.clip(recording.samples, -4.0, 4.0)), RIG)
     figures = {"raw.near_the_extreme": 20.0, "raw.kurtosis": -1.0}
-    assert "as clipping makes them" in locate_tail(ComparedPair(clipped, healthy(), True, figures, figures)).title
-    assert "clipping" not in locate_tail(ComparedPair(healthy(), clipped, True, figures, figures)).title
+    assert "as clipping makes them" in gap_places(compared(figures, clipped))[0].title
+    assert "clipping" not in gap_places(compared(figures))[0].title
 
 
-def compared(change_db: dict[str, float]) -> ComparedPair:
+def compared(change_db: dict[str, float], now: ReducedRecording | None = None) -> Condition:
     """Return two records that differ by noise, with features that are said to have changed; floors of 1 dB."""
-    return ComparedPair(healthy(1), healthy(), True, change_db, change_db)
+    condition = condition_of(now or healthy(1))
+    names, values = tuple(change_db), np.array([*change_db.values()])
+    vars(condition)["change"] = Features(names, values, np.zeros(len(values)))
+    vars(condition)["floor"] = StructuralFloor(names, np.ones(len(values)))
+    return condition
 
 
 def test_the_figure_of_a_place_is_the_one_that_was_scored() -> None:
@@ -250,10 +258,8 @@ def test_the_figure_of_a_place_is_the_one_that_was_scored() -> None:
 
 
 def test_mesh_lines_that_hardly_moved_give_way_to_what_was_scored() -> None:
-    spot = locate_mesh(compared({"mesh.total": 0.2, "mesh.share.2": -4.0, "line.half_mesh": 0.0}))
-    assert spot is not None
+    (spot,) = gap_places(compared({"mesh.total": 0.2, "mesh.share.2": -4.0, "line.half_mesh": 0.0}))
     assert (spot.title, spot.change_db) == ("mesh harmonic 2 over all, down by 4 dB", -4.0)
     assert spot.orders == (2.0 * TEETH[0],)
-    spread = locate_mesh(compared({"mesh.total": 0.2, "alike.mesh.spread": 3.0, "line.half_mesh": 0.0}))
-    assert spread is not None
+    (spread,) = gap_places(compared({"mesh.total": 0.2, "alike.mesh.spread": 3.0, "line.half_mesh": 0.0}))
     assert spread.title == "what lies beside the mesh harmonics, which themselves hardly moved"

@@ -1,4 +1,4 @@
-"""What is learned of a population: a small one here, and of the one that was made, where it is kept."""
+"""What is learned of a population, a small one here and the one that was made; and the textbook's rules."""
 
 from __future__ import annotations
 
@@ -17,16 +17,20 @@ from gearsig.gap import (
     Features,
     Learned,
     Population,
+    contrast_rows,
     even_weights,
     learn,
     load_learned,
     load_population,
+    mirrored,
     population_file,
     read_learned,
+    textbook_rules,
+    textbook_strengths,
     without_machines_of,
     write_learned,
 )
-from sims.effects import effects
+from sims.effects import as_gap_effect, effects
 
 SHIFTS = {"tooth_wear": {"mesh.total": 9.0}, "mains_hum": {"hum": 12.0}, UNKNOWN: {"line.strange": 12.0}, NONE: {}}
 KEPT = population_file()
@@ -156,3 +160,74 @@ def test_machines_can_be_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
         rest = load_population()
     assert set(population.simulators) - set(rest.simulators) == {INDEPENDENT}
     assert load_population() is population
+
+
+# --------------------
+# What the forest sees: bounded shares, differences of the right sign, and shafts that can be exchanged.
+# --------------------
+
+
+NAMES = load_learned().change_names
+FEATURES = load_learned().feature_names
+
+
+@pytest.mark.parametrize("names", [NAMES, FEATURES])
+def test_exchanging_the_shafts_twice_changes_nothing(names: tuple[str, ...]) -> None:
+    exchanged = mirrored(names)
+    np.testing.assert_array_equal(exchanged[exchanged], np.arange(len(names)))
+    assert names[exchanged[names.index("sideband.driver.1")]] == "sideband.driven.1"
+    assert names[exchanged[names.index("mesh.total")]] == "mesh.total"
+
+
+@pytest.mark.parametrize("names", [NAMES, FEATURES])
+def test_shares_do_not_depend_on_the_size_of_the_whole_change_much(names: tuple[str, ...]) -> None:
+    n = len(names)
+    rows = np.zeros((2, n))
+    rows[:, names.index("sideband.driver.1")] = 10.0, 40.0
+    rows[:, names.index("shaft.driver.1")] = -5.0, -20.0
+    seen = contrast_rows(names, rows)
+    shares = seen[:, n : 2 * n]
+    assert np.abs(shares).max() == 1.0
+    assert shares[0] == pytest.approx(shares[1], abs=0.1)
+
+
+def test_what_did_not_change_is_zero() -> None:
+    assert not contrast_rows(NAMES, np.zeros((1, len(NAMES)))).any()
+
+
+# --------------------
+# The textbook's rules.
+# --------------------
+
+
+RULES = textbook_rules(map(as_gap_effect, effects().values()))
+
+
+def test_every_effect_has_a_rule_of_features_that_there_are() -> None:
+    assert {cause for cause, _ in RULES} >= set(effects())
+    names = load_learned().feature_names
+    for _, signs in RULES:
+        for name, _ in signs:
+            assert name.format(side="driven") in names
+
+
+@pytest.mark.parametrize("side", ["driver", "driven"])
+def test_either_shaft_speaks_for_its_effect(side: str) -> None:
+    said = textbook_strengths(
+        RULES, {f"shaft.{side}.2": 4.0, f"sideband.{side}.2": 6.0} | dict.fromkeys(_others(side), 0.0)
+    )
+    assert said["misalignment"] == pytest.approx(5.0)
+    assert max(said, key=said.__getitem__) == "misalignment"
+    assert NONE not in said
+
+
+def _others(side: str) -> list[str]:
+    """All features of the table but those of a misaligned shaft."""
+    known = {name.format(side=s) for _, signs in RULES for name, _ in signs for s in ("driver", "driven")}
+    return sorted(known - {f"shaft.{side}.2", f"sideband.{side}.2"})
+
+
+def test_one_sign_alone_does_not_carry_a_rule() -> None:
+    names = {name.format(side=s) for _, signs in RULES for name, _ in signs for s in ("driver", "driven")}
+    said = textbook_strengths(RULES, dict.fromkeys(names, 0.0) | {"mesh.total": 50.0})
+    assert said["tooth_wear"] == pytest.approx(8.0 / 3.0)

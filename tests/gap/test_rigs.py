@@ -1,14 +1,15 @@
-"""What is diagnosed of a machine: one pair of several, and gears of which only the teeth are known."""
+"""What is diagnosed of a machine: one pair of several, gears of which only the teeth are known, and their load."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from math import cos, isnan, radians
 
 import numpy as np
 import pytest
 
 from gearsig.errors import InputError, RefusalError
-from gearsig.gap import background_orders, once, reduce_recording, twin_rig, with_stage
+from gearsig.gap import gear_frame, once, reduce_recording, tooth_load_n_per_mm, twin_rig, with_stage
 from gearsig.rig import Bearing, GearPair, OperatingPoint, Rig, Shaft
 from sims.registry import gap_simulator
 from tests.gap.synthetic import RIG, TEETH, record
@@ -68,8 +69,8 @@ def test_teeth_alone_are_enough_and_a_stated_torque_says_how_large_the_gears_are
 def test_lines_of_the_other_pair_are_background() -> None:
     train = with_stage(TRAIN, "stage")
     mesh = 19 * TEETH[0] / TEETH[1]
-    lines = background_orders(train)
-    assert background_orders(RIG) == ()
+    lines = gear_frame(train).background
+    assert gear_frame(RIG).background == ()
     slow = mesh / 61
     for order in (mesh, 3 * mesh, mesh + 2 * slow, mesh - TEETH[0] / TEETH[1], slow):
         assert min(abs(order - line) for line in lines) < 1e-6
@@ -88,3 +89,21 @@ def test_lines_of_the_other_pair_are_background() -> None:
     assert {"line.strange", "tooth.driven.level"} <= set(changed)
     for name in [name for name in changed if not name.startswith("sideband.driven")]:  # 38 on the shaft of 37 teeth
         assert abs(as_stage[name] - quiet[name]) < 2.0 + 0.1 * abs(as_one[name] - quiet[name]), name
+
+
+# --------------------
+# The load of the teeth: force over width, unknown where the rig does not say.
+# --------------------
+
+
+PAIR = GearPair("stage", "in", "out", 50, 50, 3.0, 20.0, 20.0)
+
+
+def test_force_on_the_base_circle_over_the_face_width() -> None:
+    assert tooth_load_n_per_mm(PAIR, 340.0) == pytest.approx(340.0 / (0.075 * cos(radians(20.0))) / 20.0)
+    assert tooth_load_n_per_mm(PAIR, -340.0) == tooth_load_n_per_mm(PAIR, 340.0)
+
+
+@pytest.mark.parametrize("missing", ["driver_teeth", "module_mm", "face_width_mm"])
+def test_what_the_rig_does_not_say_is_not_guessed(missing: str) -> None:
+    assert isnan(tooth_load_n_per_mm(replace(PAIR, **{missing: None}), 340.0))

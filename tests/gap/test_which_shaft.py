@@ -1,4 +1,4 @@
-"""On which shaft a cause sits: simulated on either one, by hand, and where it cannot be told."""
+"""On which shaft a cause sits: simulated on either one, by hand, and where it cannot be told; and at which tooth."""
 
 from __future__ import annotations
 
@@ -14,19 +14,21 @@ from gearsig.gap import (
     SIDES,
     SIGNS,
     Added,
+    BearingFrame,
+    Condition,
+    ConditionFacts,
     GapPlace,
+    GearFrame,
     OperatingCondition,
     PlaceKind,
     ReducedRecording,
-    ShaftSigns,
+    at_its_tooth,
     cause_place,
-    change_features,
     determined_options,
     gear_frame,
     load_learned,
-    over_floors,
+    place_of,
     reduce_recording,
-    shaft_signs,
 )
 from gearsig.rig import GearPair, OperatingPoint, Rig, Shaft
 from sims.registry import gap_simulator
@@ -55,14 +57,17 @@ def test_signs_that_rose_on_one_shaft_put_it_there(cause: str, side: str) -> Non
 
 
 def test_what_no_shaft_has_to_itself_cannot_be_told() -> None:
-    assert shaft_signs("tooth_wear", [{}], TEETH) is None
+    assert determined_options("tooth_wear", [on_both("unbalance")], TEETH) == {}
     assert determined_options("backlash", [{}], TEETH) == {}
 
 
 @given(st.floats(0.0, 20.0), st.floats(0.0, 20.0))
 def test_exchanged_shafts_exchange_the_answer(one: float, other: float) -> None:
-    side, turned = ShaftSigns((one, other)).side, ShaftSigns((other, one)).side
-    assert (side is None and turned is None) or side == 1 - (turned or 0)
+    def put_on(*rises: float) -> str:
+        change = {sign.format(side): by for side, by in zip(SIDES, rises, strict=True) for sign in SIGNS["unbalance"]}
+        return determined_options("unbalance", [change], TEETH).get("gear", "")
+
+    assert {put_on(one, other), put_on(other, one)} in ({""}, set(SIDES))
 
 
 def test_signs_on_both_shafts_cannot_be_told_but_for_an_order_that_one_shaft_cannot_have() -> None:
@@ -120,8 +125,8 @@ def healthy(point: OperatingCondition) -> ReducedRecording:
 
 
 def simulated(*added: Added, point: OperatingCondition = POINT) -> dict[str, float]:
-    floor = load_learned().floor(with_reference=True)
-    return over_floors(change_features(run(*added, noise=2, point=point), healthy(point)), floor, is_reference=True)
+    now, reference = run(*added, noise=2, point=point), healthy(point)
+    return Condition(ConditionFacts("now", point, 0.0, 0.0, 0.0), now, reference, reference, load_learned()).over_floors
 
 
 @pytest.mark.slow
@@ -151,3 +156,51 @@ def test_what_shows_at_speed_or_load_only_is_put_on_its_shaft_there(
 def test_a_healthy_machine_has_no_signs_on_either_shaft() -> None:
     again = simulated()
     assert all(determined_options(cause, [again], (29, 47)) == {} for cause in SIGNS)
+
+
+# --------------------
+# Where a fitted effect sits, in words, and which tooth its simulation gets.
+# --------------------
+
+
+FRAME = GearFrame(GearPair("stage 1", "input", "output", 29, 47), ("input", "output"), (29, 47), ())
+CRACK = Added("root_crack", 2.0, {"gear": "driver", "tooth": 1.0})
+
+
+def tooth_place(tooth: int | None, shaft: str = "input") -> GapPlace:
+    return GapPlace(PlaceKind.TOOTH, "a burst", 20.0, 9.0, 5.0, 0.9, shaft=shaft, angle_deg=87.0, tooth=tooth)
+
+
+def test_the_tooth_is_the_recordings() -> None:
+    assert place_of(CRACK, FRAME, [tooth_place(8)]) == "tooth 8 of the gear on the input shaft"
+    assert at_its_tooth(CRACK, FRAME, [tooth_place(8)]).options == {"gear": "driver", "tooth": 8.0}
+
+
+def test_without_a_mark_there_is_an_angle_and_the_simulated_tooth_stays() -> None:
+    assert place_of(CRACK, FRAME, [tooth_place(None)]) == "87° of the input shaft"
+    assert at_its_tooth(CRACK, FRAME, [tooth_place(None)]) == CRACK
+
+
+def test_a_burst_on_the_other_shaft_says_nothing() -> None:
+    assert place_of(CRACK, FRAME, [tooth_place(8, "output")]) == "one tooth of the gear on the input shaft"
+    assert at_its_tooth(CRACK, FRAME, [tooth_place(8, "output")]) == CRACK
+
+
+def test_bearings_of_one_type_on_a_shaft_cannot_be_told_apart() -> None:
+    alike = [BearingFrame(name, 0, 3.5, 5.5, 2.3, 0.4) for name in ("near", "far")]
+    frame = replace(FRAME, bearings=(*alike, BearingFrame("wheel", 1, 2.2, 3.4, 1.4, 0.25)))
+    race = Added("bearing_outer_race", 0.3, {"bearing": "near"})
+    assert place_of(race, frame, ()) == "near or far"
+    seen = GapPlace(PlaceKind.ENVELOPE, "envelope lines", 20.0, 9.0, 5.0, 0.9, orders=(2.203,))
+    assert place_of(race, frame, [seen]) == "wheel"
+    assert place_of(race, frame, [replace(seen, orders=(7.7,))]) == "near or far"
+    assert place_of(replace(race, options={"bearing": "of unknown size"}), frame, ()) == "of unknown size"
+
+
+def test_other_places() -> None:
+    assert place_of(Added("eccentricity", 30.0, {"gear": "driven"}), FRAME, ()) == "the gear on the output shaft"
+    assert place_of(Added("misalignment", 1.0, {"shaft": "driven"}), FRAME, ()) == "the output shaft"
+    assert place_of(Added("bearing_clearance", 9.0, {"bearing": "NDE"}), FRAME, ()) == "NDE"
+    assert place_of(Added("torque_ripple", 5.0, {"order": 6.0}), FRAME, ()) == "order 6"
+    assert place_of(Added("backlash", 100.0), FRAME, ()) == ""
+    assert at_its_tooth(Added("backlash", 100.0), FRAME, [tooth_place(3)]) == Added("backlash", 100.0)

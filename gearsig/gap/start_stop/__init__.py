@@ -16,8 +16,6 @@ from gearsig.gap.start_stop._attribution import (
 )
 from gearsig.gap.start_stop._comparison import (
     TRIED,
-    DriveComparison,
-    SimulatedDrive,
     compare_drive,
     predict,
     read_cycles,
@@ -25,7 +23,6 @@ from gearsig.gap.start_stop._comparison import (
 from gearsig.gap.start_stop._cycles import (
     NAMES,
     PHASES,
-    CycleFeatures,
     LocatedDriveChange,
     PreparedCycles,
     change_of,
@@ -35,7 +32,6 @@ from gearsig.gap.start_stop._cycles import (
     spot_of,
     thin,
 )
-from gearsig.gap.start_stop._diagnose import DriveDiagnosis, diagnose_start_stop, drive_report
 
 __all__ = [
     "FLOORS_FILE",
@@ -43,23 +39,17 @@ __all__ = [
     "NAMES",
     "PHASES",
     "TRIED",
-    "CycleFeatures",
-    "DriveComparison",
-    "DriveDiagnosis",
     "DriveEvidence",
     "DriveFloor",
     "FittedDriveCause",
     "LocatedDriveChange",
     "PredictedCause",
     "PreparedCycles",
-    "SimulatedDrive",
     "affected_features",
     "attribute_drive",
     "change_of",
     "compare_drive",
     "cut_cycles",
-    "diagnose_start_stop",
-    "drive_report",
     "evidences",
     "fit",
     "load_floors",

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from gearsig.checks import FloatArray
 from gearsig.gap._attribution import Attribution, GapCalibration, calibration_values
 from gearsig.gap._evidence import CRACK
+from gearsig.gap._features import jackknife_variance
 from gearsig.gap._floors import FLOOR_IN_DEVIATIONS
 from gearsig.gap._report import NONE, UNKNOWN, Interval, Shrinkage, shares_of
 from gearsig.gap.start_stop._cycles import FEATURES, NAMES
@@ -92,8 +93,8 @@ class DriveFloor:
             Each of the changes without each of its cycles.
         """
         value = float(np.mean([self.size(change) for change in changes]))
-        variances = [_jackknife_variance([self.size(row) for row in rows]) for rows in left_out]
-        return Interval.around(value, NORMAL_90 * float(np.sqrt(sum(variances))) / len(changes), low=0.0)
+        variance = sum(float(jackknife_variance(np.array([self.size(row) for row in rows]))) for rows in left_out)
+        return Interval.around(value, NORMAL_90 * variance**0.5 / len(changes), low=0.0)
 
     def log_density(self, change: FloatArray, predicted: FloatArray, widen: FloatArray | float = 0.0) -> FloatArray:
         """Return the logarithm of Student's density of each change around centre + predicted, (n,); 0 where unknown.
@@ -390,7 +391,7 @@ def _shrinkage(name: str, folds: Sequence[tuple[Mapping[str, PredictedCause], Dr
         features = affected_features(guess, fold.scored, floor)
         values.append(shrink(fold.scored, guess, floor, features))
         rows = np.array([shrink(row, guess, floor, features)[:3] for row in fold.again])
-        variances.append([_jackknife_variance(column, of_one_block=0.25) for column in rows.T])
+        variances.append(jackknife_variance(rows) if len(rows) > 1 else np.full(3, 0.25))
         placebos.append(
             max((shrink(row, guess, floor, features)[2] for row in fold.elsewhere.get(name, ())), default=0.0)
         )
@@ -410,8 +411,3 @@ def _shrinkage(name: str, folds: Sequence[tuple[Mapping[str, PredictedCause], Dr
 def _mean_of_known(values: Sequence[float]) -> float:
     known = [value for value in values if np.isfinite(value)]
     return float(np.mean(known)) if known else float("nan")
-
-
-def _jackknife_variance(values: Sequence[float] | FloatArray, of_one_block: float = 0.0) -> float:
-    """Return the variance of what leaving out each block tells; `of_one_block` where there is one block only."""
-    return (len(values) - 1.0) * float(np.var(values)) if len(values) > 1 else of_one_block

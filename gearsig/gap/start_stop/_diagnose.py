@@ -16,14 +16,13 @@ whatever the valve and the brake do, so that a simulated drive need not repeat t
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from gearsig.checks import FloatArray
 from gearsig.errors import GearsigError, RefusalError
 from gearsig.formatting import readable
-from gearsig.gap._attribution import Attribution, is_calibrated
 from gearsig.gap._conditions import Stage
 from gearsig.gap._evidence import CRACK, MIN_SIGN_FLOORS, evidence_of_feature
 from gearsig.gap._features import jackknife_variance
@@ -50,7 +49,6 @@ from gearsig.gap._report import (
 )
 from gearsig.gap._simulator import Added, DriveSimulator, GapEffect, OperatingCondition
 from gearsig.gap.start_stop._attribution import (
-    FLOORS_FILE,
     RIPPLE,
     DriveEvidence,
     FittedDriveCause,
@@ -73,40 +71,13 @@ from gearsig.motion import is_start_stop, measure_motion, motion_segments
 from gearsig.recording import Recording
 
 
-@dataclass(frozen=True)
-class DriveDiagnosis:
-    """Everything that a report is made of.
-
-    Parameters
-    ----------
-    rig, simulator : str
-    effects : mapping
-        Those of the simulator.
-    compared : tuple of DriveComparison
-    evidence : tuple of DriveEvidence
-        Of each.
-    attribution : Attribution
-    outcome : GapOutcome
-    references : tuple of str
-    """
-
-    rig: str
-    simulator: str
-    effects: Mapping[str, GapEffect]
-    compared: tuple[DriveComparison, ...]
-    evidence: tuple[DriveEvidence, ...]
-    attribution: Attribution[FittedDriveCause]
-    outcome: GapOutcome
-    references: tuple[str, ...] = ()
-
-
 def diagnose_start_stop(
     recordings: Sequence[Recording],
     references: Sequence[Recording],
     simulator: DriveSimulator,
     effects: Mapping[str, GapEffect],
-    tell: Stage = lambda *_: None,
-) -> DriveDiagnosis:
+    tell: Stage,
+) -> GapReport:
     """Diagnose the gap between start–stop recordings of one machine and its simulated drive; see `diagnose_gap`.
 
     Parameters
@@ -121,8 +92,8 @@ def diagnose_start_stop(
 
     Returns
     -------
-    DriveDiagnosis
-        `drive_report` makes the report of it.
+    GapReport
+        Places, curves and steps are of the recording that differs most.
 
     Raises
     ------
@@ -131,41 +102,32 @@ def diagnose_start_stop(
     """
     tell("reading the motion", 0.02)
     healthy = [read_cycles(reference) for reference in references]
-    compared = tuple(compare_drive(read_cycles(now), healthy, simulator, now.name) for now in recordings)
-    evidence = []
-    for i, comparison in enumerate(compared):
+    every = [compare_drive(read_cycles(now), healthy, simulator, now.name) for now in recordings]
+    evidences = []
+    for i, comparison in enumerate(every):
 
         def simulating(name: str, done: float, i: int = i) -> None:
-            tell(f"simulating {name.replace('_', ' ')}", 0.1 + 0.7 * (i + done) / len(compared))
+            tell(f"simulating {name.replace('_', ' ')}", 0.1 + 0.7 * (i + done) / len(every))
 
-        evidence.append(comparison.evidence(predict(comparison, effects, simulating)))
+        evidences.append(comparison.evidence(predict(comparison, effects, simulating)))
     tell("weighing", 0.85)
-    attribution = attribute_drive(evidence, with_reference=bool(references))
-    outcome = attribution.calibration.outcome(attribution.probabilities())
-    rig = "" if recordings[0].rig is None else recordings[0].rig.name
-    names = tuple(reference.name for reference in references)
-    return DriveDiagnosis(rig, simulator.name, effects, compared, tuple(evidence), attribution, outcome, names)
-
-
-def drive_report(diagnosis: DriveDiagnosis) -> GapReport:
-    """Return the report of a diagnosis; places, curves and steps are of the recording that differs most."""
-    outcome, effects, fits = diagnosis.outcome, diagnosis.effects, diagnosis.attribution.tried
-    k = int(np.argmax([c.floor().size(c.change) for c in diagnosis.compared]))
-    compared, evidence = diagnosis.compared[k], diagnosis.evidence[k]
-    probabilities = diagnosis.attribution.probabilities()
-    causes = in_order([_cause(diagnosis, k, name, p) for name, p in probabilities.items()], outcome)
+    attribution = attribute_drive(evidences, with_reference=bool(references))
+    probabilities, fits = attribution.probabilities(), attribution.tried
+    outcome = attribution.calibration.outcome(probabilities)
+    compared, evidence = max(zip(every, evidences, strict=True), key=lambda both: both[0].floor().size(both[0].change))
+    found = [_cause(name, p, effects, fits.get(name), compared, evidence) for name, p in probabilities.items()]
+    causes = in_order(found, outcome)
     first, pair, is_named = causes[0], most_probable_two(causes), outcome in NAMING
     fitted = first.fitted if is_named else None
-    floor = compared.floor()
     repeated = compared.change / _repeatability_limit(compared)
     note = () if fitted is None else (fitted_words(first, fitted.severity, compared.name),)
     return GapReport(
-        rig=diagnosis.rig,
-        simulator=diagnosis.simulator,
-        conditions=tuple(_facts(c) for c in diagnosis.compared),
-        references=diagnosis.references,
+        rig="" if recordings[0].rig is None else recordings[0].rig.name,
+        simulator=simulator.name,
+        conditions=tuple(_facts(c) for c in every),
+        references=tuple(reference.name for reference in references),
         outcome=outcome,
-        size=floor.size_interval([compared.change], [compared.without]),
+        size=compared.floor().size_interval([compared.change], [compared.without]),
         repeatability=float(np.sqrt(np.nanmean(repeated**2))),
         places=drive_places(compared),
         causes=causes,
@@ -175,7 +137,7 @@ def drive_report(diagnosis: DriveDiagnosis) -> GapReport:
         else (),
         spectra=_torque_curves(compared, fitted),
         angles=_tooth_curves(compared, fitted, fits),
-        notes=tuple(_messages(diagnosis, compared, evidence)),
+        notes=tuple(_messages(effects, every, compared, evidence)),
         twin_toml="" if fitted is None else compared.drive.twin.preset_toml(fitted, note),
     )
 
@@ -198,17 +160,22 @@ def _facts(compared: DriveComparison) -> ConditionFacts:
     )
 
 
-def _cause(diagnosis: DriveDiagnosis, k: int, name: str, probability: float) -> GapCause:
-    base = named_cause(name, probability, diagnosis.effects)
-    if name not in diagnosis.attribution.tried:
+def _cause(
+    name: str,
+    probability: float,
+    effects: Mapping[str, GapEffect],
+    fitted: FittedDriveCause | None,
+    compared: DriveComparison,
+    evidence: DriveEvidence,
+) -> GapCause:
+    base = named_cause(name, probability, effects)
+    if fitted is None:
         return base
-    fitted, compared = diagnosis.attribution.tried[name], diagnosis.compared[k]
     places = {CRACK: f"tooth {compared.spot.tooth + 1} of the pinion", RIPPLE: f"order {compared.order} of the pinion"}
-    options = diagnosis.evidence[k].predicted[name].options
     return replace(
         base,
         severity=fitted.severity,
-        fitted=Added(name, float(f"{fitted.severity.value:.4g}"), options),
+        fitted=Added(name, float(f"{fitted.severity.value:.4g}"), evidence.predicted[name].options),
         place=places.get(name, ""),
         shrinkage=fitted.shrinkage,
         evidence=_evidence(fitted, compared),
@@ -247,11 +214,13 @@ def _steps(compared: DriveComparison, evidence: DriveEvidence, cause: GapCause) 
     return GapStep("before", remaining([0.0 * change for change in fitted])), GapStep(cause.title, remaining(fitted))
 
 
-def _messages(diagnosis: DriveDiagnosis, clearest: DriveComparison, evidence: DriveEvidence) -> Iterator[str]:
+def _messages(
+    effects: Mapping[str, GapEffect],
+    every: Sequence[DriveComparison],
+    clearest: DriveComparison,
+    evidence: DriveEvidence,
+) -> Iterator[str]:
     """Say what could not be told, what was taken for granted, and what the recording would not show."""
-    effects, every = diagnosis.effects, diagnosis.compared
-    if not is_calibrated(FLOORS_FILE):
-        yield "The probabilities are not calibrated yet: take them as a ranking only."
     known = set.intersection(*(set(tellable(c, effects)) for c in every))
     missing = [effects[name].title for name in TRIED if name in effects and name not in known]
     if missing:
