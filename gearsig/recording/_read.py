@@ -27,7 +27,10 @@ from gearsig.recording._table import (
     one_condition,
     one_measurement,
     rate_of_time,
-    seconds_per_unit,
+    refuse_spectrum,
+    rises,
+    seconds_per_value,
+    time_among,
 )
 from gearsig.recording._types import (
     RPM_UNITS,
@@ -41,7 +44,16 @@ from gearsig.recording._types import (
 )
 from gearsig.recording.formats import CSV, FORMATS, FileFormat
 from gearsig.recording.formats._csv import find_layout, line_of_row, parse_rows
-from gearsig.rig import ConstantSpeed, PulseTimes, Rig, SpeedChannel, SpeedSource, check_rig, check_speed_source
+from gearsig.rig import (
+    ConstantSpeed,
+    PulseTimes,
+    Rig,
+    SpeedChannel,
+    SpeedSource,
+    TachometerChannel,
+    check_rig,
+    check_speed_source,
+)
 
 
 def read_recording(
@@ -241,6 +253,8 @@ def identify(path: Path) -> FileFormat:
     with path.open("rb") as file:
         head = file.read(4096)
     kind = content_kind(head)
+    if promised is None and not is_ending(endings[-1]):
+        promised = next((f for f in FORMATS if f.sniff(head) == kind), None)
     if promised is None:
         raise InputError(
             f"extension {path.suffix or '(none)'!r} is not known; the content looks like {kind}",
@@ -261,6 +275,17 @@ def identify(path: Path) -> FileFormat:
         allowed=f"content that fits {path.suffix or 'the extension'}",
         remedy=hint,
     )
+
+
+def is_ending(suffix: str) -> bool:
+    """Whether a suffix says of what format a file is: digits, as of a name that is a date, say nothing.
+
+    Examples
+    --------
+    >>> is_ending(".csv"), is_ending(Path("2004.02.12.10.32.39").suffix), is_ending("")
+    (True, False, False)
+    """
+    return not suffix[1:].isdigit() and suffix != ""
 
 
 def _columns_hint(file: Path) -> str:
@@ -522,7 +547,7 @@ def _checked(table: RawTable, source: str) -> RawTable:
             remedy="rename the columns",
         )
     if table.time is None and not table.is_own_layout:
-        time = next((c for c in table.columns if seconds_per_unit(c.name, c.unit) is not None), None)
+        time = time_among(table.columns) or _time_of_rate(table)
         if time is not None and len(table.columns) == 1:
             raise InputError(
                 f"the only column, {time.name!r}, is a time",
@@ -532,6 +557,8 @@ def _checked(table: RawTable, source: str) -> RawTable:
             )
         if time is not None:
             table = replace(table, columns=tuple(c for c in table.columns if c is not time), time=time)
+        elif table.sampling_rate_hz is None:
+            refuse_spectrum(where=source, columns=table.columns)
     if not 0 < len(table.columns) <= 4096:
         raise InputError(
             f"{len(table.columns)} channels were found",
@@ -565,6 +592,16 @@ def _checked(table: RawTable, source: str) -> RawTable:
     return table
 
 
+def _time_of_rate(table: RawTable) -> RawColumn | None:
+    """Return a first column, whatever it is called, that rises by the sampling interval that is stated."""
+    first, rate_hz = table.columns[0], table.sampling_rate_hz
+    if len(table.columns) < 2 or rate_hz is None or first.unit or not rises(first.values):
+        return None
+    steps = np.diff(first.values.astype(np.float64))
+    is_even = abs(float(steps.mean()) * rate_hz - 1.0) < 1e-3
+    return first if is_even and np.ptp(steps) <= 0.5 * steps.mean() else None
+
+
 def _sampling_rate(
     table: RawTable, source: str, rig: Rig | None, explicit_hz: float | None
 ) -> tuple[float, tuple[str, ...]]:
@@ -576,7 +613,7 @@ def _sampling_rate(
     file_hz, timed_hz, of_time = table.sampling_rate_hz, None, tuple[str, ...]()
     rig_hz = None if rig is None else rig.sampling_rate_hz
     if table.time is not None:
-        scale_s = seconds_per_unit(table.time.name, table.time.unit) or 1.0
+        scale_s = seconds_per_value(table.time)
         where = f"{source}, column {table.time.name!r}"
         timed_hz, of_time = rate_of_time(table.time.values, scale_s, where, table.row_place)
     if file_hz is None:
@@ -652,15 +689,18 @@ def _speed(
         return (table.speed, ()) if speed is None else (speed, _contradicted(speed, table, rig))
     known = None if rig is None else rig.speed
     measured = known is not None and not isinstance(known, ConstantSpeed)
-    if table.speed is not None and not isinstance(table.speed, ConstantSpeed):
-        return table.speed, ()
+    given = table.speed
+    if isinstance(known, TachometerChannel) and known.channel in table.pulse_times_s:
+        given = PulseTimes(table.pulse_times_s[known.channel], known.pulses_per_revolution, known.shaft)
+    if given is not None and not isinstance(given, ConstantSpeed):
+        return given, ()
     in_rpm = [c for c in channels if c.quantity == "rotational_speed" and c.unit.casefold() in RPM_UNITS]
     if known is None and len(in_rpm) == 1:
         name = in_rpm[0].name
         return SpeedChannel(name), (f"channel {name!r} is in {in_rpm[0].unit} and was taken as the shaft speed",)
-    if table.speed is None or measured:
+    if given is None or measured:
         return None, ()
-    of_file = table.speed.speed_rpm
+    of_file = given.speed_rpm
     text = f"the file states {of_file:g} rpm, which was taken as the speed of the reference shaft"
     if isinstance(known, ConstantSpeed):
         if abs(of_file - known.speed_rpm) <= 1e-3 * of_file:

@@ -183,11 +183,10 @@ def test_jitter_below_one_percent_is_fine(tmp_path):
         (["a,b", "1,2", "3,4", "5,6,7"], "line 4 has 3 of 2 columns"),
         (["a,b", "1,2", "3,4", "5,nan"], "'b' holds 1 NaN.*line 4"),
         (["a,b", "1,2", "3,4", "inf,6"], "'a' holds 1 NaN.*line 4"),
-        (["a,a", "1,2", "3,4"], "occur more than once: 'a'"),
         (["a,b"], "no line of numbers"),
         (["<html><body>1,2"], "HTML"),
         (["time", "1", "2", "3"], "only column"),
-        (["when,a", "1.2.2024 00:00:01,2", "1.2.2024 00:00:02,2"], "line 2 begins .*date and time are read as 2026-01"),
+        (["when,a", "1/2/2024 00:00:01,2", "1/2/2024 00:00:02,2"], "line 2 begins .*date and time are read as 2026-01"),
         (["when,a", "2024-02-30T00:00:01,2", "2024-02-30T00:00:02,2"], "line 2 begins .*date and time are read as"),
         (["when,a", "2024-01-01T00:00:01,2", "2024-01-01T00:00:02Z,2", "2024-01-01T00:00:03,2"], "line 3, .*no date"),
         (["when,a", "2024-01-01T00:00:01,2", "2024-01-01T00:00:02,2", "2024-01-01T00:00:02,2"], "does not increase at"),
@@ -240,7 +239,7 @@ def test_dates_and_times_are_the_time(tmp_path, separator, zone, between, quote,
 
 
 def test_the_first_bad_line_is_named_not_the_last_of_a_sample(tmp_path):
-    lines = ["timestamp,acc", *(f"01.01.2026 00:00:00.{i:06},{i}" for i in range(20_000))]
+    lines = ["timestamp,acc", *(f"01/01/2026 00:00:00.{i:06},{i}" for i in range(20_000))]
     with pytest.raises(InputError, match="line 2 begins"):
         read_recording(write(tmp_path / "x.csv", lines))
 
