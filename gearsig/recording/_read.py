@@ -8,7 +8,7 @@ import re
 import stat
 import tempfile
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from os import PathLike
@@ -31,6 +31,7 @@ from gearsig.recording._table import (
     rises,
     seconds_per_value,
     time_among,
+    with_pulse_channels,
 )
 from gearsig.recording._types import (
     RPM_UNITS,
@@ -110,6 +111,8 @@ def read_recording(
         else:
             table = one_measurement(table, None, file.name)
         sha256 = sha256_of(file) if part is None else ""
+        if part is None:  # of a part, pulses may not show
+            table = with_pulse_channels(table)
         recording = assemble(table, name, sha256, rig=rig, sampling_rate_hz=sampling_rate_hz, speed=speed)
         return recording if part is None else _with_pulses_within(recording, part.start or 0)
 
@@ -523,6 +526,8 @@ def assemble(
         Channel(c.name, c.quantity or quantity_of(c.name, c.unit), c.unit, c.position) for c in table.columns
     )
     speed, speed_warnings = _speed(table, channels, rig, speed)
+    if speed is None and not table.is_own_layout and (rig is None or rig.speed is None):
+        speed_warnings = (*speed_warnings, *_unused_pulses(table, channels))
     recording = Recording(
         _stack(table, source),
         rate_hz,
@@ -707,6 +712,15 @@ def _speed(
             return None, ()
         text = f"the rig states a speed of {known.speed_rpm:g} rpm, the file {of_file:g} rpm: the file's was taken"
     return ConstantSpeed(of_file, known.shaft if known is not None else ""), (text,)
+
+
+def _unused_pulses(table: RawTable, channels: tuple[Channel, ...]) -> Iterator[str]:
+    """Say how the speed is taken from pulses that no rig file names: how many make a revolution is not known."""
+    for name in (*table.pulse_times_s, *(c.name for c in channels if c.quantity == "tachometer")):
+        yield (
+            f'{name!r} holds pulses, as of a tachometer: [speed] with source = "tachometer", channel = "{name}" and '
+            "pulses_per_revolution = … in a rig file takes the speed from them"
+        )
 
 
 def _contradicted(given: SpeedSource, table: RawTable, rig: Rig | None) -> tuple[str, ...]:

@@ -20,6 +20,7 @@ from gearsig.recording._types import (
     SECONDS_PER_UNIT,
     SPEED_NAMES,
     plain_name,
+    quantity_of,
 )
 from gearsig.rig import ConstantSpeed, SpeedSource
 
@@ -231,6 +232,37 @@ def _clock_of_parts(columns: Sequence[RawColumn]) -> RawColumn | None:
         if fraction.max() < per_second and step > 0 and np.abs(t - grid).max() < 0.5 * step:
             return RawColumn("time", grid, "s")
     return None
+
+
+def with_pulse_channels(table: RawTable) -> RawTable:
+    """Return the table with channels of no known quantity that hold pulses as tachometers."""
+    if table.is_own_layout:
+        return table
+    columns = tuple(replace(c, quantity="tachometer") if _is_pulse_train(c) else c for c in table.columns)
+    return replace(table, columns=columns)
+
+
+def _is_pulse_train(column: RawColumn) -> bool:
+    """Whether a channel of no known quantity stays at two levels, and goes from one to the other again and again.
+
+    A tenth of the samples at most is on the way, and of those that left a level most are at the other: neither impacts,
+    which fade, nor clipped vibration is like that.
+    """
+    quantity = column.quantity or quantity_of(column.name, column.unit)
+    if quantity not in ("unknown", "voltage") or column.values.dtype.kind not in "fiu" or column.values.ndim != 1:
+        return False
+    some = column.values[:: max(1, len(column.values) // 200_000)].astype(np.float64)
+    if len(some) < 100 or not np.all(np.isfinite(some)):
+        return False
+    low, high = np.percentile(some, (0.05, 99.95))
+    if not high > low:
+        return False
+    near = 0.25 * (high - low)
+    lower, upper = int(np.count_nonzero(some < low + near)), int(np.count_nonzero(some > high - near))
+    if min(lower, upper) < 3 or len(some) - lower - upper > min(0.1 * len(some), 0.7 * lower, 0.7 * upper):
+        return False
+    is_high = column.values > low + 0.5 * (high - low)
+    return int(np.count_nonzero(is_high[1:] & ~is_high[:-1])) >= 3
 
 
 N_COHERENCE_SEGMENTS = 64
@@ -564,17 +596,13 @@ def table_from_arrays(arrays: NamedArrays, reader: str, where: str) -> RawTable:
     if clocks and rate_hz is None:
         time = RawColumn("time", signals[clocks[0]].reshape(-1), "s")
     if clocks:
-        warnings.append(f"taken for times and not for channels: {', '.join(clocks[:8])}")
+        names = dict.fromkeys(path.rpartition(".")[2] for path in clocks)
+        warnings.append(f"taken for times and not for channels: {', '.join(list(names)[:8])}")
     # A channel is called by the last part of its path where that is unique.
     leaves = [c.name.rpartition(".")[2] for c in columns]
     columns = [replace(c, name=leaf) if leaves.count(leaf) == 1 else c for c, leaf in zip(columns, leaves, strict=True)]
     speeds_rpm, speed, hints = _stated_speed(scalars)
     warnings += hints
-    warnings += [
-        f"{name!r} holds {len(times)} rising times, as of tachometer pulses: a rig file that says source = "
-        f'"tachometer", channel = "{name}" and pulses_per_revolution takes the speed from them'
-        for name, times in pulses.items()
-    ]
     if short := [path for path in short if path.rpartition(".")[2] not in pulses]:
         warnings.append(f"shorter than a tenth of the longest signal and left out: {', '.join(short[:8])}")
     return RawTable(

@@ -80,6 +80,7 @@ SI_FACTORS: dict[str, dict[str, float]] = {
         "g": _G,
         "gn": _G,
         "g_n": _G,
+        "g-s": _G,
         "mg": 1e-3 * _G,
     },
     "velocity": {"m/s": 1.0, "mm/s": 1e-3, "µm/s": 1e-6, "in/s": _INCH, "ips": _INCH},
@@ -93,6 +94,7 @@ SI_FACTORS: dict[str, dict[str, float]] = {
     "angular_acceleration": {"rad/s²": 1.0},
     "temperature": {"°C": 1.0, "degC": 1.0},  # of differences: the zero is not the kelvin's
     "voltage": {"V": 1.0, "mV": 1e-3},
+    "current": {"A": 1.0, "mA": 1e-3},
 }
 """Quantity → unit → what a value is multiplied by to be in the SI unit, of every unit that is known here.
 
@@ -252,15 +254,22 @@ def quantity_of(name: str, unit: str) -> str:
 
     Examples
     --------
-    >>> quantity_of("a1", "m/s^2"), quantity_of("Tacho", "V"), quantity_of("a1", "")
-    ('acceleration', 'tachometer', 'unknown')
+    >>> quantity_of("a1", "m/s^2"), quantity_of("Tacho", "V"), quantity_of("a1", ""), quantity_of("phase_current_1", "")
+    ('acceleration', 'tachometer', 'unknown', 'current')
     """
     quantity = _QUANTITY_OF_UNIT.get(_plain_unit(unit), "unknown")
     if quantity in ("unknown", "voltage") and re.match(r"tach|keyphas", name.strip().casefold()):
         return "tachometer"
     if quantity == "unknown" and plain_name(name) in ("rpm", "speedrpm"):
         return "rotational_speed"
+    if quantity == "unknown" and (match := _TELLING_NAME.search(name.casefold())) is not None:
+        return next(of_name for of_name, word in match.groupdict().items() if word)
     return quantity
+
+
+_TELLING_NAME = re.compile(
+    r"(?<![^\W\d_])(?:(?P<torque>torque|drehmoment)|(?P<temperature>temp(?:eratur|erature)?)|(?P<current>current|strom))(?![^\W\d_])"
+)
 
 
 VIBRATION_QUANTITIES = frozenset(
