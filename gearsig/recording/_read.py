@@ -47,6 +47,7 @@ from gearsig.recording.formats import CSV, FORMATS, FileFormat
 from gearsig.recording.formats._csv import find_layout, line_of_row, parse_rows
 from gearsig.rig import (
     ConstantSpeed,
+    EncoderChannel,
     PulseTimes,
     Rig,
     SpeedChannel,
@@ -537,7 +538,19 @@ def assemble(
         truth=table.truth,
         warnings=(*table.warnings, *rate_warnings, *speed_warnings),
     )
-    return recording if rig is None else recording.with_rig(rig)
+    recording = recording if rig is None else recording.with_rig(rig)
+    return recording if table.is_own_layout else _with_quantity_of_speed(recording)
+
+
+def _with_quantity_of_speed(recording: Recording) -> Recording:
+    """Return the recording with the quantity of the channel that tells the speed, where nothing else tells it."""
+    quantities = {TachometerChannel: "tachometer", EncoderChannel: "encoder", SpeedChannel: "rotational_speed"}
+    source = recording.speed_source
+    quantity, name = quantities.get(type(source), ""), getattr(source, "channel", "")
+    if not quantity or all((c.name, c.quantity) != (name, "unknown") for c in recording.channels):
+        return recording
+    channels = tuple(replace(c, quantity=quantity) if c.name == name else c for c in recording.channels)
+    return replace(recording, channels=channels)
 
 
 def _checked(table: RawTable, source: str) -> RawTable:

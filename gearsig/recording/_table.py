@@ -266,6 +266,8 @@ def _is_pulse_train(column: RawColumn) -> bool:
 
 
 N_COHERENCE_SEGMENTS = 64
+N_COMPARED = 8
+"""Columns of which each pair is compared; a matrix without a time that has more of them is rather one of runs."""
 
 
 def ask_whether_runs(columns: list[RawColumn], where: str) -> list[str]:
@@ -276,18 +278,18 @@ def ask_whether_runs(columns: list[RawColumn], where: str) -> list[str]:
 
     .. math:: P(\hat\gamma^2 > c) = (1 - c)^{n - 1}.
 
-    Columns share no noise if in every pair less than half of the spectrum is coherent at 5 %.
+    Columns share no noise if in every pair of the first eight less than half of the spectrum is coherent at 5 %.
 
     Source: J. S. Bendat, A. G. Piersol, *Random Data*, 4th ed., ch. 9.
     """
     from scipy.signal import coherence
 
     n_samples = min(len(c.values) for c in columns)
-    if len(columns) < 2 or n_samples < 64 * N_COHERENCE_SEGMENTS:
+    if len(columns) < 2 or n_samples < 32 * N_COHERENCE_SEGMENTS:
         return []
     chance = 1.0 - 0.05 ** (1.0 / (N_COHERENCE_SEGMENTS - 1))
     length = n_samples // N_COHERENCE_SEGMENTS
-    for i, a in enumerate(columns):
+    for i, a in enumerate(columns[:N_COMPARED]):
         for b in columns[:i]:
             _, gamma2 = coherence(a.values[:n_samples], b.values[:n_samples], nperseg=length, noverlap=0)
             if not float(np.median(gamma2[2:-1])) < chance:
@@ -590,14 +592,14 @@ def table_from_arrays(arrays: NamedArrays, reader: str, where: str) -> RawTable:
             warnings += notes
             if notes:
                 of_array = [replace(c, name=f"{path}_{i}") for i, c in enumerate(of_array, 1)]
-            if time is not None:
+            if time is not None or len(of_array) > N_COMPARED:
                 warnings += ask_whether_runs(of_array, where)
         columns += of_array
     if clocks and rate_hz is None:
         time = RawColumn("time", signals[clocks[0]].reshape(-1), "s")
     if clocks:
-        names = dict.fromkeys(path.rpartition(".")[2] for path in clocks)
-        warnings.append(f"taken for times and not for channels: {', '.join(list(names)[:8])}")
+        leaves = list(dict.fromkeys(path.rpartition(".")[2] for path in clocks))
+        warnings.append(f"taken for times and not for channels: {', '.join(leaves[:8])}")
     # A channel is called by the last part of its path where that is unique.
     leaves = [c.name.rpartition(".")[2] for c in columns]
     columns = [replace(c, name=leaf) if leaves.count(leaf) == 1 else c for c, leaf in zip(columns, leaves, strict=True)]

@@ -388,3 +388,10 @@ def test_pulses_are_a_tachometer_whatever_they_are_called(tmp_path):
     assert any("ch1" in w and "pulses_per_revolution" in w for w in r.warnings)
     r = read_recording(tmp_path / "x.csv", rig=Rig(speed=TachometerChannel("ch1")), sampling_rate_hz=4000.0)
     assert not any("pulses_per_revolution" in w for w in r.warnings)
+
+
+def test_the_channel_that_tells_the_speed_is_no_vibration(tmp_path):
+    path = write(tmp_path / "x.csv", ["a,n", *(f"{np.sin(i):.4f},{1500 + np.cos(i):.4f}" for i in range(50))])
+    told = [None, Rig(speed=SpeedChannel("n"))]
+    names = [read_recording(path, rig=rig, sampling_rate_hz=10.0).vibration_names() for rig in told]
+    assert names == [("a", "n"), ("a",)]
