@@ -405,7 +405,7 @@ def matching_origins(
                 stat.st_mtime_ns,
             )
         )
-    return result
+    return sorted(result, key=lambda o: (o.machine, o.point, o.date, o.path))
 
 
 N_NAMED = 3
