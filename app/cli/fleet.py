@@ -42,7 +42,7 @@ PatternOption = Annotated[
     typer.Option(
         "--pattern",
         help="How paths name machine, point and date, from their end: '{machine}/{point}_{date:%Y%m%d}.csv'; "
-        "{} is anything.",
+        "{number:1min} is a running number, {} is anything.",
     ),
 ]
 MachineOption = Annotated[str, typer.Option("--machine", help="Name of the machine, for all of these recordings.")]

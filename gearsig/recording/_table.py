@@ -153,10 +153,10 @@ def refuse_spectrum(lines: Iterable[str] = (), where: str = "", columns: Sequenc
         label, *words = (word.strip().casefold() for word in re.split(r"[:=;,\t]+", line.strip()))
         is_frequency = any(word in _FREQUENCY_UNITS or _FREQUENCY_NAME.match(word) for word in words)
         if plain_name(label) in ("xunit", "xaxisunit", "xdimension", "xunitlabel") and is_frequency:
-            axis = line.strip()[:60]
-    for column in columns:
+            axis = " ".join(line.split())[:60]
+    for column in columns[:1]:  # a frequency that stands later is rather that of a drive
         named = _FREQUENCY_NAME.match(column.name) or column.unit.strip().casefold() in _FREQUENCY_UNITS
-        if named and rises(column.values):
+        if named and rises(column.values) and bool(np.all(np.diff(column.values) > 0)):
             axis = f"{column.name} ({column.unit})" if column.unit else column.name
     if axis:
         raise InputError(
@@ -201,7 +201,8 @@ def without_clock(
         others, time, notes = without_clock(columns[1:])
         return others, time, [f"column 1 ({first.name!r}) only counts the rows and was left out", *notes]
     if steps.min() > 0 and np.ptp(steps) <= 0.02 * steps.mean():
-        if steps.mean() > 0.05 and all(bool(np.all(c.values >= 0)) for c in columns[1:]):
+        amplitudes = [bool(np.all(c.values >= 0)) and not rises(c.values) for c in columns[1:]]
+        if steps.mean() > 0.05 and all(amplitudes):
             raise InputError(
                 f"looks like a spectrum: {first.name!r} rises in steps of {steps.mean():.4g}, and no value is negative",
                 allowed="the waveform, sample by sample",

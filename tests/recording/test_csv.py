@@ -194,6 +194,7 @@ def test_jitter_below_one_percent_is_fine(tmp_path):
         (["when,a", "1678-01-01T00:00:01,2", "2261-01-01T00:00:02,2", "1679-01-01T00:00:02,2"], "does not increase"),
         (["when,a", "2024-01-01T00:00:01,2", "2024-01-01T00:00:02,2", "2024-02-30T00:00:02,2"], "line 4, .*no date"),
         (["text,a", "b,2", "c,3"], "line 1 begins 'text,a'"),
+        (["a;b", "999,5;2", "1.000,5;2", "3,5;4"], "line 3, column 'a': .* between thousands"),
         (["a b", "1 2", "3 4", "5 1_0"], "line 4, column 'b': '1_0'"),
     ],
 )

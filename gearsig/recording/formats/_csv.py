@@ -495,11 +495,14 @@ def _raise_no_date_time(field: str, number: int, name: str, layout: CsvLayout, w
 
 def _raise_no_number(field: str, number: int, name: str, layout: CsvLayout, where: str) -> None:
     text = field.strip()[:60]
+    remedy = "correct the field, or remove the column" if text else "cut out the gap knowingly or export again"
+    if re.match(r"[+-]?\d{1,3}(?:[.,' \u00a0]\d{3})+(?!\d)", text):
+        remedy = "export the numbers without signs between thousands"
     raise InputError(
         f"line {number}, column {name!r}: " + (f"{text!r} is not a number" if text else "the field is empty"),
         where=where,
         allowed=f"numbers with decimal {'comma' if layout.decimal == ',' else 'point'}",
-        remedy="correct the field, or remove the column" if text else "cut out the gap knowingly or export again",
+        remedy=remedy,
     )
 
 
