@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import PurePath
 from typing import Any
 
 import numpy as np
@@ -592,7 +593,7 @@ def table_from_arrays(arrays: NamedArrays, reader: str, where: str) -> RawTable:
             of_array, time, notes = without_clock(of_array)
             warnings += notes
             if notes:
-                of_array = [replace(c, name=f"{path}_{i}") for i, c in enumerate(of_array, 1)]
+                of_array = [replace(c, name=_column_name(path, i, where)) for i, c in enumerate(of_array, 1)]
             if time is not None or len(of_array) > N_COMPARED:
                 warnings += ask_whether_runs(of_array, where)
         columns += of_array
@@ -683,7 +684,8 @@ def _unit(path: str, arrays: NamedArrays) -> str:
 def _columns(path: str, array: NumberArray, arrays: NamedArrays, where: str) -> list[RawColumn]:
     unit = _unit(path, arrays)
     if 1 in array.shape or array.ndim == 1:
-        return [RawColumn(path, array.reshape(-1), unit)]
+        name = path if path != PurePath(where).stem else _column_name(path, 1, where)
+        return [RawColumn(name, array.reshape(-1), unit)]
     over_time = array if array.shape[0] < array.shape[1] else array.T
     if len(over_time) > 0.5 * over_time.shape[1]:
         raise InputError(
@@ -692,7 +694,12 @@ def _columns(path: str, array: NumberArray, arrays: NamedArrays, where: str) -> 
             allowed="a matrix with many more samples than channels",
             remedy="save each channel as a vector",
         )
-    return [RawColumn(f"{path}_{i + 1}", row, unit) for i, row in enumerate(over_time)]
+    return [RawColumn(_column_name(path, i, where), row, unit) for i, row in enumerate(over_time, 1)]
+
+
+def _column_name(path: str, number: int, where: str) -> str:
+    """Name a column of a matrix; one that is called as its file would be called otherwise in each recording."""
+    return f"ch{number}" if path == PurePath(where).stem else f"{path}_{number}"
 
 
 def _one_rate(scalars: Mapping[str, NumberArray], stated_hz: float | None, where: str) -> float | None:

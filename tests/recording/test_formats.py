@@ -48,6 +48,13 @@ class TestMat5:
         assert r.channel_names == ("m_1", "m_2")
         np.testing.assert_array_equal(r.samples, np.stack([X, Y]))
 
+    def test_a_variable_called_as_its_file_has_the_same_channels_in_each(self, tmp_path):
+        for name in ("C0A_200", "C1A_200"):
+            savemat(tmp_path / f"{name}.mat", {name: np.stack([X, Y], axis=1)})
+            assert read_recording(tmp_path / f"{name}.mat", sampling_rate_hz=1.0).channel_names == ("ch1", "ch2")
+            savemat(tmp_path / f"{name}.mat", {name: X})
+            assert read_recording(tmp_path / f"{name}.mat", sampling_rate_hz=1.0).channel_names == ("ch1",)
+
     def test_time_vector_and_speed(self, tmp_path):
         contents = {"t": np.arange(1000) / 50, "a": X, "X097RPM": 1796, "BPFO": 81.1, "win": [1, 2, 3]}
         savemat(tmp_path / "x.mat", contents)
