@@ -161,6 +161,8 @@ def rate_in_line(line: str) -> float | None:
     --------
     >>> rate_in_line("# fs = 25600"), rate_in_line("Sampling rate [Hz];25.6e3"), rate_in_line("# run 5: good")
     (25600.0, 25600.0, None)
+    >>> rate_in_line("fs: 25,6 kHz"), rate_in_line("fs,1024,1024"), rate_in_line("fs: 25,600 Hz")
+    (25600.0, 1024.0, None)
     """
     value, unit = _in_line(line, RATE_NAMES)
     return None if value is None or unit not in ("", "hz", "khz") else value * (1e3 if unit == "khz" else 1.0)
@@ -191,7 +193,7 @@ def _in_line(line: str, names: frozenset[str]) -> tuple[float | None, str]:
     for separator in (",", "\t", ";"):  # of channels; a comma may be a decimal sign
         fields = {field.strip().removeprefix(label.strip()).lstrip("=: ") for field in rest.split(separator)} - {""}
         match = _QUANTITY.fullmatch(fields.pop()) if len(fields) == 1 else None
-        if match is not None:
+        if match is not None and not re.fullmatch(r"[1-9]\d{0,2},\d{3}", match["value"]):  # of thousands, or a decimal
             return float(match["value"].replace(",", ".")), (match["unit"] or unit.strip("]) ")).casefold()
     return None, ""
 
@@ -268,7 +270,7 @@ def quantity_of(name: str, unit: str) -> str:
 
 
 _TELLING_NAME = re.compile(
-    r"(?<![^\W\d_])(?:(?P<torque>torque|drehmoment)|(?P<temperature>temp(?:eratur|erature)?)|(?P<current>current|strom))(?![^\W\d_])"
+    r"(?<![^\W\d_])(?:(?P<torque>torque|drehmoment)|(?P<temperature>temp(?:eratur|erature)?)|(?P<current>(?<!eddy.)current|strom))(?![^\W\d_])"
 )
 
 

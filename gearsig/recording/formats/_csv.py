@@ -300,7 +300,8 @@ def _header(
     """
     filled = [text for text in above if text.strip()]
     rows: list[tuple[str, ...]] = []
-    for text in reversed(filled[-MAX_HEADER_LINES:]):
+    n_lines = 2 if n_columns == 1 else MAX_HEADER_LINES  # any line may be the name of one column
+    for text in reversed(filled[-n_lines:]):
         fields = _header_fields(text, separator, n_columns, leading, trailing)
         if fields is None:
             break
