@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Iterable, Sequence
+from datetime import datetime
 from io import StringIO
 from math import floor, isfinite, log10
 from pathlib import Path
@@ -300,3 +301,14 @@ def position_text(axis: str, position: float, n_digits: int = 7) -> str:
 def named(what: str, name: str) -> str:
     """Return a name with what it names before it, unless the name says so itself; empty for an empty name."""
     return name if not name or what.rsplit(maxsplit=1)[-1] in name.lower() else f"{what} {name}"
+
+
+def moment_text(moment: datetime) -> str:
+    """Write a date, with the time of day unless that is midnight, as where a name states the day alone.
+
+    Examples
+    --------
+    >>> moment_text(datetime(2026, 1, 31, 14, 5)), moment_text(datetime(2026, 1, 31))
+    ('2026-01-31 14:05', '2026-01-31')
+    """
+    return f"{moment:%Y-%m-%d %H:%M}".removesuffix(" 00:00")

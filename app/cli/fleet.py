@@ -42,7 +42,7 @@ PatternOption = Annotated[
     typer.Option(
         "--pattern",
         help="How paths name machine, point and date, from their end: '{machine}/{point}_{date:%Y%m%d}.csv'; "
-        "{} is anything.",
+        "{number:1min} is a running number, {} is anything.",
     ),
 ]
 MachineOption = Annotated[str, typer.Option("--machine", help="Name of the machine, for all of these recordings.")]
@@ -461,7 +461,7 @@ def _series_row(row: dict[Any, Any]) -> tuple[str, ...]:
     from pandas import isna
 
     from gearsig.fleet import change_text, series_level
-    from gearsig.formatting import unit_text
+    from gearsig.formatting import moment_text, unit_text
 
     unit = f" {unit_text(row['unit'])}" if row["unit"] else ""
     of = " ".join(part for part in (row["point"], row["place"], row["channel"], row["computed_on"]) if part)
@@ -473,7 +473,7 @@ def _series_row(row: dict[Any, Any]) -> tuple[str, ...]:
         _number(row["expected"]),
         _number(row["upper_limit"]),
         change_text(row["change"], in_db=row["in_db"]),
-        "" if isna(row["since"]) else f"{row['since']:%Y-%m-%d}",
+        "" if isna(row["since"]) else moment_text(row["since"]),
         row["basis"],
     )
 

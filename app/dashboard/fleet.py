@@ -32,7 +32,7 @@ from gearsig.fleet import (
     series_level,
     trends_text,
 )
-from gearsig.formatting import unit_text, with_minus
+from gearsig.formatting import moment_text, unit_text, with_minus
 from gearsig.plot import ChartLine, LinePanel, with_unit
 from gearsig.recording import sha256_of
 from gearsig.rig import rig_file_beside
@@ -278,7 +278,7 @@ def _show_trend(fleet: Fleet, row: Row, over: str) -> None:
         trend = next((candidate for candidate in trends if candidate.band == row["band"]), trends[0])
         table = limits = trend.table
         at = along = table["date"].to_numpy("datetime64[s]").astype(float) / 86400.0
-        changed = f" The level first changed on {trend.changed:%Y-%m-%d}." if trend.changed is not None else ""
+        changed = f" The level first changed on {moment_text(trend.changed)}." if trend.changed is not None else ""
         x, text, margin = "date", trend.text + changed, 0.5
     else:
         related = fleet.trend_over(over, machine, name, **only)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from gearsig.cache import write_whole
 from gearsig.fleet._fleet import DiagnosisChange, Fleet
 from gearsig.fleet._trends import LEVEL_NAMES, STATUS_LEVELS, events_of, level_name
-from gearsig.formatting import counted, readable, signed
+from gearsig.formatting import counted, moment_text, readable, signed
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -169,7 +169,7 @@ def trends_text(row: Mapping[Any, Any]) -> str:
     if not counts:
         n = row["n_baseline"]
         return "" if isna(n) or n else "baseline not complete"
-    since = "" if isna(row["since"]) else f" since {row['since']:%Y-%m-%d}"
+    since = "" if isna(row["since"]) else f" since {moment_text(row['since'])}"
     change = change_text(row["change"], in_db=bool(row["change_in_db"]))
     of = f" of {row['worst_place']}" if row["worst_place"] else ""
     return f"{', '.join(counts)}{since}; worst: {row['worst']}{of}{f' {change}' if change else ''}"

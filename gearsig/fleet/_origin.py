@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from functools import cache
 from pathlib import Path
 
@@ -14,8 +14,11 @@ from gearsig.errors import InputError
 from gearsig.formatting import counted, file_label
 from gearsig.rig import Rig, read_rig, rig_file_beside
 
-FIELDS = ("machine", "point", "date")
+FIELDS = ("machine", "point", "date", "number")
 """What a pattern may name, besides `{}` for what does not matter."""
+
+NUMBERS_BEGIN = datetime(2000, 1, 1)  # noqa: DTZ001 - as all dates here
+"""Where no date is stated, running numbers count from here."""
 
 LONGEST_NAME = 200
 
@@ -35,7 +38,7 @@ _FORMS = {
 }
 _DATE_IN_NAME = re.compile(
     r"(?<!\d)(?P<day>(?:19|20)\d\d[-_.]?[01]\d[-_.]?[0-3]\d)"
-    r"(?:[-_T ]?(?P<time>[0-2]\d[-_.:h]?[0-5]\d(?:[-_.:m]?[0-5]\d)?))?(?!\d)"
+    r"(?:[-_.T ]?(?P<time>[0-2]\d[-_.:h]?[0-5]\d(?:[-_.:m]?[0-5]\d)?))?(?!\d)"
 )
 
 
@@ -88,8 +91,8 @@ class PassedOver:
 class FilePattern:
     """A pattern of paths such as "{machine}/{point}_{date:%Y%m%d}.csv", matched from a path's end.
 
-    `{machine}` and `{point}` are letters without "/", `{date:…}` has the fields of `strptime`, `{}` is anything but
-    "/", `*` likewise, and `**` also "/".
+    `{machine}` and `{point}` are letters without "/", `{date:…}` has the fields of `strptime`, `{number:10min}` is a
+    running number of recordings that are so far apart, `{}` is anything but "/", `*` likewise, and `**` also "/".
     """
 
     text: str
@@ -97,7 +100,7 @@ class FilePattern:
     def __post_init__(self) -> None:
         self._compiled()
 
-    def match(self, path: Path, root: Path | None = None) -> dict[str, str | datetime] | None:
+    def match(self, path: Path, root: Path | None = None) -> dict[str, str | datetime | timedelta] | None:
         """Return what the pattern names in a path, None if the path is of another kind.
 
         Below `root` it is tried on the whole of the path first.
@@ -111,7 +114,7 @@ class FilePattern:
         named = self.examined(path, root)
         return None if isinstance(named, PassedOver) else named
 
-    def examined(self, path: Path, root: Path | None = None) -> dict[str, str | datetime] | PassedOver:
+    def examined(self, path: Path, root: Path | None = None) -> dict[str, str | datetime | timedelta] | PassedOver:
         """Return what `match` does, but for a path of another kind what speaks against it.
 
         Examples
@@ -126,21 +129,24 @@ class FilePattern:
         match = match or expression.search(path.absolute().as_posix())
         if match is None:
             return PassedOver(path.absolute(), "does not match the pattern")
-        result: dict[str, str | datetime] = {k: v for k, v in match.groupdict().items() if k != "date"}
-        if form:
+        result: dict[str, str | datetime | timedelta] = {k: v for k, v in match.groupdict().items() if k != "date"}
+        if isinstance(form, timedelta):
+            result["number"] = int(match["number"]) * form
+        elif form:
             try:
                 result["date"] = datetime.strptime(match["date"], form)  # noqa: DTZ007 - as the name states it
             except ValueError:  # the 31st of February
                 return PassedOver(path.absolute(), f"{match['date']} is no date in the form {form}")
         return result
 
-    def _compiled(self) -> tuple[re.Pattern[str], str]:
+    def _compiled(self) -> tuple[re.Pattern[str], str | timedelta]:
         return _compile(self.text)
 
 
 @cache
-def _compile(text: str) -> tuple[re.Pattern[str], str]:
-    where, form, parts, end = "--pattern", "", ["(?:^|/)"], 0
+def _compile(text: str) -> tuple[re.Pattern[str], str | timedelta]:
+    where, parts, end = "--pattern", ["(?:^|/)"], 0
+    form: str | timedelta = ""
     names: set[str] = set()
     for field in _FIELD.finditer(text):
         parts.append(_literal(text[end : field.start()]))
@@ -149,12 +155,18 @@ def _compile(text: str) -> tuple[re.Pattern[str], str]:
             raise InputError(f"{{{name}}} is not known", where=where, allowed=", ".join(f"{{{n}}}" for n in FIELDS))
         if name in names:
             raise InputError(f"{{{name}}} occurs twice", where=where)
-        if bool(field["form"]) != (name == "date"):
-            raise InputError(f"{field[0]} has no date format", where=where, remedy="write for example {date:%Y%m%d}")
+        if bool(field["form"]) != (name in ("date", "number")):
+            remedy = "write for example {date:%Y%m%d}, {number:10min} or {machine}"
+            raise InputError(f"{field[0]} is not understood", where=where, remedy=remedy)
         names.add(name)
+        if {"date", "number"} <= names:
+            raise InputError("date and number occur both", where=where, remedy="keep the date")
         if name == "date":
             form = field["form"]
             parts.append(f"(?P<date>{_of_form(form)})")
+        elif name == "number":
+            form = _interval(field["form"])
+            parts.append(r"(?P<number>\d{1,9})")
         else:
             parts.append(f"(?P<{name}>[^/]+?)" if name else "[^/]*?")
     parts.append(_literal(text[end:]))
@@ -176,12 +188,21 @@ def _of_form(form: str) -> str:
     return "".join(_FORMS.get(part, re.escape(part)) for part in parts)
 
 
+def _interval(text: str) -> timedelta:
+    """Return the time that "10min" states."""
+    match = re.fullmatch(r"(\d{1,6}(?:\.\d{1,3})?)\s?(s|min|h|d)", text)
+    if match is None or not float(match[1]):
+        allowed = "seconds, minutes, hours or days above 0: 10s, 1min, 2h, 1d"
+        raise InputError(f"{{number:{text}}} states no time between recordings", where="--pattern", allowed=allowed)
+    return float(match[1]) * timedelta(**{{"s": "seconds", "min": "minutes", "h": "hours", "d": "days"}[match[2]]: 1})
+
+
 def date_in_name(name: str) -> datetime | None:
     """Return the date, with its time if there is one, that a name states, year first.
 
     Examples
     --------
-    >>> [str(date_in_name(name)) for name in ("pump_2026-01-31T1405.csv", "20260131_140512", "run_1234.h5")]
+    >>> [str(date_in_name(name)) for name in ("pump_2026-01-31T1405.csv", "2026.01.31.14.05.12", "run_1234.h5")]
     ['2026-01-31 14:05:00', '2026-01-31 14:05:12', 'None']
     """
     for match in _DATE_IN_NAME.finditer(name):
@@ -265,9 +286,12 @@ def _walk(root: Path) -> Iterable[Path]:
 
 
 def _is_recording(path: Path) -> bool:
-    from gearsig.recording import FORMAT_OF_EXTENSION
+    """Whether a file in a folder has the ending of a format, or none and a name that is a date."""
+    from gearsig.recording import FORMAT_OF_EXTENSION, is_ending
 
     name = path.name.lower()
+    if not is_ending(path.suffix):
+        return date_in_name(name) is not None
     return any(name.endswith((ending, f"{ending}.gz")) for ending in FORMAT_OF_EXTENSION)
 
 
@@ -285,7 +309,8 @@ def origins(
 
     The machine is what is stated, else what the pattern names, else the first sub-folder below the place searched,
     else the name in the rig file, else the folder. The point is stated, in the pattern, or the second sub-folder. The
-    date is stated, in the pattern, in the file's name, or when the file was written.
+    date is stated, in the pattern, in the file's name, or when the file was written; running numbers count from what is
+    stated.
 
     Parameters
     ----------
@@ -357,7 +382,9 @@ def matching_origins(
         of_point = _first(
             ("stated", point), ("pattern", named.get("point", "")), ("folder", below[1] if len(below) > 1 else "")
         )
+        since = named.get("number")
         of_date = _first(
+            ("pattern", (date or NUMBERS_BEGIN) + since if isinstance(since, timedelta) else None),
             ("stated", date),
             ("pattern", named.get("date")),
             ("file name", date_in_name(path.name)),
@@ -378,7 +405,7 @@ def matching_origins(
                 stat.st_mtime_ns,
             )
         )
-    return result
+    return sorted(result, key=lambda o: (o.machine, o.point, o.date, o.path))
 
 
 N_NAMED = 3

@@ -294,20 +294,27 @@ def alarm_levels(sample: IntArray, calm: BoolArray, n_to_clear: int) -> IntArray
     return result
 
 
-def decibels(values: FloatArray, baseline: BoolArray) -> tuple[FloatArray, BoolArray]:
-    """Return levels in dB where a series is positive over its baseline, else values over their scatter.
+def decibels(values: FloatArray, baseline: BoolArray, is_signed: BoolArray) -> tuple[FloatArray, BoolArray]:
+    """Return levels in dB where a series is positive over its baseline, else values as they are.
+
+    Parameters
+    ----------
+    values : array, (n_recordings, n_series)
+    baseline : bool array, (n_recordings,)
+    is_signed : bool array, (n_series,)
+        Which series may be negative, as those in dB already, and stay as they are.
 
     Returns
     -------
     array, (n_recordings, n_series)
         20 lg of values; a later zero counts as a thousandth of the baseline's smallest.
     bool array, (n_series,)
-        Whether the series is in dB.
+        Whether the series was brought to dB.
     """
     known = np.where(baseline[:, None], values, np.nan)
     filled = np.where(np.isfinite(known), known, np.inf)
     smallest = filled.min(axis=0, initial=np.inf)
-    in_db = (smallest > 0) & np.isfinite(smallest)
+    in_db = (smallest > 0) & np.isfinite(smallest) & ~is_signed
     floor = np.where(in_db, 1e-3 * np.where(np.isfinite(smallest), smallest, 1.0), 1.0)
     with np.errstate(invalid="ignore", divide="ignore"):
         levels = 20.0 * np.log10(np.maximum(values, floor))

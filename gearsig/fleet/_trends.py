@@ -33,7 +33,7 @@ from gearsig.fleet._statistics import (
     standardised_innovations,
 )
 from gearsig.fleet._store import SERIES
-from gearsig.formatting import counted, readable
+from gearsig.formatting import counted, moment_text, readable
 from gearsig.rig import read_toml
 
 if TYPE_CHECKING:
@@ -252,7 +252,8 @@ class PointTrends:
         """How far each value is from the expected one: in dB, or in the indicator's unit."""
         with np.errstate(invalid="ignore", divide="ignore"):
             in_db = 20.0 * np.log10(self.values / self.expected)
-        result: FloatArray = np.where(self.in_db, in_db, self.values - self.expected)
+        is_level = self.in_db & ~_is_ratio(self.series)
+        result: FloatArray = np.where(is_level, in_db, self.values - self.expected)
         return result
 
     def events(self, column: int) -> list[AlarmEvent]:
@@ -289,7 +290,9 @@ def judge(
     recordings = recordings.sort_values(["date", "added"], kind="stable").reset_index(drop=True)
     values, series = _matrix(recordings, indicators)
     baseline = _baseline(recordings, settings, stated)
-    y, in_db = decibels(values, baseline)
+    is_ratio = _is_ratio(series)
+    y, is_level = decibels(values, baseline, is_ratio | _is_signed(series))
+    in_db = is_level | is_ratio
     x, inside, normalised = regressors(*_conditions(recordings), baseline)
     rate = settings.false_alarm_rate / max(len(series), 1)
     limits, reach = _limits(y, x, baseline, in_db, rate, settings)
@@ -300,7 +303,7 @@ def judge(
         calm = np.abs(rise) <= RETURN * reach
     sample = np.where(judged, sample, -1)
     basis = [STATISTICAL if known else NONE for known in np.asarray(np.isfinite(reach).any(axis=0)).tolist()]
-    expected, low, high, alarm = _natural_limits(limits.expected, reach, in_db)
+    expected, low, high, alarm = _natural_limits(limits.expected, reach, in_db, is_level)
     zones = _zone_limits(recordings)
     is_velocity = np.asarray(series["name"] == "overall velocity", dtype=np.bool_)
     for column in np.flatnonzero(is_velocity):
@@ -351,11 +354,11 @@ def _limits(
 
 
 def _natural_limits(
-    expected: FloatArray, reach: FloatArray, in_db: BoolArray
+    expected: FloatArray, reach: FloatArray, in_db: BoolArray, is_level: BoolArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return what is expected, low, high and alarm in the indicators' units."""
-    middle, low, high = (_natural(expected + part, in_db) for part in (0.0 * reach, -reach, reach))
-    return middle, low, high, np.where(in_db, _natural(expected + np.maximum(reach, SERIOUS_DB), in_db), np.nan)
+    middle, low, high = (_natural(expected + part, is_level) for part in (0.0 * reach, -reach, reach))
+    return middle, low, high, np.where(in_db, _natural(expected + np.maximum(reach, SERIOUS_DB), is_level), np.nan)
 
 
 CONDITIONS = {"load": "load_nm", "speed": "speed_rpm"}
@@ -410,16 +413,19 @@ def over_condition(
     rows = (rows_across, rows_along) if over == "load" else (rows_along, rows_across)
     is_baseline = np.concatenate([baseline, np.zeros(n_added, dtype=np.bool_)])
     x, inside, _ = regressors(*rows, is_baseline)
-    y, in_db = decibels(value[:, None], baseline)
+    series = trends.series.iloc[[column]]
+    is_ratio = _is_ratio(series)
+    y, is_level = decibels(value[:, None], baseline, is_ratio | _is_signed(series))
+    in_db = is_level | is_ratio
     y = np.concatenate([y, np.full((n_added, 1), np.nan)])
     limits, reach = _limits(y, x, is_baseline, in_db, trends.false_alarm_rate, settings)
     reach[n : 2 * n] = reach[:n]  # each value keeps the limits of its own place
-    natural = np.hstack(_natural_limits(limits.expected, reach, in_db))
+    natural = np.hstack(_natural_limits(limits.expected, reach, in_db, is_level))
     moved = np.nan_to_num(limits.expected[n : 2 * n, 0] - limits.expected[:n, 0])
     if is_iso:  # boundaries of zones are the same at any load
         moved[:] = 0.0
         natural[:, 1], natural[:, 2:] = np.nan, [trends.high[0, column], trends.alarm[0, column]]
-    adjusted = value * 10.0 ** (moved / 20.0) if in_db[0] else value + moved
+    adjusted = value * 10.0 ** (moved / 20.0) if is_level[0] else value + moved
     _, low, high, alarm = natural[n : 2 * n].T
     with np.errstate(invalid="ignore"):
         level = np.select([adjusted > alarm, (adjusted < low) | (adjusted > high)], ["alarm", "warning"], "ok")
@@ -462,8 +468,20 @@ def _baseline(recordings: DataFrame, settings: TrendSettings, stated: Baseline |
     return first if int(first.sum()) == settings.n_baseline else np.zeros(len(healthy), dtype=np.bool_)
 
 
-def _natural(levels: FloatArray, in_db: BoolArray) -> FloatArray:
-    result: FloatArray = np.where(in_db, 10.0 ** (np.clip(levels, -6000.0, 6000.0) / 20.0), levels)
+def _is_ratio(series: DataFrame) -> BoolArray:
+    """Which series are ratios in dB already: they may be negative, and their changes are in dB all the same."""
+    result: BoolArray = (series["unit"] == "dB").to_numpy(np.bool_)
+    return result
+
+
+def _is_signed(series: DataFrame) -> BoolArray:
+    """Which other series may be negative, be they positive over a whole baseline by chance."""
+    result: BoolArray = (series["name"] == "skewness").to_numpy(np.bool_)
+    return result
+
+
+def _natural(levels: FloatArray, is_level: BoolArray) -> FloatArray:
+    result: FloatArray = np.where(is_level, 10.0 ** (np.clip(levels, -6000.0, 6000.0) / 20.0), levels)
     return result
 
 
@@ -600,7 +618,7 @@ class Trend:
 
     def __repr__(self) -> str:
         of = " ".join(part for part in (self.machine, self.point, self.place, self.channel) if part)
-        since = f", changed since {self.changed:%Y-%m-%d}" if self.changed is not None else ""
+        since = f", changed since {moment_text(self.changed)}" if self.changed is not None else ""
         state = "no limits yet" if self.basis == NONE else f"{self.level} ({self.basis} limits)"
         return f"Trend {self.name!r} of {of}: {counted(len(self.table), 'recording')}, {state}{since}"
 

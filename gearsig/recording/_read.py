@@ -8,7 +8,7 @@ import re
 import stat
 import tempfile
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from os import PathLike
@@ -27,7 +27,11 @@ from gearsig.recording._table import (
     one_condition,
     one_measurement,
     rate_of_time,
-    seconds_per_unit,
+    refuse_spectrum,
+    rises,
+    seconds_per_value,
+    time_among,
+    with_pulse_channels,
 )
 from gearsig.recording._types import (
     RPM_UNITS,
@@ -41,7 +45,17 @@ from gearsig.recording._types import (
 )
 from gearsig.recording.formats import CSV, FORMATS, FileFormat
 from gearsig.recording.formats._csv import find_layout, line_of_row, parse_rows
-from gearsig.rig import ConstantSpeed, PulseTimes, Rig, SpeedChannel, SpeedSource, check_rig, check_speed_source
+from gearsig.rig import (
+    ConstantSpeed,
+    EncoderChannel,
+    PulseTimes,
+    Rig,
+    SpeedChannel,
+    SpeedSource,
+    TachometerChannel,
+    check_rig,
+    check_speed_source,
+)
 
 
 def read_recording(
@@ -98,6 +112,8 @@ def read_recording(
         else:
             table = one_measurement(table, None, file.name)
         sha256 = sha256_of(file) if part is None else ""
+        if part is None:  # of a part, pulses may not show
+            table = with_pulse_channels(table)
         recording = assemble(table, name, sha256, rig=rig, sampling_rate_hz=sampling_rate_hz, speed=speed)
         return recording if part is None else _with_pulses_within(recording, part.start or 0)
 
@@ -241,6 +257,8 @@ def identify(path: Path) -> FileFormat:
     with path.open("rb") as file:
         head = file.read(4096)
     kind = content_kind(head)
+    if promised is None and not is_ending(endings[-1]):
+        promised = next((f for f in FORMATS if f.sniff(head) == kind), None)
     if promised is None:
         raise InputError(
             f"extension {path.suffix or '(none)'!r} is not known; the content looks like {kind}",
@@ -261,6 +279,17 @@ def identify(path: Path) -> FileFormat:
         allowed=f"content that fits {path.suffix or 'the extension'}",
         remedy=hint,
     )
+
+
+def is_ending(suffix: str) -> bool:
+    """Whether a suffix says of what format a file is: digits, as of a name that is a date, say nothing.
+
+    Examples
+    --------
+    >>> is_ending(".csv"), is_ending(Path("2004.02.12.10.32.39").suffix), is_ending("")
+    (True, False, False)
+    """
+    return not suffix[1:].isdigit() and suffix != ""
 
 
 def _columns_hint(file: Path) -> str:
@@ -498,6 +527,8 @@ def assemble(
         Channel(c.name, c.quantity or quantity_of(c.name, c.unit), c.unit, c.position) for c in table.columns
     )
     speed, speed_warnings = _speed(table, channels, rig, speed)
+    if speed is None and not table.is_own_layout and (rig is None or rig.speed is None):
+        speed_warnings = (*speed_warnings, *_unused_pulses(table, channels))
     recording = Recording(
         _stack(table, source),
         rate_hz,
@@ -507,7 +538,19 @@ def assemble(
         truth=table.truth,
         warnings=(*table.warnings, *rate_warnings, *speed_warnings),
     )
-    return recording if rig is None else recording.with_rig(rig)
+    recording = recording if rig is None else recording.with_rig(rig)
+    return recording if table.is_own_layout else _with_quantity_of_speed(recording)
+
+
+def _with_quantity_of_speed(recording: Recording) -> Recording:
+    """Return the recording with the quantity of the channel that tells the speed, where nothing else tells it."""
+    quantities = {TachometerChannel: "tachometer", EncoderChannel: "encoder", SpeedChannel: "rotational_speed"}
+    source = recording.speed_source
+    quantity, name = quantities.get(type(source), ""), getattr(source, "channel", "")
+    if not quantity or all((c.name, c.quantity) != (name, "unknown") for c in recording.channels):
+        return recording
+    channels = tuple(replace(c, quantity=quantity) if c.name == name else c for c in recording.channels)
+    return replace(recording, channels=channels)
 
 
 def _checked(table: RawTable, source: str) -> RawTable:
@@ -522,7 +565,7 @@ def _checked(table: RawTable, source: str) -> RawTable:
             remedy="rename the columns",
         )
     if table.time is None and not table.is_own_layout:
-        time = next((c for c in table.columns if seconds_per_unit(c.name, c.unit) is not None), None)
+        time = time_among(table.columns) or _time_of_rate(table)
         if time is not None and len(table.columns) == 1:
             raise InputError(
                 f"the only column, {time.name!r}, is a time",
@@ -532,6 +575,8 @@ def _checked(table: RawTable, source: str) -> RawTable:
             )
         if time is not None:
             table = replace(table, columns=tuple(c for c in table.columns if c is not time), time=time)
+        elif table.sampling_rate_hz is None:
+            refuse_spectrum(where=source, columns=table.columns)
     if not 0 < len(table.columns) <= 4096:
         raise InputError(
             f"{len(table.columns)} channels were found",
@@ -565,6 +610,16 @@ def _checked(table: RawTable, source: str) -> RawTable:
     return table
 
 
+def _time_of_rate(table: RawTable) -> RawColumn | None:
+    """Return a first column, whatever it is called, that rises by the sampling interval that is stated."""
+    first, rate_hz = table.columns[0], table.sampling_rate_hz
+    if len(table.columns) < 2 or rate_hz is None or first.unit or not rises(first.values):
+        return None
+    steps = np.diff(first.values.astype(np.float64))
+    is_even = abs(float(steps.mean()) * rate_hz - 1.0) < 1e-3
+    return first if is_even and np.ptp(steps) <= 0.5 * steps.mean() else None
+
+
 def _sampling_rate(
     table: RawTable, source: str, rig: Rig | None, explicit_hz: float | None
 ) -> tuple[float, tuple[str, ...]]:
@@ -576,7 +631,7 @@ def _sampling_rate(
     file_hz, timed_hz, of_time = table.sampling_rate_hz, None, tuple[str, ...]()
     rig_hz = None if rig is None else rig.sampling_rate_hz
     if table.time is not None:
-        scale_s = seconds_per_unit(table.time.name, table.time.unit) or 1.0
+        scale_s = seconds_per_value(table.time)
         where = f"{source}, column {table.time.name!r}"
         timed_hz, of_time = rate_of_time(table.time.values, scale_s, where, table.row_place)
     if file_hz is None:
@@ -652,21 +707,33 @@ def _speed(
         return (table.speed, ()) if speed is None else (speed, _contradicted(speed, table, rig))
     known = None if rig is None else rig.speed
     measured = known is not None and not isinstance(known, ConstantSpeed)
-    if table.speed is not None and not isinstance(table.speed, ConstantSpeed):
-        return table.speed, ()
+    given = table.speed
+    if isinstance(known, TachometerChannel) and known.channel in table.pulse_times_s:
+        given = PulseTimes(table.pulse_times_s[known.channel], known.pulses_per_revolution, known.shaft)
+    if given is not None and not isinstance(given, ConstantSpeed):
+        return given, ()
     in_rpm = [c for c in channels if c.quantity == "rotational_speed" and c.unit.casefold() in RPM_UNITS]
     if known is None and len(in_rpm) == 1:
         name = in_rpm[0].name
         return SpeedChannel(name), (f"channel {name!r} is in {in_rpm[0].unit} and was taken as the shaft speed",)
-    if table.speed is None or measured:
+    if given is None or measured:
         return None, ()
-    of_file = table.speed.speed_rpm
+    of_file = given.speed_rpm
     text = f"the file states {of_file:g} rpm, which was taken as the speed of the reference shaft"
     if isinstance(known, ConstantSpeed):
         if abs(of_file - known.speed_rpm) <= 1e-3 * of_file:
             return None, ()
         text = f"the rig states a speed of {known.speed_rpm:g} rpm, the file {of_file:g} rpm: the file's was taken"
     return ConstantSpeed(of_file, known.shaft if known is not None else ""), (text,)
+
+
+def _unused_pulses(table: RawTable, channels: tuple[Channel, ...]) -> Iterator[str]:
+    """Say how the speed is taken from pulses that no rig file names: how many make a revolution is not known."""
+    for name in (*table.pulse_times_s, *(c.name for c in channels if c.quantity == "tachometer")):
+        yield (
+            f'{name!r} holds pulses, as of a tachometer: [speed] with source = "tachometer", channel = "{name}" and '
+            "pulses_per_revolution = … in a rig file takes the speed from them"
+        )
 
 
 def _contradicted(given: SpeedSource, table: RawTable, rig: Rig | None) -> tuple[str, ...]:

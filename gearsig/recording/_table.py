@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import PurePath
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,15 @@ from numpy.typing import NDArray
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
 from gearsig.formatting import counted
-from gearsig.recording._types import INTERVAL_NAMES, RATE_NAMES, SECONDS_PER_UNIT, SPEED_NAMES, plain_name
+from gearsig.recording._types import (
+    INTERVAL_NAMES,
+    RATE_NAMES,
+    RPM_UNITS,
+    SECONDS_PER_UNIT,
+    SPEED_NAMES,
+    plain_name,
+    quantity_of,
+)
 from gearsig.rig import ConstantSpeed, SpeedSource
 
 NumberArray = NDArray[Any]
@@ -63,6 +72,8 @@ class RawTable:
     speed : SpeedSource or None
     speeds_rpm : mapping
         Speeds that the file states, by name; more than one where it holds several measurements.
+    pulse_times_s : mapping
+        Times of pulses that stand beside the signals, by name.
     truth : mapping or None
     history : tuple of str
         Processing steps that were done before the file was written.
@@ -78,6 +89,7 @@ class RawTable:
     warnings: tuple[str, ...] = ()
     speed: SpeedSource | None = None
     speeds_rpm: Mapping[str, float] = field(default_factory=dict)
+    pulse_times_s: Mapping[str, FloatArray] = field(default_factory=dict)
     truth: Mapping[str, Any] | None = None
     history: tuple[str, ...] = ()
     row_place: Callable[[int], str] = sample_place
@@ -106,8 +118,71 @@ def seconds_per_unit(name: str, unit: str) -> float | None:
     return SECONDS_PER_UNIT.get(unit.strip().casefold() or (suffix if suffix in SECONDS_PER_UNIT else ""))
 
 
-def without_clock(columns: list[RawColumn]) -> tuple[list[RawColumn], RawColumn | None, list[str]]:
-    """Take a first column that has no name of its own, and is a clock, away from the channels.
+def time_among(columns: Sequence[RawColumn]) -> RawColumn | None:
+    """Return the column that its name makes the time, or the first one if it rises and its unit is one of time."""
+    named = next((c for c in columns if seconds_per_unit(c.name, c.unit) is not None), None)
+    if named is not None or len(columns) < 2:
+        return named
+    in_time_unit = columns[0].unit.strip().casefold() in SECONDS_PER_UNIT.keys() - {""}
+    return columns[0] if in_time_unit and rises(columns[0].values) else None
+
+
+def seconds_per_value(time: RawColumn) -> float:
+    """Return the factor to seconds of a column that is the time."""
+    return seconds_per_unit(time.name, time.unit) or SECONDS_PER_UNIT.get(time.unit.strip().casefold(), 1.0)
+
+
+def rises(values: NumberArray) -> bool:
+    """Whether numbers never fall and end above their beginning."""
+    is_long = values.dtype.kind in "fiu" and values.ndim == 1 and len(values) > 2
+    return is_long and bool(values[-1] > values[0]) and bool(np.all(values[1:] >= values[:-1]))
+
+
+_FREQUENCY_NAME = re.compile(r"(?:freq|fréq|frek|order|ordnung|ordre|band|cpm|k?hz)", re.IGNORECASE)
+_FREQUENCY_UNITS = ("hz", "khz", "cpm", "kcpm", "order", "orders", "ord")
+
+
+def refuse_spectrum(lines: Iterable[str] = (), where: str = "", columns: Sequence[RawColumn] = ()) -> None:
+    """Raise where an axis is one of frequency or order: by the lines above a table, or by a column that rises.
+
+    Raises
+    ------
+    InputError
+    """
+    axis = ""
+    for line in lines:
+        label, *words = (word.strip().casefold() for word in re.split(r"[:=;,\t]+", line.strip()))
+        is_frequency = any(word in _FREQUENCY_UNITS or _FREQUENCY_NAME.match(word) for word in words)
+        if plain_name(label) in ("xunit", "xaxisunit", "xdimension", "xunitlabel") and is_frequency:
+            axis = " ".join(line.split())[:60]
+    for column in columns[:1]:  # a frequency that stands later is rather that of a drive
+        named = _FREQUENCY_NAME.match(column.name) or column.unit.strip().casefold() in _FREQUENCY_UNITS
+        if named and rises(column.values) and bool(np.all(np.diff(column.values) > 0)):
+            axis = f"{column.name} ({column.unit})" if column.unit else column.name
+    if axis:
+        raise InputError(
+            f"holds a spectrum, no signal over time: its axis is {axis!r}",
+            where=where,
+            allowed="the waveform, sample by sample",
+            remedy="export the time waveform that the spectrum was computed from",
+        )
+
+
+def counts_rows(name: str) -> bool:
+    """Whether the header of a column is one of those that count the rows, or none."""
+    return plain_name(name) in ("", "index", "sample", "samples", "no", "nr", "#")
+
+
+def without_clock(
+    columns: list[RawColumn], *, is_named: bool = False
+) -> tuple[list[RawColumn], RawColumn | None, list[str]]:
+    """Take first columns that have no name of their own, and are a clock, away from the channels.
+
+    Parameters
+    ----------
+    columns : list of RawColumn
+    is_named : bool
+        Whether the first column has a name: then only a clock of hours, minutes, seconds and a fraction is looked for.
 
     Returns
     -------
@@ -117,19 +192,84 @@ def without_clock(columns: list[RawColumn]) -> tuple[list[RawColumn], RawColumn 
     """
     if len(columns) < 2 or len(columns[0].values) < 3:
         return columns, None, []
+    if (time := _clock_of_parts(columns)) is not None:
+        return columns[4:], time, ["columns 1 to 4 are hour, minute, second and its fraction: taken for the time"]
     first = columns[0]
-    if first.values.dtype.kind not in "fiu":
+    if first.values.dtype.kind not in "fiu" or is_named:
         return columns, None, []
     steps = np.diff(first.values.astype(np.float64))
     if first.values[0] in (0, 1) and bool(np.all(steps == 1)):
-        return columns[1:], None, [f"column 1 ({first.name!r}) only counts the rows and was left out"]
+        others, time, notes = without_clock(columns[1:])
+        return others, time, [f"column 1 ({first.name!r}) only counts the rows and was left out", *notes]
     if steps.min() > 0 and np.ptp(steps) <= 0.02 * steps.mean():
-        note = "column 1 has no name of its own, increases uniformly and was taken for the time in seconds"
+        amplitudes = [bool(np.all(c.values >= 0)) and not rises(c.values) for c in columns[1:]]
+        if steps.mean() > 0.05 and all(amplitudes):
+            raise InputError(
+                f"looks like a spectrum: {first.name!r} rises in steps of {steps.mean():.4g}, and no value is negative",
+                allowed="the waveform, sample by sample",
+                remedy="export the time waveform; if column 1 is the time, say so in a header: time [s]",
+            )
+        note = f"{first.name!r} has no name of its own, increases uniformly and was taken for the time in seconds"
         return columns[1:], RawColumn("time", first.values, "s"), [note]
     return columns, None, []
 
 
+def _clock_of_parts(columns: Sequence[RawColumn]) -> RawColumn | None:
+    """Return the time of day in seconds from columns of hour, minute, second and fraction of a second, if these are.
+
+    The fraction is in the unit in which the whole rises evenly, to half a step: microseconds, milliseconds, hundredths
+    or tenths. It is handed over as an even grid, since such clocks are rounded.
+    """
+    if len(columns) < 5 or any(c.values.dtype.kind not in "fiu" for c in columns[:4]):
+        return None
+    hour, minute, second, fraction = (c.values.astype(np.float64) for c in columns[:4])
+    whole = all(np.array_equal(v, np.floor(v)) and v.min() >= 0 for v in (hour, minute, second, fraction))
+    if not whole or hour.max() > 23 or minute.max() > 59 or second.max() > 59:
+        return None
+    k = np.arange(len(hour)) - (len(hour) - 1) / 2
+    for per_second in (1e6, 1e3, 1e2, 1e1):
+        t = 3600 * hour + 60 * minute + second + fraction / per_second
+        step = float(k @ t) / float(k @ k)
+        grid = t.mean() + k * step
+        if fraction.max() < per_second and step > 0 and np.abs(t - grid).max() < 0.5 * step:
+            return RawColumn("time", grid, "s")
+    return None
+
+
+def with_pulse_channels(table: RawTable) -> RawTable:
+    """Return the table with channels of no known quantity that hold pulses as tachometers."""
+    if table.is_own_layout:
+        return table
+    columns = tuple(replace(c, quantity="tachometer") if _is_pulse_train(c) else c for c in table.columns)
+    return replace(table, columns=columns)
+
+
+def _is_pulse_train(column: RawColumn) -> bool:
+    """Whether a channel of no known quantity stays at two levels, and goes from one to the other again and again.
+
+    A tenth of the samples at most is on the way, and of those that left a level most are at the other: neither impacts,
+    which fade, nor clipped vibration is like that.
+    """
+    quantity = column.quantity or quantity_of(column.name, column.unit)
+    if quantity not in ("unknown", "voltage") or column.values.dtype.kind not in "fiu" or column.values.ndim != 1:
+        return False
+    some = column.values[:: max(1, len(column.values) // 200_000)].astype(np.float64)
+    if len(some) < 100 or not np.all(np.isfinite(some)):
+        return False
+    low, high = np.percentile(some, (0.05, 99.95))
+    if not high > low:
+        return False
+    near = 0.25 * (high - low)
+    lower, upper = int(np.count_nonzero(some < low + near)), int(np.count_nonzero(some > high - near))
+    if min(lower, upper) < 3 or len(some) - lower - upper > min(0.1 * len(some), 0.7 * lower, 0.7 * upper):
+        return False
+    is_high = column.values > low + 0.5 * (high - low)
+    return int(np.count_nonzero(is_high[1:] & ~is_high[:-1])) >= 3
+
+
 N_COHERENCE_SEGMENTS = 64
+N_COMPARED = 8
+"""Columns of which each pair is compared; a matrix without a time that has more of them is rather one of runs."""
 
 
 def ask_whether_runs(columns: list[RawColumn], where: str) -> list[str]:
@@ -140,18 +280,18 @@ def ask_whether_runs(columns: list[RawColumn], where: str) -> list[str]:
 
     .. math:: P(\hat\gamma^2 > c) = (1 - c)^{n - 1}.
 
-    Columns share no noise if in every pair less than half of the spectrum is coherent at 5 %.
+    Columns share no noise if in every pair of the first eight less than half of the spectrum is coherent at 5 %.
 
     Source: J. S. Bendat, A. G. Piersol, *Random Data*, 4th ed., ch. 9.
     """
     from scipy.signal import coherence
 
     n_samples = min(len(c.values) for c in columns)
-    if len(columns) < 2 or n_samples < 64 * N_COHERENCE_SEGMENTS:
+    if len(columns) < 2 or n_samples < 32 * N_COHERENCE_SEGMENTS:
         return []
     chance = 1.0 - 0.05 ** (1.0 / (N_COHERENCE_SEGMENTS - 1))
     length = n_samples // N_COHERENCE_SEGMENTS
-    for i, a in enumerate(columns):
+    for i, a in enumerate(columns[:N_COMPARED]):
         for b in columns[:i]:
             _, gamma2 = coherence(a.values[:n_samples], b.values[:n_samples], nperseg=length, noverlap=0)
             if not float(np.median(gamma2[2:-1])) < chance:
@@ -398,7 +538,7 @@ class NamedArrays:
     units : mapping of str to str
         Units of arrays where the file states them.
     rates_hz : mapping of str to float
-        Sampling rates that are stated for an array.
+        Sampling rates that are stated for an array, by its path; for all, by "".
     warnings : tuple of str
     """
 
@@ -413,12 +553,14 @@ def table_from_arrays(arrays: NamedArrays, reader: str, where: str) -> RawTable:
     """Return the table of a file of named arrays.
 
     Arrays with one element are settings; among them the sampling rate is known by its name. Vectors are channels, and
-    a matrix is one channel per column or row, whichever are fewer. Vectors much shorter than the longest are left out.
+    a matrix is one channel per column or row, whichever are fewer. Vectors much shorter than the longest are left out,
+    and so are signals at lower rates than the highest, but for speeds in rpm, which are interpolated. Times of
+    tachometer pulses are kept for a rig file that names them.
 
     Raises
     ------
     InputError
-        If no array is a signal, or the file states two sampling rates.
+        If no array is a signal, or the file states two sampling rates without saying of what.
     """
     scalars = {path: a for path, a in arrays.arrays.items() if a.size == 1}
     signals = {path: a for path, a in arrays.arrays.items() if a.size > 1 and a.ndim <= 2 and a.dtype.kind in "fiubc"}
@@ -430,13 +572,19 @@ def table_from_arrays(arrays: NamedArrays, reader: str, where: str) -> RawTable:
             allowed="vectors or matrices of numbers",
             remedy="save the signals as plain arrays (no tables or objects)",
         )
-    rate_hz = _one_rate(scalars, arrays.rates_hz, where)
+    rate_hz = _one_rate(scalars, arrays.rates_hz.get(""), where)
+    rates_hz, clocks = _rates_of_clocks(signals)
+    signals = {path: a for path, a in signals.items() if path not in clocks}
+    signals, rate_hz, notes = _at_highest_rate(signals, rates_hz | dict(arrays.rates_hz), rate_hz, arrays)
     longest = max(max(a.shape) for a in signals.values())
     short = [path for path, a in signals.items() if max(a.shape) < 0.1 * longest]  # a setting or a result
-    clocks = [path for path, a in signals.items() if path not in short and _is_clock(path, a)]
+    pulses = {
+        path.rpartition(".")[2]: signals[path].reshape(-1) for path in short if _is_pulse_times(path, signals[path])
+    }
+    clocks += [path for path, a in signals.items() if path not in short and _is_clock(path, a)]
     time: RawColumn | None = None
     columns: list[RawColumn] = []
-    warnings = list(arrays.warnings)
+    warnings = [*arrays.warnings, *notes]
     for path, array in signals.items():
         if path in short or path in clocks:
             continue
@@ -445,20 +593,21 @@ def table_from_arrays(arrays: NamedArrays, reader: str, where: str) -> RawTable:
             of_array, time, notes = without_clock(of_array)
             warnings += notes
             if notes:
-                of_array = [replace(c, name=f"{path}_{i}") for i, c in enumerate(of_array, 1)]
-            if time is not None:
+                of_array = [replace(c, name=_column_name(path, i, where)) for i, c in enumerate(of_array, 1)]
+            if time is not None or len(of_array) > N_COMPARED:
                 warnings += ask_whether_runs(of_array, where)
         columns += of_array
     if clocks and rate_hz is None:
         time = RawColumn("time", signals[clocks[0]].reshape(-1), "s")
     if clocks:
-        warnings.append(f"taken for times and not for channels: {', '.join(clocks[:8])}")
+        leaves = list(dict.fromkeys(path.rpartition(".")[2] for path in clocks))
+        warnings.append(f"taken for times and not for channels: {', '.join(leaves[:8])}")
     # A channel is called by the last part of its path where that is unique.
     leaves = [c.name.rpartition(".")[2] for c in columns]
     columns = [replace(c, name=leaf) if leaves.count(leaf) == 1 else c for c, leaf in zip(columns, leaves, strict=True)]
     speeds_rpm, speed, hints = _stated_speed(scalars)
     warnings += hints
-    if short:
+    if short := [path for path in short if path.rpartition(".")[2] not in pulses]:
         warnings.append(f"shorter than a tenth of the longest signal and left out: {', '.join(short[:8])}")
     return RawTable(
         tuple(columns),
@@ -468,7 +617,52 @@ def table_from_arrays(arrays: NamedArrays, reader: str, where: str) -> RawTable:
         warnings=tuple(warnings),
         speed=speed,
         speeds_rpm=speeds_rpm,
+        pulse_times_s=pulses,
     )
+
+
+def _rates_of_clocks(signals: Mapping[str, NumberArray]) -> tuple[dict[str, float], list[str]]:
+    """Return the sampling rates of signals by the times of their length, where several times are there, and these."""
+    times = [path for path, a in signals.items() if seconds_per_unit(path.rpartition(".")[2], "") is not None]
+    rates: dict[int, float] = {}
+    for path in times:
+        t = signals[path].reshape(-1)
+        if rises(t):
+            rates[len(t)] = (len(t) - 1) / float(t[-1] - t[0])
+    if len(rates) < 2:
+        return {}, []
+    of_length = {path: max(a.shape) for path, a in signals.items() if path not in times}
+    return {path: rates[n] for path, n in of_length.items() if n in rates}, times
+
+
+def _at_highest_rate(
+    signals: dict[str, NumberArray], rates_hz: Mapping[str, float], rate_hz: float | None, arrays: NamedArrays
+) -> tuple[dict[str, NumberArray], float | None, list[str]]:
+    """Leave out signals whose rate is lower than the highest that is stated for one; interpolate a speed in rpm."""
+    if rates_hz.keys().isdisjoint(signals):
+        return signals, rate_hz, []
+    stated = {path: hz for path in signals if (hz := rates_hz.get(path, rate_hz)) is not None}
+    highest = max(stated.values())
+    slower = {path: hz for path, hz in stated.items() if hz < (1 - 1e-3) * highest}
+    n = max(max(a.shape) for path, a in signals.items() if path not in slower)
+    kept = {path: a for path, a in signals.items() if path not in slower}
+    for path, hz in slower.items():
+        values = signals[path].reshape(-1)
+        if _unit(path, arrays).casefold() in RPM_UNITS and abs(len(values) / hz - n / highest) <= 2 / hz:
+            kept[path] = np.interp(np.arange(n) / highest, np.arange(len(values)) / hz, values)
+    names = {path: path.rpartition(".")[2] for path in slower}
+    left_out = [name for path, name in names.items() if path not in kept]
+    interpolated = [name for path, name in names.items() if path in kept]
+    notes = [f"sampled slower than {highest:.6g} Hz and left out: {', '.join(left_out[:8])}"] if left_out else []
+    notes += [f"sampled slower and interpolated to {highest:.6g} Hz: {', '.join(interpolated)}"] if interpolated else []
+    return kept, highest, notes
+
+
+def _is_pulse_times(path: str, array: NumberArray) -> bool:
+    """Whether a vector is called a tachometer and rises from each value to the next: times, no samples."""
+    is_vector = 1 in array.shape or array.ndim == 1
+    named = re.match(r"tach|keyphas", path.rpartition(".")[2], re.IGNORECASE) is not None
+    return named and is_vector and array.dtype.kind in "fiu" and bool(np.all(np.diff(array.reshape(-1)) > 0))
 
 
 def _is_clock(path: str, array: NumberArray) -> bool:
@@ -483,10 +677,15 @@ def _is_clock(path: str, array: NumberArray) -> bool:
     return named and bool(np.all(np.diff(array.reshape(-1)) > 0))
 
 
+def _unit(path: str, arrays: NamedArrays) -> str:
+    return arrays.units.get(path, "") or arrays.texts.get(f"{path.rpartition('.')[0]}.unit".lstrip("."), "")
+
+
 def _columns(path: str, array: NumberArray, arrays: NamedArrays, where: str) -> list[RawColumn]:
-    unit = arrays.units.get(path, "") or arrays.texts.get(f"{path.rpartition('.')[0]}.unit".lstrip("."), "")
+    unit = _unit(path, arrays)
     if 1 in array.shape or array.ndim == 1:
-        return [RawColumn(path, array.reshape(-1), unit)]
+        name = path if path != PurePath(where).stem else _column_name(path, 1, where)
+        return [RawColumn(name, array.reshape(-1), unit)]
     over_time = array if array.shape[0] < array.shape[1] else array.T
     if len(over_time) > 0.5 * over_time.shape[1]:
         raise InputError(
@@ -495,12 +694,17 @@ def _columns(path: str, array: NumberArray, arrays: NamedArrays, where: str) -> 
             allowed="a matrix with many more samples than channels",
             remedy="save each channel as a vector",
         )
-    return [RawColumn(f"{path}_{i + 1}", row, unit) for i, row in enumerate(over_time)]
+    return [RawColumn(_column_name(path, i, where), row, unit) for i, row in enumerate(over_time, 1)]
 
 
-def _one_rate(scalars: Mapping[str, NumberArray], stated_hz: Mapping[str, float], where: str) -> float | None:
-    """Return the sampling rate from the scalars whose name says so; rates go before intervals."""
-    rates = {path: float(hz) for path, hz in stated_hz.items()}
+def _column_name(path: str, number: int, where: str) -> str:
+    """Name a column of a matrix; one that is called as its file would be called otherwise in each recording."""
+    return f"ch{number}" if path == PurePath(where).stem else f"{path}_{number}"
+
+
+def _one_rate(scalars: Mapping[str, NumberArray], stated_hz: float | None, where: str) -> float | None:
+    """Return the sampling rate that is stated, or from the scalars whose name says so; rates go before intervals."""
+    rates = {} if stated_hz is None else {"the file": stated_hz}
     intervals: dict[str, float] = {}
     for path, array in scalars.items():
         if array.dtype.kind not in "fiu":

@@ -43,7 +43,7 @@ RATE_NAMES = frozenset(
 """Names of sampling rates in Hz, lower case, without spaces and underscores."""
 INTERVAL_NAMES = frozenset(
     (
-        *("dt", "dts", "ts", "deltat", "xinc", "wfincrement", "tsample"),
+        *("dt", "dts", "ts", "deltat", "deltax", "xinc", "xaxisdelta", "wfincrement", "tsample"),
         *("sampleinterval", "samplinginterval", "samplingperiod"),
     )
 )
@@ -80,6 +80,7 @@ SI_FACTORS: dict[str, dict[str, float]] = {
         "g": _G,
         "gn": _G,
         "g_n": _G,
+        "g-s": _G,
         "mg": 1e-3 * _G,
     },
     "velocity": {"m/s": 1.0, "mm/s": 1e-3, "µm/s": 1e-6, "in/s": _INCH, "ips": _INCH},
@@ -93,14 +94,17 @@ SI_FACTORS: dict[str, dict[str, float]] = {
     "angular_acceleration": {"rad/s²": 1.0},
     "temperature": {"°C": 1.0, "degC": 1.0},  # of differences: the zero is not the kelvin's
     "voltage": {"V": 1.0, "mV": 1e-3},
+    "current": {"A": 1.0, "mA": 1e-3},
 }
 """Quantity → unit → what a value is multiplied by to be in the SI unit, of every unit that is known here.
 
 In one spelling each; `si_factor` finds the others ("m/s^2", "m/s**2", "Nm")."""
 
 # Texts of files may be made to be slow to match: quantifiers are possessive, and what stands about is stripped.
-_RATE_SIGN = re.compile(r"[=:;,\t]")
-_RATE = re.compile(r"(?P<value>[-+]?(?:\d++\.?\d*+|\.\d++)(?:e[-+]?\d++)?)\s*+(?P<unit>k?hz)?", re.IGNORECASE)
+_SIGN = re.compile(r"[=:;,\t]")
+_QUANTITY = re.compile(
+    r"(?P<value>[-+]?(?:\d++[.,]?\d*+|[.,]\d++)(?:e[-+]?\d++)?)\s*+(?P<unit>[a-zµμ]++)?", re.IGNORECASE
+)
 _BRACKETS = {"]": "[", ")": "("}
 _AXIS = re.compile(r"^[XYZ]:\s*(?=\S)", re.IGNORECASE)
 
@@ -151,21 +155,47 @@ def split_unit(header: str) -> tuple[str, str]:
 
 
 def rate_in_line(line: str) -> float | None:
-    """Return the sampling rate that a line of text states, in Hz.
+    """Return the sampling rate that a line of text states, in Hz, once or for each channel alike.
 
     Examples
     --------
     >>> rate_in_line("# fs = 25600"), rate_in_line("Sampling rate [Hz];25.6e3"), rate_in_line("# run 5: good")
     (25600.0, 25600.0, None)
+    >>> rate_in_line("fs: 25,6 kHz"), rate_in_line("fs,1024,1024"), rate_in_line("fs: 25,600 Hz")
+    (25600.0, 1024.0, None)
     """
+    value, unit = _in_line(line, RATE_NAMES)
+    return None if value is None or unit not in ("", "hz", "khz") else value * (1e3 if unit == "khz" else 1.0)
+
+
+def interval_in_line(line: str) -> float | None:
+    """Return the sampling interval that a line of text states, in seconds.
+
+    Examples
+    --------
+    >>> interval_in_line("Delta_X;1,0E-3;1,0E-3;"), interval_in_line("dt = 0.5 ms"), interval_in_line("dt = 1 Hz")
+    (0.001, 0.0005, None)
+    """
+    value, unit = _in_line(line, INTERVAL_NAMES)
+    return None if value is None or unit not in SECONDS_PER_UNIT else value * SECONDS_PER_UNIT[unit]
+
+
+def _in_line(line: str, names: frozenset[str]) -> tuple[float | None, str]:
+    """Return the number, and its unit in lower case, that a line states for one of some names."""
     line = line.lstrip("#%/; \t\r\n\f\v").rstrip("; ,\t\r\n\f\v")
-    sign = _RATE_SIGN.search(line)
-    if sign is None or re.sub(r"[\[(]hz[\])]$", "", plain_name(line[: sign.start()])) not in RATE_NAMES:
-        return None
-    match = _RATE.fullmatch(line[sign.start() :].lstrip("=:;, \t"))
-    if match is None:
-        return None
-    return float(match["value"]) * (1e3 if (match["unit"] or "").casefold() == "khz" else 1.0)
+    sign = _SIGN.search(line)
+    if sign is None:
+        return None, ""
+    label, _, unit = line[: sign.start()].rstrip().replace("(", "[").partition("[")
+    if plain_name(label) not in names:
+        return None, ""
+    rest = line[sign.start() :].lstrip("=:;, \t")
+    for separator in (",", "\t", ";"):  # of channels; a comma may be a decimal sign
+        fields = {field.strip().removeprefix(label.strip()).lstrip("=: ") for field in rest.split(separator)} - {""}
+        match = _QUANTITY.fullmatch(fields.pop()) if len(fields) == 1 else None
+        if match is not None and not re.fullmatch(r"[1-9]\d{0,2},\d{3}", match["value"]):  # of thousands, or a decimal
+            return float(match["value"].replace(",", ".")), (match["unit"] or unit.strip("]) ")).casefold()
+    return None, ""
 
 
 def is_unit(text: str) -> bool:
@@ -226,15 +256,22 @@ def quantity_of(name: str, unit: str) -> str:
 
     Examples
     --------
-    >>> quantity_of("a1", "m/s^2"), quantity_of("Tacho", "V"), quantity_of("a1", "")
-    ('acceleration', 'tachometer', 'unknown')
+    >>> quantity_of("a1", "m/s^2"), quantity_of("Tacho", "V"), quantity_of("a1", ""), quantity_of("phase_current_1", "")
+    ('acceleration', 'tachometer', 'unknown', 'current')
     """
     quantity = _QUANTITY_OF_UNIT.get(_plain_unit(unit), "unknown")
     if quantity in ("unknown", "voltage") and re.match(r"tach|keyphas", name.strip().casefold()):
         return "tachometer"
     if quantity == "unknown" and plain_name(name) in ("rpm", "speedrpm"):
         return "rotational_speed"
+    if quantity == "unknown" and (match := _TELLING_NAME.search(name.casefold())) is not None:
+        return next(of_name for of_name, word in match.groupdict().items() if word)
     return quantity
+
+
+_TELLING_NAME = re.compile(
+    r"(?<![^\W\d_])(?:(?P<torque>torque|drehmoment)|(?P<temperature>temp(?:eratur|erature)?)|(?P<current>(?<!eddy.)current|strom))(?![^\W\d_])"
+)
 
 
 VIBRATION_QUANTITIES = frozenset(

@@ -12,7 +12,7 @@ from gearsig import __version__
 from gearsig.cache import write_text
 from gearsig.errors import InputError
 from gearsig.fleet import AlarmChange, Fleet, FleetChanges, change_text, counts_text, fleet_changes, trends_text
-from gearsig.formatting import readable, unit_text
+from gearsig.formatting import moment_text, readable, unit_text
 from gearsig.plot import Picture, fleet_trend_picture
 from gearsig.report._files import compiled, date_text, put_picture, render, write_pdf
 
@@ -183,8 +183,8 @@ def _row(change: AlarmChange) -> AlarmRow:
         readable(change.expected, 4),
         readable(change.upper_limit, 4),
         change_text(change.change, in_db=change.in_db),
-        f"{change.raised:%Y-%m-%d}",
-        f"{change.cleared:%Y-%m-%d}" if change.cleared is not None else "",
+        moment_text(change.raised),
+        moment_text(change.cleared) if change.cleared is not None else "",
         change.basis,
     )
 
@@ -194,7 +194,7 @@ def _shift(row: Mapping[Any, Any]) -> dict[str, str]:
         "machine": " · ".join(part for part in (row["machine"], row["point"]) if part),
         "name": row["name"],
         "of": ", ".join(part for part in (row["place"], row["channel"], row["computed_on"]) if part),
-        "since": f"{row['changed']:%Y-%m-%d}",
+        "since": moment_text(row["changed"]),
         "by": change_text(row["changed_by"], in_db=bool(row["in_db"])),
     }
 

@@ -249,6 +249,7 @@ QUANTITIES = (
     "angular_acceleration",
     "temperature",
     "voltage",
+    "current",
     "unknown",
 )
 """What a channel may measure."""

@@ -239,6 +239,11 @@ def test_other_folders_are_not_taken_for_a_store(tmp_path):
         ("{machine}/{point}_{date:%Y%m%d}.csv", "/d/p 1/DE_20260131.csv", ("p 1", "DE", datetime(2026, 1, 31))),
         ("{machine}/**/{point}-{date:%d.%m.%y}*", "/d/m/x/y/NDE-03.02.26_a.h5", ("m", "NDE", datetime(2026, 2, 3))),
         ("{machine}_{}_{date:%Y%m%d}.csv", "/d/m_test_20260131.csv", ("m", None, datetime(2026, 1, 31))),
+        (
+            "{machine}/{date:%Y.%m.%d.%H.%M.%S}",
+            "/d/m/2026.01.31.14.05.12",
+            ("m", None, datetime(2026, 1, 31, 14, 5, 12)),
+        ),
     ],
 )
 def test_patterns_name_machine_point_and_date(pattern, path, found):
@@ -247,7 +252,27 @@ def test_patterns_name_machine_point_and_date(pattern, path, found):
     assert (match["machine"], match.get("point"), match["date"]) == found
 
 
-@pytest.mark.parametrize("pattern", ["{mashine}/x", "{date}.csv", "{date:%Q}", "{point}{point}", "{machine:%Y}", "{a"])
+def test_running_numbers_are_times_apart_and_names_that_are_dates_need_no_ending(tmp_path):
+    for name in ("m/1.csv", "m/2.csv", "m/10.csv", "k/2026.01.31.14.05.12", "k/README", "k/2026.01.31.pdf"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text("1\n2\n")
+    found = origins([tmp_path / "m"], pattern="{number:10min}.csv", date=datetime(2026, 1, 1))
+    assert sorted((o.path.name, o.date) for o in found) == [
+        ("1.csv", datetime(2026, 1, 1, 0, 10)),
+        ("10.csv", datetime(2026, 1, 1, 1, 40)),
+        ("2.csv", datetime(2026, 1, 1, 0, 20)),
+    ]
+    (named,) = origins([tmp_path / "k"])
+    assert (named.date, named.date_from) == (datetime(2026, 1, 31, 14, 5, 12), "file name")
+
+
+@pytest.mark.parametrize(
+    "pattern",
+    [
+        *("{mashine}/x", "{date}.csv", "{date:%Q}", "{point}{point}", "{machine:%Y}", "{a"),
+        *("{number}", "{number:0s}", "{number:10 apples}", "{number:1s}{date:%Y}"),
+    ],
+)
 def test_what_is_no_pattern_is_refused(pattern):
     with pytest.raises(InputError):
         FilePattern(pattern)

@@ -10,7 +10,7 @@ import pytest
 from gearsig.errors import InputError
 from gearsig.fleet import Fleet, TrendSettings, counts_text, fleet_changes, last_report, mark_reported, open_fleet
 from gearsig.report import fleet_page_html, fleet_page_pdf
-from gearsig.rig import ConstantSpeed, MachineSize, OperatingPoint, Rig, Sensor, Shaft
+from gearsig.rig import Bearing, ConstantSpeed, MachineSize, OperatingPoint, Rig, Sensor, Shaft
 from tests.fleet.recordings import PATTERN, write_daily_recordings, write_recording_file
 
 SAMPLES = Path(__file__).parents[2] / "sample_data"
@@ -160,6 +160,20 @@ def test_limits_are_closer_where_speed_is_accounted_for():
     without = prediction_limits(y, np.ones((21, 1)), baseline, 1e-3)
     assert with_speed.high[-1] - with_speed.low[-1] < 0.3 * (without.high[-1] - without.low[-1])
     assert with_speed.low[-1] < y[-1] < with_speed.high[-1]
+
+
+def test_ratios_in_decibels_are_judged_as_they_are(make_recordings, tmp_path):
+    bearing = Bearing("DE", "shaft", bpfo_order=3.58, bpfi_order=5.42, bsf_order=2.36, ftf_order=0.4)
+    rig = Rig(shafts=(Shaft("shaft"),), bearings=(bearing,), speed=ConstantSpeed(2400.0, "shaft"))
+    fleet = open_fleet(tmp_path / "store", create=True)
+    fleet.set(TrendSettings(n_baseline=7))
+    fleet.add(make_recordings("fan", [1.0] * 10), pattern=PATTERN, rig=rig, n_processes=1)
+    ratios = fleet.series("fan").query("unit == 'dB'")
+    assert len(ratios) > 5
+    assert ratios["in_db"].all()
+    assert (ratios["upper_limit"] - ratios["expected"]).between(6.0, 60.0).all()
+    assert (ratios["change"] - (ratios["value"] - ratios["expected"])).abs().max() < 1e-9
+    assert not ratios["level"].any()
 
 
 def test_machines_are_named_in_quotes_as_names_may_hold_commas(fleet):

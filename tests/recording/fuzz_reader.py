@@ -45,6 +45,10 @@ def csv_seeds(folder):
     yield f"# fs = 25600\nName: x\nzeit [s];a (g);b [mm/s]\n{rows}".encode()
     yield b"time,a,b\n[s],[g],(m)\n" + b"".join(b"%.2f,%d,2e1\n" % (i, i) for i in range(60))
     yield b"".join(b" %d   %.3f\t%d \r\n" % (i, i / 7, i) for i in range(60))
+    rows = "".join(f"\t0,{i % 9}\t{5 * (i % 8 > 5)}\n" for i in range(120))
+    yield f"Y_Unit_Label\tg\tV\nDelta_X\t1,0E-3\t1,0E-3\nX_Value\tm/s²\tTacho\tComment\n{rows}".encode("cp1252")
+    yield b"Date;Time;a;b\n" + b"".join(b"31.01.2026;9:59:59,%02d;%d;1\n" % (i, i % 5) for i in range(60))
+    yield b"".join(b"9,39,59,%d,%d,0.5\n" % (39 * i, i % 5) for i in range(60))
     yield written(".csv", folder, speed=PulseTimes(np.arange(5.0), 1, "s"))
     yield written(".csv", folder, n=30).decode().encode("utf-16")
 
@@ -59,10 +63,15 @@ def mat_seeds(folder):
     x = np.arange(200.0)
     cell = np.array([x, "text", np.array([[1, 2]])], dtype=object)
     contents = {"a": x, "fs": 100.0, "s": {"b": x, "unit": "g", "t": {"u": x}}, "c": cell, "i": x.astype(np.int8)}
-    for packed in (False, True):
-        stream = io.BytesIO()
-        savemat(stream, contents, do_compression=packed)
-        yield stream.getvalue()
+    fields = [("Name", object), ("Data", object), ("Unit", object)]
+    channels = [("v", x, "g"), ("n", x[::4], "rpm"), ("Time", x, "s"), ("Time", x[::4], "s"), ("tach", x[:9], "s")]
+    axis = {"x_values": {"increment": 0.1, "quantity": {"label": "s"}}, "function_record": {"name": cell[1:2]}}
+    axis |= {"y_values": {"values": x, "quantity": {"label": "g"}}}
+    for held in (contents, {"Y": np.array(channels, fields)}, {"f": axis}):
+        for packed in (False, True):
+            stream = io.BytesIO()
+            savemat(stream, held, do_compression=packed)
+            yield stream.getvalue()
     yield written(".mat", folder)
     header = b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM"
     yield header.ljust(512, b"\0") + hdf5_bytes(folder, userblock=True)[512:]

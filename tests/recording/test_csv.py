@@ -7,7 +7,7 @@ import pytest
 
 from gearsig.errors import InputError
 from gearsig.recording import read_recording
-from gearsig.rig import Rig, Sensor, SpeedChannel
+from gearsig.rig import Rig, Sensor, SpeedChannel, TachometerChannel
 
 FS_HZ = 25600.0
 
@@ -183,11 +183,10 @@ def test_jitter_below_one_percent_is_fine(tmp_path):
         (["a,b", "1,2", "3,4", "5,6,7"], "line 4 has 3 of 2 columns"),
         (["a,b", "1,2", "3,4", "5,nan"], "'b' holds 1 NaN.*line 4"),
         (["a,b", "1,2", "3,4", "inf,6"], "'a' holds 1 NaN.*line 4"),
-        (["a,a", "1,2", "3,4"], "occur more than once: 'a'"),
         (["a,b"], "no line of numbers"),
         (["<html><body>1,2"], "HTML"),
         (["time", "1", "2", "3"], "only column"),
-        (["when,a", "1.2.2024 00:00:01,2", "1.2.2024 00:00:02,2"], "line 2 begins .*date and time are read as 2026-01"),
+        (["when,a", "1/2/2024 00:00:01,2", "1/2/2024 00:00:02,2"], "line 2 begins .*date and time are read as 2026-01"),
         (["when,a", "2024-02-30T00:00:01,2", "2024-02-30T00:00:02,2"], "line 2 begins .*date and time are read as"),
         (["when,a", "2024-01-01T00:00:01,2", "2024-01-01T00:00:02Z,2", "2024-01-01T00:00:03,2"], "line 3, .*no date"),
         (["when,a", "2024-01-01T00:00:01,2", "2024-01-01T00:00:02,2", "2024-01-01T00:00:02,2"], "does not increase at"),
@@ -195,6 +194,7 @@ def test_jitter_below_one_percent_is_fine(tmp_path):
         (["when,a", "1678-01-01T00:00:01,2", "2261-01-01T00:00:02,2", "1679-01-01T00:00:02,2"], "does not increase"),
         (["when,a", "2024-01-01T00:00:01,2", "2024-01-01T00:00:02,2", "2024-02-30T00:00:02,2"], "line 4, .*no date"),
         (["text,a", "b,2", "c,3"], "line 1 begins 'text,a'"),
+        (["a;b", "999,5;2", "1.000,5;2", "3,5;4"], "line 3, column 'a': .* between thousands"),
         (["a b", "1 2", "3 4", "5 1_0"], "line 4, column 'b': '1_0'"),
     ],
 )
@@ -240,7 +240,7 @@ def test_dates_and_times_are_the_time(tmp_path, separator, zone, between, quote,
 
 
 def test_the_first_bad_line_is_named_not_the_last_of_a_sample(tmp_path):
-    lines = ["timestamp,acc", *(f"01.01.2026 00:00:00.{i:06},{i}" for i in range(20_000))]
+    lines = ["timestamp,acc", *(f"01/01/2026 00:00:00.{i:06},{i}" for i in range(20_000))]
     with pytest.raises(InputError, match="line 2 begins"):
         read_recording(write(tmp_path / "x.csv", lines))
 
@@ -264,3 +264,135 @@ def test_rows_that_stand_twice_are_no_rounded_time(tmp_path):
     path.write_text("time,a1\n" + "".join(f"{t:.4f},{np.sin(300 * t):.6f}\n" for t in time_s))
     with pytest.raises(InputError, match=r"line 3.*doubled"):
         read_recording(path)
+
+
+def read_text(tmp_path, text, name="x.csv", **more):
+    (tmp_path / name).write_bytes(text.encode("cp1252"))
+    return read_recording(tmp_path / name, **more)
+
+
+def table(columns, separator=";", decimal=",", n=50):
+    """Return rows: the time from 0 in steps of a millisecond, and a different wave in each further column."""
+    numbers = [[f"{i / 1000:.6f}", *(f"{np.sin(i + k):.5f}" for k in range(columns))] for i in range(n)]
+    return "".join(separator.join(row).replace(".", decimal) + "\r\n" for row in numbers)
+
+
+def described(recording):
+    return [(c.name, c.unit) for c in recording.channels], recording.sampling_rate_hz
+
+
+@pytest.mark.parametrize(
+    ("head", "found"),
+    [
+        ("Zeit;a;b\r\ns;m/s²;µm\r\n", [("a", "m/s²"), ("b", "µm")]),
+        ("Zeit  1 - Standardmessrate [s];a [m/s²];b [V];\r\n", [("a", "m/s²"), ("b", "V")]),
+        ("Zeit;a;b\r\ns;g;g\r\nT0 = 1.1.26;T0 = 1.1.26;T0 = 1.1.26\r\nNAME=Z;SN=1;SN=2\r\n", [("a", "g"), ("b", "g")]),
+        ("Name;a;b\r\nSample rate;1000;1000\r\nTime [s];a [g];a [g]\r\n", [("a (2)", "g"), ("a (3)", "g")]),
+        ("Sampling frequency (Hz):;1000\r\nY unit:;g;mm/s\r\n\r\nX;a;b\r\n", [("a", "g"), ("b", "mm/s")]),
+        ("Amplitude Units: G-s\r\nTime(s);a;b\r\n", [("a", "G-s"), ("b", "G-s")]),
+    ],
+)  # fmt: skip
+def test_headers_of_measurement_programs(tmp_path, head, found):
+    assert described(read_text(tmp_path, head + table(2))) == (found, pytest.approx(1000))
+
+
+@pytest.mark.parametrize("times", ["One", "No"])
+@pytest.mark.parametrize("decimal", [".", ","])
+def test_labview_measurement(tmp_path, times, decimal):
+    head = [
+        *("LabVIEW Measurement\t", "Separator\tTab", "Date\t2026/01/31", "***End_of_Header***\t", "\t\t\t"),
+        *("Channels\t2\t\t", "Samples\t50\t50\t", "Y_Unit_Label\tg\tVolts\t", "X_Dimension\tTime\tTime\t"),
+        *(f"Delta_X\t1{decimal}0E-3\t1{decimal}0E-3\t", "***End_of_Header***\t\t\t", "X_Value\tAcc\tTacho\tComment"),
+    ]
+    rows_ = table(2, "\t", decimal).splitlines()
+    if times == "No":
+        rows_ = ["\t" + line.partition("\t")[2] for line in rows_]
+    r = read_text(tmp_path, "\r\n".join([*head, *rows_]), "x.lvm")
+    assert described(r) == ([("Acc", "g"), ("Tacho", "Volts")], pytest.approx(1000))
+    assert r.samples.shape == (2, 50)
+
+
+def test_rows_are_counted_before_the_time(tmp_path):
+    lines = [f"{i}\t{(i - 1) * 1e-3:.7E}\t{np.sin(i):.6E}" for i in range(1, 51)]
+    r = read_text(tmp_path, "\n".join(["X-axis unit:\t s", "Amplitude unit:\t m/s^2", "", *lines]))
+    assert described(r) == ([("ch3", "m/s^2")], pytest.approx(1000))
+
+
+@pytest.mark.parametrize(
+    ("stamp", "rate_hz"),
+    [
+        (lambda i: f"31.01.2026 23:59:{59 + i / 100:05.2f}".replace(".", ",", 3).replace(",", ".", 2), 100),
+        (lambda i: f"1.3.2026 9:05:{i / 100:06.3f}", 100),
+        (lambda i: f"2026/01/31;14:22:{i / 100:06.3f}", 100),
+        (lambda i: f"14:22:{i / 100:06.3f}", 100),
+    ],
+)
+@pytest.mark.parametrize("head", ["", "Date;Time;a\n"])
+def test_dates_as_people_write_them(tmp_path, stamp, rate_hz, head):
+    lines = [f"{stamp(i)};{np.sin(i):.4f}" for i in range(90)]
+    if head and lines[0].count(";") == 1:
+        head = "when;a\n"
+    r = read_text(tmp_path, head + "\n".join(lines))
+    assert r.sampling_rate_hz == pytest.approx(rate_hz, rel=1e-6)
+    assert r.samples.shape == (1, 90)
+    lines[40] = lines[40].replace(":", ":x")
+    with pytest.raises(InputError, match=f"line {41 + bool(head)}"):
+        read_text(tmp_path, head + "\n".join(lines))
+
+
+@pytest.mark.parametrize(("separator", "form"), [(",", "d"), (";", ".5g")])
+def test_hour_minute_second_and_microseconds_are_the_time(tmp_path, separator, form):
+    t = 34779.965 + np.arange(500) / 25600  # into the next second
+    parts = [(9, 39, int(s) % 60, round(s % 1 * 1e6) % 1_000_000) for s in t]
+    fraction = [f"{p[3]:{form}}" for p in parts]
+    waves = [(f"{np.sin(i):.4f}", "0.5") for i in range(500)]
+    lines = [separator.join((*map(str, p[:3]), f, *w)) for p, f, w in zip(parts, fraction, waves, strict=True)]
+    r = read_text(tmp_path, "\n".join(lines))
+    assert (r.channel_names, r.sampling_rate_hz) == (("ch5", "ch6"), pytest.approx(25600, rel=1e-3))
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        *(
+            "Frequency (Hz),Amplitude (mm/s RMS)\n",
+            "Freq(CPM),Amplitude\n",
+            "Ordnung [-],a [g]\n",
+            "X-axis unit: Hz\nx,y\n",
+        ),
+        "",
+    ],
+)
+def test_a_spectrum_is_no_signal(tmp_path, head):
+    lines = "\n".join(f"{0.64 * i:.2f},{abs(np.sin(i)):.5f}" for i in range(400))
+    with pytest.raises(InputError, match="spectrum"):
+        read_text(tmp_path, head + lines, sampling_rate_hz=1000.0)
+
+
+def test_what_has_no_ending_is_known_by_its_content(tmp_path):
+    text = "\n".join(f"{np.sin(i):.3f}\t{np.cos(i):.3f}" for i in range(50))
+    for name in ("2004.02.12.10.32.39", "run", "7"):
+        assert read_text(tmp_path, text, name, sampling_rate_hz=20_000.0).samples.shape == (2, 50)
+    with pytest.raises(InputError, match="not known"):
+        read_text(tmp_path, text, "run.a39", sampling_rate_hz=20_000.0)
+
+
+def test_pulses_are_a_tachometer_whatever_they_are_called(tmp_path):
+    rng, n = np.random.default_rng(1), 4000
+    turns = np.arange(n) / 80
+    pulses = np.where(turns % 1 < 0.1, 4.6, -0.5) + 0.03 * rng.standard_normal(n)
+    impacts = rng.standard_normal(n) + np.where(turns % 1 < 0.03, 25.0, 0.0) * rng.random(n)
+    columns = np.array([pulses, impacts, np.clip(impacts, -0.8, 0.8), np.sign(np.sin(0.3 * turns)) * 2.0]).T
+    np.savetxt(tmp_path / "x.csv", columns, delimiter=",", fmt="%.5g")
+    r = read_recording(tmp_path / "x.csv", sampling_rate_hz=4000.0)
+    assert [c.quantity for c in r.channels] == ["tachometer", "unknown", "unknown", "tachometer"]
+    assert any("ch1" in w and "pulses_per_revolution" in w for w in r.warnings)
+    r = read_recording(tmp_path / "x.csv", rig=Rig(speed=TachometerChannel("ch1")), sampling_rate_hz=4000.0)
+    assert not any("pulses_per_revolution" in w for w in r.warnings)
+
+
+def test_the_channel_that_tells_the_speed_is_no_vibration(tmp_path):
+    path = write(tmp_path / "x.csv", ["a,n", *(f"{np.sin(i):.4f},{1500 + np.cos(i):.4f}" for i in range(50))])
+    told = [None, Rig(speed=SpeedChannel("n"))]
+    names = [read_recording(path, rig=rig, sampling_rate_hz=10.0).vibration_names() for rig in told]
+    assert names == [("a", "n"), ("a",)]

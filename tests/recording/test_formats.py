@@ -16,7 +16,7 @@ from scipy.sparse import csc_array
 
 from gearsig.errors import InputError
 from gearsig.recording import parse_lea, read_recording, variables
-from gearsig.rig import ConstantSpeed, Rig, Sensor, Shaft, SpeedChannel, TachometerChannel
+from gearsig.rig import ConstantSpeed, PulseTimes, Rig, Sensor, Shaft, SpeedChannel, TachometerChannel
 
 RNG = np.random.default_rng(7)
 X = RNG.standard_normal(1000)
@@ -47,6 +47,13 @@ class TestMat5:
         r = read_recording(tmp_path / "x.mat")
         assert r.channel_names == ("m_1", "m_2")
         np.testing.assert_array_equal(r.samples, np.stack([X, Y]))
+
+    def test_a_variable_called_as_its_file_has_the_same_channels_in_each(self, tmp_path):
+        for name in ("C0A_200", "C1A_200"):
+            savemat(tmp_path / f"{name}.mat", {name: np.stack([X, Y], axis=1)})
+            assert read_recording(tmp_path / f"{name}.mat", sampling_rate_hz=1.0).channel_names == ("ch1", "ch2")
+            savemat(tmp_path / f"{name}.mat", {name: X})
+            assert read_recording(tmp_path / f"{name}.mat", sampling_rate_hz=1.0).channel_names == ("ch1",)
 
     def test_time_vector_and_speed(self, tmp_path):
         contents = {"t": np.arange(1000) / 50, "a": X, "X097RPM": 1796, "BPFO": 81.1, "win": [1, 2, 3]}
@@ -163,6 +170,41 @@ class TestMat5:
         r = read_recording(tmp_path / "x.mat")
         assert r.channel_names == ("runs(1).a", "runs(2).a")
         assert "sparse" in r.warnings[0]
+
+    def test_channels_are_called_by_what_their_structs_say(self, tmp_path):
+        fields = [("Name", object), ("Data", object), ("Unit", object)]
+        slow = X[:500] + 1500.0
+        y = np.array([("vib", X[None], "g"), ("speed", slow[None], "rpm"), ("force", slow[None], "N")], dtype=fields)
+        x = np.array([("Time", np.arange(n)[None] / hz, "s") for n, hz in ((1000, 100.0), (500, 50.0))], dtype=fields)
+        savemat(tmp_path / "x.mat", {"run": {"X": x, "Y": y, "Info": {"by": "me"}}})
+        r = read_recording(tmp_path / "x.mat")
+        assert ([(c.name, c.unit) for c in r.channels], r.sampling_rate_hz) == ([("vib", "g"), ("speed", "rpm")], 100)
+        np.testing.assert_array_equal(r.values("speed")[:-1:2], slow)
+        assert r.speed == SpeedChannel("speed")
+        assert any("left out: force" in w for w in r.warnings)
+
+    @pytest.mark.parametrize("label", ["s", "Hz"])
+    def test_functions_over_an_axis(self, tmp_path, label):
+        axis = {"start_value": 0.0, "increment": 0.01, "number_of_values": 1000.0, "quantity": {"label": label}}
+        names = np.array(["DE:+X", "NDE:+Z"], dtype=object)
+        signal = {"x_values": axis, "y_values": {"values": np.array([X, Y]).T, "quantity": {"label": "g"}}}
+        savemat(tmp_path / "x.mat", {"Signal": {**signal, "function_record": {"name": names}}})
+        if label == "Hz":
+            with pytest.raises(InputError, match="spectrum"):
+                read_recording(tmp_path / "x.mat")
+            return
+        r = read_recording(tmp_path / "x.mat")
+        assert [(c.name, c.unit) for c in r.channels] == [("DE:+X", "g"), ("NDE:+Z", "g")]
+        assert r.sampling_rate_hz == pytest.approx(100)
+
+    def test_times_of_pulses_beside_the_signal(self, tmp_path):
+        times_s = 0.05 + 0.2 * np.arange(50)
+        savemat(tmp_path / "x.mat", {"vibration": X, "tach": times_s[:, None], "fs": 100.0})
+        assert "pulses_per_revolution" in " ".join(read_recording(tmp_path / "x.mat").warnings)
+        r = read_recording(tmp_path / "x.mat", rig=Rig(speed=TachometerChannel("tach", 2)))
+        assert isinstance(r.speed, PulseTimes)
+        assert r.speed.pulses_per_revolution == 2
+        np.testing.assert_array_equal(r.speed.times_s, times_s)
 
     def test_big_endian(self, tmp_path):
         savemat(tmp_path / "x.mat", {"a": X, "fs": 5.0})

@@ -76,7 +76,7 @@ def test_sensors_are_applied_once_whatever_else_of_the_rig_changes() -> None:
 
 # Every spelling that a reader knows, with the unit in full.
 SPELLINGS = {
-    "acceleration": ("m/s^2", "m/s2", "m/s²", "m/s**2", "ms-2", "mm/s^2", "mm/s²", "g", "gn", "g_n", "mg", "G"),
+    "acceleration": ("m/s^2", "m/s2", "m/s²", "m/s**2", "ms-2", "mm/s^2", "mm/s²", "g", "gn", "g_n", "mg", "G", "G-s"),
     "velocity": ("m/s", "mm/s", "in/s", "ips", "IPS"),
     "displacement": ("mm", "µm", "μm", "um", "mil"),
     "sound_pressure": ("Pa",),
@@ -87,6 +87,7 @@ SPELLINGS = {
     "angular_acceleration": ("rad/s^2", "rad/s2", "rad/s²"),
     "temperature": ("°C", "degC"),
     "voltage": ("V", "mV"),
+    "current": ("A", "mA"),
 }
 
 

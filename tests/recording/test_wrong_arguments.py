@@ -92,7 +92,7 @@ def test_a_reference_whose_columns_are_conditions(runs):
     with pytest.raises(InputError, match=rf"the reference is one column of its file; .*recording's give {columns}"):
         analyze(whole, reference=one)
     other = Recording(RUNS[:, 1:3].T, 1000.0, (Channel("a1"), Channel("a2")))
-    with pytest.raises(InputError, match=r"no channel 'runs_1' \(allowed: same channels: a1, a2\)$"):
+    with pytest.raises(InputError, match=r"no channel 'ch1' \(allowed: same channels: a1, a2\)$"):
         analyze(whole, reference=other)
 
 

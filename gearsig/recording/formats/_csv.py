@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
@@ -16,8 +16,17 @@ import numpy as np
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
 from gearsig.recording._limits import check_memory, read_text_bytes
-from gearsig.recording._table import RawColumn, RawTable, ask_whether_runs, without_clock
-from gearsig.recording._types import Recording, is_unit, plain_name, rate_in_line, split_unit
+from gearsig.recording._table import (
+    RawColumn,
+    RawTable,
+    ask_whether_runs,
+    counts_rows,
+    refuse_spectrum,
+    rises,
+    time_among,
+    without_clock,
+)
+from gearsig.recording._types import Recording, interval_in_line, is_unit, plain_name, rate_in_line, split_unit
 from gearsig.recording.formats._format import OWN_TEXT_MARK, FileFormat, metadata_json, table_from_metadata
 
 # --------------------
@@ -38,11 +47,22 @@ COMMENT_SIGNS = ("#", "%", "//")
 
 # Possessive: digits that no number ends are looked at once.
 _NUMBER = re.compile(r"[+-]?(?:\d++\.?\d*+|\.\d++)(?:e[+-]?\d++)?\Z|[+-]?(?:nan|inf|infinity)\Z", re.IGNORECASE)
-_DATE_TIME = re.compile(
-    r"[0-9]{4}-[0-9]{2}-[0-9]{2}[T ][0-9]{2}:[0-9]{2}:[0-9]{2}(?:\.[0-9]{1,9})?(Z|[+-][0-9]{2}(?::?[0-9]{2})?)?\Z"
-)
-DATE_TIME_EXAMPLES = "2026-01-31T12:00:00.0001 or 2026-01-31 12:00:00.0001Z"
-"""Of what is read as date and time, ISO 8601."""
+_CLOCK = r"[0-9]{1,2}:[0-9]{2}:[0-9]{2}(?:[.,][0-9]{1,9})?"
+_DAY = r"(?:[0-9]{4}[-/.][0-9]{2}[-/.][0-9]{2}|[0-9]{1,2}\.[0-9]{1,2}\.[0-9]{4})"
+_ISO = r"[0-9]{4}-[0-9]{2}-[0-9]{2}[T ][0-9]{2}:[0-9]{2}:[0-9]{2}(?:\.[0-9]{1,9})?"
+_DATE_TIMES = {
+    kind: re.compile(expression + r"\Z")
+    for kind, expression in {
+        "local": _ISO,
+        "zoned": _ISO + r"(?:Z|[+-][0-9]{2}(?::?[0-9]{2})?)",
+        "written": _DAY + "[T ]" + _CLOCK,
+        "apart": _DAY + "\x1f" + _CLOCK,
+        "clock": _CLOCK,
+    }.items()
+}
+"""Kinds of date and time → how they are written: ISO 8601, as people write it, in two columns, the time of day."""
+DATE_TIME_EXAMPLES = "2026-01-31T12:00:00.0001, 2026-01-31 12:00:00.0001Z, 31.01.2026 12:00:00,0001 or 12:00:00.0001"
+"""Of what is read as date and time."""
 
 
 @dataclass(frozen=True)
@@ -54,8 +74,8 @@ class CsvLayout:
     separator, decimal : str
         The separator " " stands for any run of blanks.
     n_columns : int
-    trailing_separator : bool
-        Whether each line ends with a separator that begins no column.
+    leading_separator, trailing_separator : bool
+        Whether each line begins or ends with a separator, beside which no column stands.
     header, units : tuple of str
         One text per column, or nothing.
     preamble : tuple of str
@@ -67,13 +87,13 @@ class CsvLayout:
     bytes_per_line : float
         Mean over the lines that were looked at.
     date_times : str
-        Of the first column: "local" or "zoned" where it holds dates and times (ISO 8601) without or with an offset from
-        UTC, empty where it holds numbers.
+        Of the first column, or of the first two ("apart"): see `date_time_kind`; empty where it holds numbers.
     """
 
     separator: str
     decimal: str
     n_columns: int
+    leading_separator: bool
     trailing_separator: bool
     header: tuple[str, ...]
     units: tuple[str, ...]
@@ -82,6 +102,11 @@ class CsvLayout:
     offset: int
     bytes_per_line: float
     date_times: str = ""
+
+    @property
+    def n_date_columns(self) -> int:
+        """Columns that together are the time."""
+        return 0 if not self.date_times else 2 if self.date_times == "apart" else 1
 
 
 def is_number(text: str, decimal: str) -> bool:
@@ -94,28 +119,34 @@ def is_number(text: str, decimal: str) -> bool:
     return _NUMBER.match(field) is not None
 
 
-def date_time_kind(text: str) -> str:
-    """Return "zoned" for date and time with an offset from UTC, "local" for those without, and nothing for other text.
+def date_time_kind(fields: Sequence[str]) -> str:
+    """Return how the first fields of a line state date and time, and nothing where they do not.
 
     Examples
     --------
-    >>> [date_time_kind(text) for text in ("2026-01-31T12:00:00.5Z", "2026-01-31 12:00:00", "2026-02-30 12:00:00")]
+    >>> [date_time_kind([text]) for text in ("2026-01-31T12:00:00.5Z", "2026-01-31 12:00:00", "2026-02-30 12:00:00")]
     ['zoned', 'local', '']
+    >>> [date_time_kind(fields) for fields in (["31.1.2026 12:00:00,5"], ["2026/01/31", "12:00:00"], ["0:00:01"])]
+    ['written', 'apart', 'clock']
     """
     from pyarrow import ArrowInvalid
 
-    kind = _date_time_form(text)
+    kind = _date_time_form(fields)
     try:
-        _seconds_from_first([text.strip(" \t\r")] if kind else [], kind)
+        _seconds_from_first([_date_time_text(fields, kind)] if kind else [], kind)
     except ArrowInvalid:  # a 30th of February
         return ""
     return kind
 
 
-def _date_time_form(text: str) -> str:
+def _date_time_form(fields: Sequence[str]) -> str:
     """Return what `date_time_kind` does, whether or not there is such a day and time."""
-    match = _DATE_TIME.match(text.strip(" \t\r"))
-    return "" if match is None else "zoned" if match[1] else "local"
+    texts = {kind: _date_time_text(fields, kind) for kind in _DATE_TIMES}
+    return next((kind for kind, form in _DATE_TIMES.items() if form.match(texts[kind])), "")
+
+
+def _date_time_text(fields: Sequence[str], kind: str) -> str:
+    return "\x1f".join(field.strip(" \t\r") for field in fields[: 2 if kind == "apart" else 1])
 
 
 def _seconds_from_first(date_times: Any, kind: str) -> FloatArray:
@@ -123,16 +154,32 @@ def _seconds_from_first(date_times: Any, kind: str) -> FloatArray:
     import pyarrow as pa
 
     if isinstance(date_times, list):
-        date_times = pa.array(date_times, pa.string()).cast(_arrow_type(kind))
-    whole, rest_ns = np.divmod(date_times.cast(pa.int64()).to_numpy(zero_copy_only=False), 10**9)
+        date_times = pa.array(date_times, pa.string())
+    if kind in ("written", "apart", "clock"):
+        date_times = _as_iso(date_times, kind)
+    whole, rest_ns = np.divmod(
+        date_times.cast(pa.timestamp("ns", "UTC" if kind == "zoned" else None))
+        .cast(pa.int64())
+        .to_numpy(zero_copy_only=False),
+        10**9,
+    )
     seconds: FloatArray = (whole - whole[:1]) + (rest_ns - rest_ns[:1]) / 1e9
     return seconds
 
 
-def _arrow_type(kind: str) -> Any:
-    import pyarrow as pa
+def _as_iso(texts: Any, kind: str) -> Any:
+    """Return dates and times that are written otherwise as ISO 8601 has them."""
+    from pyarrow import compute
 
-    return pa.timestamp("ns", "UTC" if kind == "zoned" else None)
+    changes = [(r"^([0-9]{4})[/.]([0-9]{2})[/.]", r"\1-\2-")]
+    if kind != "clock":
+        changes += [(r"^([0-9])\.", r"0\1."), (r"^([0-9]{2})\.([0-9])\.", r"\1.0\2.")]
+        changes += [(r"^([0-9]{2})\.([0-9]{2})\.([0-9]{4})", r"\3-\2-\1")]
+    else:
+        changes += [("^", "1970-01-01 ")]
+    for old, new in [*changes, ("\x1f", " "), (" ([0-9]):", r" 0\1:"), (",", ".")]:
+        texts = compute.replace_substring_regex(texts, old, new)
+    return texts
 
 
 def split(line: str, separator: str) -> list[str]:
@@ -144,6 +191,21 @@ def split(line: str, separator: str) -> list[str]:
     return line.split(separator)
 
 
+def _text(line: bytes) -> str:
+    """Decode a line: what is not UTF-8 is Windows' Western code page, in which "m/s²" has other bytes."""
+    try:
+        return line.decode("utf-8")
+    except UnicodeDecodeError:
+        return line.decode("cp1252", errors="replace")
+
+
+def _between_separators(fields: list[str]) -> tuple[list[str], bool, bool]:
+    """Return the fields without an empty first and last one, and whether there were these."""
+    leading = len(fields) > 1 and not fields[0].strip()
+    trailing = len(fields) > 1 + leading and not fields[-1].strip()
+    return fields[leading : len(fields) - trailing], leading, trailing
+
+
 def find_layout(data: bytes, where: str) -> CsvLayout:
     """Return the layout of a text file from its first lines.
 
@@ -153,18 +215,18 @@ def find_layout(data: bytes, where: str) -> CsvLayout:
         If no line of numbers is found.
     """
     lines = _first_lines(data)
-    texts = [line.decode("utf-8", errors="replace").strip("\r\n") for line in lines]
+    texts = [_text(line).strip("\r\n") for line in lines]
     texts[0] = texts[0].removeprefix("\ufeff")
     start, separator, decimal = _table_start(texts, where)
-    fields = split(texts[start], separator)
-    trailing = len(fields) > 1 and fields[-1].strip() == "" and separator != " "
-    n_columns = len(fields) - trailing
-    header, units, preamble = _header(texts[:start], separator, n_columns)
+    fields, leading, trailing = _between_separators(split(texts[start], separator))
+    n_columns = len(fields)
+    header, units, preamble = _header(texts[:start], separator, n_columns, leading, trailing)
     table = lines[start:]
     return CsvLayout(
         separator,
         decimal,
         n_columns,
+        leading,
         trailing,
         header,
         units,
@@ -172,7 +234,7 @@ def find_layout(data: bytes, where: str) -> CsvLayout:
         first_line=start + 1,
         offset=sum(len(line) for line in lines[:start]),
         bytes_per_line=sum(len(line) for line in table) / len(table),
-        date_times=date_time_kind(fields[0]),
+        date_times=date_time_kind(fields),
     )
 
 
@@ -184,7 +246,7 @@ def own_layout(data: bytes) -> CsvLayout:
     first = data[offset : end if end > 0 else len(data)]
     description = data[: header_at - 1].decode("utf-8", errors="replace")
     n_columns = first.count(b",") + 1
-    return CsvLayout(",", ".", n_columns, False, (), (), (description,), 3, offset, len(first) + 1.0)
+    return CsvLayout(",", ".", n_columns, False, False, (), (), (description,), 3, offset, len(first) + 1.0)
 
 
 def _first_lines(data: bytes) -> list[bytes]:
@@ -215,45 +277,48 @@ def _n_columns(proof: list[str], separator: str, decimal: str) -> int:
     line must be clean, and the others must have as many fields for the most part.
     """
     rows = [split(line, separator) for line in proof]
-    if rows[0][-1].strip() == "" and len(rows[0]) > 1:
-        rows = [row[:-1] if row and row[-1].strip() == "" else row for row in rows]
-    first, *others = rows[0]
-    kind = date_time_kind(first) if others else ""
-    if not all(is_number(field, decimal) for field in (others if kind else rows[0])):
+    if "" in (rows[0][0].strip(), rows[0][-1].strip()):
+        rows = [_between_separators(row)[0] if row else row for row in rows]
+    kind = date_time_kind(rows[0])
+    numbers = rows[0][(kind == "apart") + (kind != "") :]
+    if not numbers or not all(is_number(field, decimal) for field in numbers):
         return 0
-    same = sum(len(row) == len(rows[0]) and (not kind or date_time_kind(row[0]) == kind) for row in rows)
-    return len(rows[0]) if 2 * same > len(rows) else 0
+    same = sum(len(row) == len(rows[0]) and (not kind or date_time_kind(row) == kind) for row in rows)
+    return len(rows[0]) - (kind == "apart") if 2 * same > len(rows) else 0
+
+
+MAX_HEADER_LINES = 12
+"""So many lines above the table may each say something of all columns: names, units, calibrations, types."""
 
 
 def _header(
-    above: list[str], separator: str, n_columns: int
+    above: list[str], separator: str, n_columns: int, leading: bool, trailing: bool
 ) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
-    """Return names, units and the remaining lines above the table."""
+    """Return names, units and the remaining lines above the table.
+
+    The names are in the last line that has a field for each column, or above the units where a line holds these.
+    """
     filled = [text for text in above if text.strip()]
     rows: list[tuple[str, ...]] = []
-    for text in reversed(filled[-2:]):
-        fields = _header_fields(text, separator, n_columns)
+    n_lines = 2 if n_columns == 1 else MAX_HEADER_LINES  # any line may be the name of one column
+    for text in reversed(filled[-n_lines:]):
+        fields = _header_fields(text, separator, n_columns, leading, trailing)
         if fields is None:
             break
         rows.append(fields)
-    names: tuple[str, ...] = ()
-    units: tuple[str, ...] = ()
-    if len(rows) == 2 and _all_units(rows[0]):
-        units, names = rows[0], rows[1]
-        filled = filled[:-2]
-    elif rows:
-        names = rows[0]
-        filled = filled[:-1]
-    return names, units, tuple(filled)
+    of_units = next((i for i, row in enumerate(rows[:-1]) if _all_units(row)), None)
+    if of_units is None:
+        return rows[0] if rows else (), (), tuple(filled[: len(filled) - bool(rows)])
+    return rows[of_units + 1], rows[of_units], tuple(filled[: -of_units - 2] + filled[len(filled) - of_units :])
 
 
-def _header_fields(text: str, separator: str, n_columns: int) -> tuple[str, ...] | None:
+def _header_fields(text: str, separator: str, n_columns: int, leading: bool, trailing: bool) -> tuple[str, ...] | None:
     """Return a line's fields if it can be the header of so many columns."""
     if rate_in_line(text) is not None:
         return None
     for sign in COMMENT_SIGNS:
-        text = text.strip().removeprefix(sign)
-    if n_columns == 1:
+        text = text.strip("\r\n" if leading else None).removeprefix(sign)
+    if n_columns == 1 and not leading:
         field = text.strip().strip('"')
         return (field,) if field and "=" not in field and ":" not in field else None
     attempts = [split(text, separator)]
@@ -264,8 +329,10 @@ def _header_fields(text: str, separator: str, n_columns: int) -> tuple[str, ...]
         ]
     for fields in attempts:
         cleaned = tuple(field.strip() for field in fields)
-        if len(cleaned) == n_columns + 1 and cleaned[-1] == "":
-            cleaned = cleaned[:-1]
+        if len(cleaned) == n_columns + leading + trailing:  # there may be a name where there are no numbers
+            cleaned = cleaned[leading : leading + n_columns]
+        elif len(cleaned) == leading + n_columns + 1 and cleaned[-1].casefold() in ("", "comment"):
+            cleaned = cleaned[leading:-1]
         if len(cleaned) == n_columns and any(cleaned) and "=" not in cleaned:
             return cleaned
     return None
@@ -324,30 +391,32 @@ def line_of_row(data: bytes, layout: CsvLayout, row: int) -> int:
 
 def _parse_fast(data: bytes, layout: CsvLayout) -> list[FloatArray]:
     import pyarrow as pa
-    from pyarrow import csv
+    from pyarrow import compute, csv
 
     table_bytes = memoryview(data)[layout.offset :]
     separator = layout.separator
     if separator == " ":
         table_bytes = memoryview(_with_single_blanks(bytes(table_bytes)))
     columns = [f"column {i}" for i in range(layout.n_columns)]
-    types = dict.fromkeys(columns, pa.float64())
-    if layout.date_times:
-        types[columns[0]] = _arrow_type(layout.date_times)
+    types = dict.fromkeys(columns, pa.float64()) | dict.fromkeys(columns[: layout.n_date_columns], pa.string())
+    if layout.date_times in ("local", "zoned"):
+        types[columns[0]] = pa.timestamp("ns", "UTC" if layout.date_times == "zoned" else None)
     table = csv.read_csv(
         pa.BufferReader(pa.py_buffer(table_bytes)),
-        read_options=csv.ReadOptions(column_names=columns + ["nothing"] * layout.trailing_separator),
+        read_options=csv.ReadOptions(
+            column_names=["before"] * layout.leading_separator + columns + ["after"] * layout.trailing_separator
+        ),
         parse_options=csv.ParseOptions(delimiter=separator, quote_char=False),
         convert_options=csv.ConvertOptions(
             column_types=types, null_values=[], decimal_point=layout.decimal, include_columns=columns
         ),
     )
-    return [
-        _seconds_from_first(table.column(name), layout.date_times)
-        if layout.date_times and name == columns[0]
-        else table.column(name).to_numpy()
-        for name in columns
-    ]
+    values = [table.column(name) for name in columns]
+    if layout.date_times == "apart":
+        values[0] = compute.binary_join_element_wise(values[0], values.pop(1), "\x1f")
+    if layout.date_times:
+        return [_seconds_from_first(values[0], layout.date_times), *(v.to_numpy() for v in values[1:])]
+    return [v.to_numpy() for v in values]
 
 
 def _with_single_blanks(text: bytes) -> bytes:
@@ -366,14 +435,18 @@ def _parse_carefully(data: bytes, layout: CsvLayout, names: tuple[str, ...], whe
     date_times: dict[int, str] = {}
     for number, line in _filled_lines(data, layout):
         fields = split(line, layout.separator)
-        if layout.trailing_separator and len(fields) == layout.n_columns + 1 and not fields[-1].strip():
+        if layout.trailing_separator and len(fields) > layout.n_columns and not fields[-1].strip():
             fields.pop()
+        if layout.leading_separator and len(fields) > layout.n_columns and not fields[0].strip():
+            del fields[0]
         if len(fields) != layout.n_columns:
             _raise_field_count(len(fields), number, line, layout, where)
         if layout.date_times:
-            if _date_time_form(fields[0]) != layout.date_times:
-                _raise_no_date_time(fields[0], number, names[0], layout, where)
-            date_times[number], fields[0] = fields[0].strip(" \t\r"), "0"
+            text = _date_time_text(fields, layout.date_times)
+            if not _DATE_TIMES[layout.date_times].match(text):
+                _raise_no_date_time(text, number, names[0], layout, where)
+            date_times[number] = text
+            fields[: layout.n_date_columns] = ["0"]
         for field, name in zip(fields, names, strict=True):
             if not is_number(field, layout.decimal):
                 _raise_no_number(field, number, name, layout, where)
@@ -383,7 +456,7 @@ def _parse_carefully(data: bytes, layout: CsvLayout, names: tuple[str, ...], whe
         try:
             columns[0] = _seconds_from_first(list(date_times.values()), layout.date_times)
         except ArrowInvalid:
-            number = next(number for number, text in date_times.items() if not date_time_kind(text))
+            number = next(number for number, text in date_times.items() if not date_time_kind(text.split("\x1f")))
             _raise_no_date_time(date_times[number], number, names[0], layout, where)
     return columns
 
@@ -394,7 +467,7 @@ def _filled_lines(data: bytes, layout: CsvLayout) -> Iterator[tuple[int, str]]:
     while at < len(data):
         end = data.find(b"\n", at)
         end = len(data) if end < 0 else end
-        line = data[at : min(end, at + MAX_LINE_BYTES)].decode("utf-8", errors="replace")
+        line = _text(data[at : min(end, at + MAX_LINE_BYTES)])
         if line.strip():
             yield number, line.rstrip("\r")
         at, number = end + 1, number + 1
@@ -423,17 +496,20 @@ def _raise_no_date_time(field: str, number: int, name: str, layout: CsvLayout, w
 
 def _raise_no_number(field: str, number: int, name: str, layout: CsvLayout, where: str) -> None:
     text = field.strip()[:60]
+    remedy = "correct the field, or remove the column" if text else "cut out the gap knowingly or export again"
+    if re.match(r"[+-]?\d{1,3}(?:[.,' \u00a0]\d{3})+(?!\d)", text):
+        remedy = "export the numbers without signs between thousands"
     raise InputError(
         f"line {number}, column {name!r}: " + (f"{text!r} is not a number" if text else "the field is empty"),
         where=where,
         allowed=f"numbers with decimal {'comma' if layout.decimal == ',' else 'point'}",
-        remedy="correct the field, or remove the column" if text else "cut out the gap knowingly or export again",
+        remedy=remedy,
     )
 
 
 READER = "gearsig CSV reader"
-INDEX_NAMES = ("", "index", "sample", "samples", "no", "nr", "#")
-"""Headers of columns that may count the rows, lower case."""
+UNIT_LABELS = ("unit", "units", "yunit", "yunits", "yunitlabel", "amplitudeunit", "amplitudeunits", "einheit")
+"""What the units of all columns are called in a line above the table, plain."""
 
 
 def read_csv(path: Path) -> RawTable:
@@ -441,8 +517,8 @@ def read_csv(path: Path) -> RawTable:
 
     The layout is found from the first lines: separator (comma, semicolon, tab, blanks), decimal point or comma, a
     header, units in brackets or in a row of their own, lines above the header ("# …" or free text). A line
-    "sampling rate: 25600" among those states the rate. A first column of dates and times (ISO 8601) is the time, in
-    seconds from its first row.
+    "sampling rate: 25600" among those states the rate. A first column of dates and times is the time, in seconds from
+    its first row; so is a day and the time of day in two columns.
 
     Raises
     ------
@@ -463,6 +539,7 @@ def read_csv(path: Path) -> RawTable:
 
     if is_own:
         return table_from_metadata(layout.preamble[0].removeprefix(OWN_TEXT_MARK), values, READER, where, place)
+    refuse_spectrum(layout.preamble, where)
     warnings = list(_doubtful_comma(layout, values))
     columns = [RawColumn(name, v, unit) for name, unit, v in zip(names, units, values, strict=True)]
     time = None
@@ -470,21 +547,44 @@ def read_csv(path: Path) -> RawTable:
         time, *columns = columns
         time = replace(time, unit="s")
         warnings += [] if layout.header else ask_whether_runs(columns, where)
-    elif not layout.header or plain_name(layout.header[0]) in INDEX_NAMES:
-        columns, time, notes = without_clock(columns)
-        warnings += notes if time is None else [*notes, *ask_whether_runs(columns, where)]
+    else:
+        is_named = bool(layout.header) and not counts_rows(layout.header[0])
+        columns, time, notes = without_clock(columns, is_named=is_named)
+        warnings += notes if time is None or layout.header else [*notes, *ask_whether_runs(columns, where)]
+    rate_hz = next((hz for line in layout.preamble if (hz := rate_in_line(line)) is not None), None)
+    if rate_hz is None and time is None and time_among(columns) is None:  # a step may be rounded more than the times
+        steps = (step_s for line in layout.preamble if (step_s := interval_in_line(line)) is not None)
+        rate_hz = next((1.0 / step_s for step_s in steps if step_s > 0), None)
     return RawTable(
-        tuple(columns),
+        tuple(_with_stated_units(columns, layout.preamble)),
         READER,
-        sampling_rate_hz=next((hz for line in layout.preamble if (hz := rate_in_line(line)) is not None), None),
+        sampling_rate_hz=rate_hz,
         time=time,
         warnings=tuple(warnings),
         row_place=place,
     )
 
 
+def _with_stated_units(columns: list[RawColumn], preamble: tuple[str, ...]) -> list[RawColumn]:
+    """Return the columns with the units that a line above the table states for all signals, or for each."""
+    n_axes = int(len(columns) > 1 and rises(columns[0].values))  # a time that is known later
+    signals = columns[n_axes:]
+    for line in preamble:
+        label, *fields = (field.strip() for field in re.split(r"[:=;\t]+", line.strip()))
+        units = [field for field in fields if field]
+        if plain_name(label) in UNIT_LABELS and any(map(is_unit, units)):
+            units = units * (len(signals) if len(units) == 1 else 1)
+            if len(units) == len(signals):
+                new = [c if c.unit else replace(c, unit=unit) for c, unit in zip(signals, units, strict=True)]
+                return [*columns[:n_axes], *new]
+    return columns
+
+
 def _names_and_units(layout: CsvLayout) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return a name and a unit per column; a column without a name is called by its number."""
+    """Return a name and a unit per column, one for day and time; a column without a name is called by its number.
+
+    A name that occurs twice is followed by the number of its column.
+    """
     header = layout.header or ("",) * layout.n_columns
     pairs = [split_unit(text) for text in header]
     units = [unit for _, unit in pairs]
@@ -492,6 +592,10 @@ def _names_and_units(layout: CsvLayout) -> tuple[tuple[str, ...], tuple[str, ...
         units = [text.strip("[]() -") for text in layout.units]
     prefix = "column " if layout.header else "ch"
     names = [name or f"{prefix}{i + 1}" for i, (name, _) in enumerate(pairs)]
+    doubled = {name for name in names if names.count(name) > 1}
+    names = [f"{name} ({i + 1})" if name in doubled else name for i, name in enumerate(names)]
+    if layout.date_times == "apart":
+        del names[1], units[1]
     return tuple(names), tuple(units)
 
 
@@ -529,4 +633,4 @@ def _sniff(head: bytes) -> str:
     return "" if b"\0" in head or n_control > 0.01 * len(head) else "CSV text"
 
 
-CSV = FileFormat("CSV", (".csv", ".txt", ".tsv", ".dat", ".asc"), _sniff, read_csv, write_csv, (".csv",))
+CSV = FileFormat("CSV", (".csv", ".txt", ".tsv", ".dat", ".asc", ".lvm"), _sniff, read_csv, write_csv, (".csv",))

@@ -155,7 +155,7 @@ def _rates_of(attributes: Any, path: str) -> dict[str, float]:
         if np.size(value) != 1:
             continue
         if (rate_hz := stated_rate_hz(name, float(np.reshape(value, -1)[0]))) is not None:
-            rates[f"{path}@{name}"] = rate_hz
+            rates[path] = rate_hz
     return rates
 
 

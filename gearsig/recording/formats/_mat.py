@@ -13,7 +13,7 @@ import numpy as np
 
 from gearsig.errors import InputError
 from gearsig.recording._limits import CHUNK_BYTES, check_decoded
-from gearsig.recording._table import NamedArrays, NumberArray, RawTable, table_from_arrays
+from gearsig.recording._table import NamedArrays, NumberArray, RawTable, refuse_spectrum, table_from_arrays
 from gearsig.recording._types import Recording
 from gearsig.recording.formats._format import OWN_NAME, FileFormat, metadata_json, table_from_metadata
 from gearsig.recording.formats._hdf5 import decoded_bytes, load_dataset, own_datasets
@@ -319,7 +319,14 @@ def _flatten(
     path: str, value: Any, arrays: dict[str, NumberArray], texts: dict[str, str], unreadable: list[str]
 ) -> None:
     """Collect numbers and texts from nested structs and cells under their paths."""
+    if isinstance(value, dict) and isinstance(axis := value.get("x_values"), dict):
+        value = _function(value, axis)
     if isinstance(value, dict):
+        name = next((text for key in ("Name", "Label") if isinstance(text := value.get(key), str)), "")
+        data = next((key for key in ("Data", "Values", "Value") if _is_signal(value.get(key))), None)
+        if name and data is not None:  # an element of a list of channels, called by what it states
+            value = {**value, name.replace(".", "_"): value[data], "unit": value.get("Unit", value.get("Units", ""))}
+            del value[data]
         for name, item in value.items():
             _flatten(f"{path}.{name}", item, arrays, texts, unreadable)
     elif isinstance(value, list):
@@ -331,6 +338,37 @@ def _flatten(
         unreadable.append(path or "an object")
     elif value.size and value.ndim <= 2:
         arrays[path] = value
+
+
+def _is_signal(value: Any) -> bool:
+    return isinstance(value, np.ndarray) and value.size > 1
+
+
+def _function(value: dict[str, Any], axis: dict[str, Any]) -> dict[str, Any]:
+    """Return a function over an axis, as Simcenter Testlab exports it, as its signals, their unit and the step.
+
+    Raises
+    ------
+    InputError
+        If the axis is one of frequency or order.
+    """
+
+    def label(of: Any) -> str:
+        quantity = of.get("quantity") if isinstance(of, dict) else None
+        text = quantity.get("label") if isinstance(quantity, dict) else ""
+        return text if isinstance(text, str) else ""
+
+    refuse_spectrum([f"x unit: {label(axis)}"])
+    ordinate, record = value.get("y_values"), value.get("function_record")
+    values = ordinate.get("values") if isinstance(ordinate, dict) else None
+    names = record.get("name") if isinstance(record, dict) else None
+    names = [names] if isinstance(names, str) else names
+    signals: dict[str, Any] = {"values": values}
+    if isinstance(values, np.ndarray) and isinstance(names, list) and all(isinstance(n, str) for n in names):
+        over_time = values if values.ndim == 2 and values.shape[1] == len(names) else values.T
+        if over_time.ndim == 2 and over_time.shape[1] == len(names) == len(set(names)):
+            signals = {name.replace(".", "_"): over_time[:, i] for i, name in enumerate(names)}
+    return {**signals, "dt": axis.get("increment", ""), "unit": label(ordinate)}
 
 
 # --------------------

@@ -22,13 +22,14 @@ READER = "gearsig TDMS reader"
 def read_tdms(path: Path, part: slice | None = None) -> RawTable:
     """Return the channels of a TDMS file, scaled as its properties say.
 
-    The rate is one over the waveform property "wf_increment", or a property named like a sampling rate; the unit is
-    "unit_string". Channels of text or of time stamps are left out.
+    The rate is one over the waveform property "wf_increment", or a property named like a sampling rate, of the channel,
+    its group or the file; the unit is "unit_string". Channels of text or of time stamps, and those that were sampled
+    slower than others, are left out.
 
     Raises
     ------
     InputError
-        If the file is damaged, its channels have several rates, or it would not fit into memory.
+        If the file is damaged, or it would not fit into memory.
     """
     from nptdms import TdmsFile
 
@@ -40,12 +41,11 @@ def read_tdms(path: Path, part: slice | None = None) -> RawTable:
         _check_complete(file, where)
         channels = {}
         units = {}
-        rates_hz = _stated_rates(file.properties, "file")
+        rates_hz: dict[str, float] = {}
         left_out = []
         if part is None:
             check_decoded(sum(8 * len(channel) for group in file.groups() for channel in group.channels()), path)
         for group in file.groups():
-            rates_hz |= _stated_rates(group.properties, group.name)
             for channel in group.channels():
                 # A dot separates the levels of names elsewhere; within a name it would cut it.
                 name = f"{group.name}.{channel.name.replace('.', '_')}"
@@ -54,7 +54,10 @@ def read_tdms(path: Path, part: slice | None = None) -> RawTable:
                     continue
                 channels[name] = np.asarray(channel[part or slice(None)])
                 units[name] = str(channel.properties.get("unit_string", ""))
-                rates_hz |= _waveform_rate(channel, name, where) or _stated_rates(channel.properties, name)
+                stated_hz = _waveform_rate(channel, name, where) or next(
+                    filter(None, (_stated_rate(owner.properties) for owner in (channel, group, file))), None
+                )
+                rates_hz |= {} if stated_hz is None else {name: stated_hz}
     notes = (f"channels that hold no numbers were left out: {', '.join(left_out[:8])}",) if left_out else ()
     return table_from_arrays(NamedArrays(channels, {}, units, rates_hz, notes), READER, where)
 
@@ -92,10 +95,10 @@ def _check_complete(file: Any, where: str) -> None:
         )
 
 
-def _waveform_rate(channel: Any, name: str, where: str) -> dict[str, float]:
+def _waveform_rate(channel: Any, name: str, where: str) -> float | None:
     increment_s = channel.properties.get("wf_increment")
     if increment_s is None:
-        return {}
+        return None
     if not isinstance(increment_s, (int, float)) or not increment_s > 0:
         raise InputError(
             f"wf_increment of channel {name!r} is {increment_s!r}",
@@ -103,15 +106,12 @@ def _waveform_rate(channel: Any, name: str, where: str) -> dict[str, float]:
             allowed="> 0 s",
             remedy="give --fs or correct it in the file",
         )
-    return {f"{name}, wf_increment": 1.0 / float(increment_s)}
+    return 1.0 / float(increment_s)
 
 
-def _stated_rates(properties: Any, owner: str) -> dict[str, float]:
-    return {
-        f"{owner}, {name}": float(value)
-        for name, value in properties.items()
-        if plain_name(name) in RATE_NAMES and isinstance(value, (int, float)) and not isinstance(value, bool)
-    }
+def _stated_rate(properties: Any) -> float | None:
+    stated = (value for name, value in properties.items() if plain_name(name) in RATE_NAMES)
+    return next((float(v) for v in stated if isinstance(v, (int, float)) and not isinstance(v, bool)), None)
 
 
 TDMS = FileFormat("TDMS", (".tdms",), begins("TDMS", b"TDSm"), read_tdms, read_part=read_tdms, length=tdms_length)
