@@ -20,7 +20,7 @@ from gearsig.report._files import (
     recording_mark,
     write_pdf,
 )
-from gearsig.report._fleet import fleet_page_html, fleet_page_pdf, write_fleet_page
+from gearsig.report._fleet import write_fleet_page
 from gearsig.report._gap_page import (
     CHECK_FIRST,
     CauseRow,
@@ -132,8 +132,6 @@ __all__ = [
     "finding_card",
     "finding_cards",
     "fitting_methods",
-    "fleet_page_html",
-    "fleet_page_pdf",
     "floors_text",
     "force_csv",
     "force_json",

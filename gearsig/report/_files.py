@@ -8,8 +8,9 @@ import re
 import secrets
 from base64 import b64decode
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass
 from datetime import datetime
+from enum import Enum
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -182,22 +183,33 @@ def check_pdf() -> None:
         raise InputError("PDF needs the package typst", remedy="pip install 'gearsig[pdf]'") from None
 
 
-def compiled(template: str, data: Mapping[str, Any], pictures: Mapping[str, bytes]) -> bytes:
-    """Return the PDF that a template makes of data; fonts are matplotlib's, so that every machine sets it alike."""
+def compiled(template: str, values: Mapping[str, Any]) -> bytes:
+    """Return the PDF that a template makes of the values that the HTML page is made of.
+
+    Pictures come as files; fonts are matplotlib's, so that every machine sets it alike.
+    """
     check_pdf()
     import typst
 
-    source = files("gearsig.report").joinpath("templates", template).read_bytes()
-    content = json.dumps(data, ensure_ascii=False, default=str).encode()
+    pictures: dict[str, bytes] = {}
+
+    def described(value: Any) -> object:
+        if isinstance(value, Picture):
+            return _put_picture(value, pictures)
+        return vars(value) if is_dataclass(value) else value.value if isinstance(value, Enum) else str(value)
+
+    content = json.dumps({**values, "version": __version__}, ensure_ascii=False, default=described).encode()
     with TemporaryDirectory(prefix="gearsig-") as folder:
-        for name, part in {"main.typ": source, "data.json": content, **pictures}.items():
+        main = Path(folder) / template
+        for name in (template, "print.typ"):
+            (Path(folder) / name).write_bytes(files("gearsig.report").joinpath("templates", name).read_bytes())
+        for name, part in {"data.json": content, **pictures}.items():
             (Path(folder) / name).write_bytes(part)
-        main, fonts = Path(folder) / "main.typ", [font_folder()]
-        made = typst.compile(main, root=Path(folder), font_paths=fonts, ignore_system_fonts=True)
+        made = typst.compile(main, root=Path(folder), font_paths=[font_folder()], ignore_system_fonts=True)
     return bytes(made)
 
 
-def put_picture(picture: Picture, pictures: dict[str, bytes]) -> dict[str, object]:
+def _put_picture(picture: Picture, pictures: dict[str, bytes]) -> dict[str, object]:
     """Add a picture to the files, and return what the template says of it."""
     if picture.svg:
         name = f"picture{len(pictures)}.svg"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from math import inf, isfinite
 from pathlib import Path
@@ -272,7 +272,9 @@ def write_index(
     if not n_missing:
         write_batch(index, path.parent, failures=failures)
     if pdf and not n_missing:
-        write_pdf(path.with_suffix(".pdf"), _index_pdf(index, failures, made))
+        rows = [replace(row, entry=replace(row.entry, indicators=())) for row in index.rows]  # their cells stand in it
+        values = {"index": replace(index, rows=tuple(rows)), "failures": failures, "legend": LEGEND, "date": made}
+        write_pdf(path.with_suffix(".pdf"), compiled("index.typ", values))
     return write_text(path, html)
 
 
@@ -318,34 +320,6 @@ LEGEND = (
     "and need not be a fault. Size: how far the finding is over its floor, in dB, or the depth of a crack, in mm. "
     "Indicators: the largest value over channels and gears."
 )
-
-
-def _index_pdf(index: Index, failures: Sequence[Failure], date: str) -> bytes:
-    rows = [
-        {
-            "name": row.entry.name,
-            "machine": row.entry.machine,
-            "date": row.date,
-            "outcome": row.entry.outcome.value,
-            "css_class": row.css_class,
-            "conclusion": row.entry.conclusion,
-            "confidence": row.confidence,
-            "sure_of": row.entry.sure_of,
-            "ratio": row.ratio,
-            "cells": [cell.text for cell in row.cells],
-        }
-        for row in index.rows
-    ]
-    data = {
-        "summary": index.summary,
-        "columns": index.columns,
-        "has_dates": index.has_dates,
-        "rows": rows,
-        "failures": [[failure.name, failure.reason] for failure in failures],
-        "legend": LEGEND,
-        "date": f"{date}, gearsig {__version__}",
-    }
-    return compiled("index.typ", data, {})
 
 
 def _column(entries: Sequence[Entry], name: str) -> tuple[str, list[IndexCell]]:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
-from gearsig import __version__, plot
+from gearsig import plot
 from gearsig.angle import ShaftAngle
 from gearsig.cache import write_text
 from gearsig.diagnosis import CHANGED, Analysis, ChannelAnalysis, Finding, Kind, Where, changes, with_known_angle
@@ -20,7 +20,7 @@ from gearsig.motion import StartStop
 from gearsig.orders import OrderMap, SynchronousAverage
 from gearsig.plot import FAULT, QUIET, Captioned, ChartLine, Cursor, LinePanel, Picture, embed
 from gearsig.recording import si_factor
-from gearsig.report._files import compiled, put_picture, render
+from gearsig.report._files import compiled, render
 from gearsig.report._methods import fitting_methods, method_pictures
 from gearsig.report._sections import (
     change_rows,
@@ -752,35 +752,4 @@ def page_pdf(analysis: Analysis, *, command: str = "", methods: Sequence[str] | 
     InputError
         If typst is not installed.
     """
-    parts = page_parts(analysis, command=command, methods=methods)
-    pictures: dict[str, bytes] = {}
-    verdict = parts["verdict_picture"]
-    data = {
-        "title": parts["title"],
-        "machine": parts["machine_name"],
-        "headline": parts["headline"],
-        "explanation": parts["explanation"],
-        "outcome": parts["outcome"],
-        "css_class": parts["outcome_class"],
-        "reference": parts["reference"],
-        "date": dict(parts["provenance"]).get("date", ""),
-        "made": f"gearsig {__version__}",
-        "changes": [
-            asdict(row) | {"change": row.change, "repeatability": f"± {row.repeatability_db:.1f}"}
-            for row in parts["changes"]
-        ],
-        "verdict_picture": None if verdict is None else put_picture(verdict, pictures),
-        "findings": [asdict(card) for card in parts["findings"]],
-        "further": [asdict(card) for card in parts["further"]],
-        "groups": [
-            {
-                "title": group.title,
-                "wide": [put_picture(picture, pictures) for picture in group.wide],
-                "small": [put_picture(picture, pictures) for picture in group.small],
-            }
-            for group in parts["gallery"].groups
-        ],
-        "facts": [*parts["machine"], *parts["speed"], *(("warning", text) for text in parts["warnings"])],
-        "provenance": parts["provenance"],
-    }
-    return compiled("page.typ", data, pictures)
+    return compiled("page.typ", page_parts(analysis, command=command, methods=methods))

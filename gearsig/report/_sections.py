@@ -164,13 +164,9 @@ class ChangeRow:
 
     label: str
     change_db: float
-    repeatability_db: float
+    change: str
+    repeatability: str
     percent: float
-
-    @property
-    def change(self) -> str:
-        """The change with its sign."""
-        return f"{signed(self.change_db)} dB"
 
 
 def change_rows(analysis: Analysis) -> tuple[ChangeRow, ...]:
@@ -178,7 +174,11 @@ def change_rows(analysis: Analysis) -> tuple[ChangeRow, ...]:
     changed = sorted((c for c in analysis.level_changes if c.is_change), key=lambda c: -abs(c.change_db))[:8]
     return tuple(
         ChangeRow(
-            _label_of(c, changed), c.change_db, c.repeatability_db, 100 * abs(c.change_db) / abs(changed[0].change_db)
+            _label_of(c, changed),
+            c.change_db,
+            f"{signed(c.change_db)} dB",
+            f"± {c.repeatability_db:.1f}",
+            100 * abs(c.change_db) / abs(changed[0].change_db),
         )
         for c in changed
     )
