@@ -1,13 +1,15 @@
 """A gap diagnosis from files to a folder of results, here or in a process of its own that can be stopped.
 
-A page starts `python -P -m app.gap_job FOLDER`. The folder holds request.json; progress.json, and in the end results or
-error.json, come beside it. The process ends when its standard input does: nothing goes on for a parent that is gone.
+A page starts `python -P -m app.gap_job FOLDER`. The private folder holds request.pickle; progress.json, and in the end
+results or error.pickle, come beside it. The process ends when its standard input does: nothing goes on for a parent
+that is gone.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import pickle
 import secrets
 import shutil
 import signal
@@ -17,17 +19,16 @@ import sysconfig
 import weakref
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from tempfile import mkdtemp
 from threading import Thread
 from time import monotonic
 
 from gearsig.cache import write_text
-from gearsig.errors import GearsigError, InputError, RefusalError
+from gearsig.errors import GearsigError, InputError
 from gearsig.gap import PROCESSES, GapReport, GapRequest, read_gap_inputs
 from gearsig.processes import one_pool, stop
-from gearsig.report import check_writable, from_plain, plain, read_gap_json, write_gap_json, write_gap_page
+from gearsig.report import check_writable, read_gap_json, write_gap_json, write_gap_page
 
 Stage = Callable[[str, float], None]
 READING = 0.03
@@ -147,7 +148,7 @@ def _is_ours(path: Path) -> bool:
     return isinstance(content, dict) and content.get("schema") == "gearsig.gap"
 
 
-REQUEST, PROGRESS, ERROR, RESULTS, LOG = "request.json", "progress.json", "error.json", "results", "log.txt"
+REQUEST, PROGRESS, ERROR, RESULTS, LOG = "request.pickle", "progress.json", "error.pickle", "results", "log.txt"
 EXIT_REFUSED = 2
 EVERY_S = 0.2
 """Progress is written no oftener."""
@@ -155,14 +156,6 @@ EVERY_S = 0.2
 
 class JobFailedError(GearsigError):
     """The process ended without a result and without a reason of its own."""
-
-
-@dataclass(frozen=True)
-class _JobRequest:
-    gap: GapRequest
-    model: str
-    cache: Path | None
-    command: str
 
 
 class Job:
@@ -178,7 +171,7 @@ class Job:
 
     def __init__(self, folder: Path, request: GapRequest, model: str, *, cache: Path | None, command: str = "") -> None:
         self.folder, self.was_stopped = folder, False
-        write_text(folder / REQUEST, json.dumps(plain(_JobRequest(request, model, cache, command))))
+        (folder / REQUEST).write_bytes(pickle.dumps((request, model, cache, command)))
         log = (folder / LOG).open("w", encoding="utf-8")
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-m", "app.gap_job", str(folder)],  # -P: a user's own app.py there is not ours
@@ -219,7 +212,8 @@ class Job:
             Why there is none.
         """
         if (self.folder / ERROR).exists():
-            raise error_from_json((self.folder / ERROR).read_text(encoding="utf-8"))
+            error: GearsigError = pickle.loads((self.folder / ERROR).read_bytes())  # noqa: S301 - our own, in a private folder
+            raise error
         if not (self.folder / RESULTS / JSON).exists():
             raise JobFailedError(f"the diagnosis ended without a result ({self._last_words()})")
         return read_gap_json(self.folder / RESULTS / JSON)
@@ -266,21 +260,6 @@ def _stop(process: subprocess.Popen[bytes]) -> None:
             process.stdin.close()
 
 
-def error_to_json(error: GearsigError) -> str:
-    """Return an error as a text that `error_from_json` makes it from again, with its parts."""
-    parts = {name: part for name, part in vars(error).items() if isinstance(part, str)} or {"reason": str(error)}
-    return json.dumps({"kind": type(error).__name__, "parts": parts})
-
-
-def error_from_json(text: str) -> GearsigError:
-    """Return the error that `error_to_json` made the text of."""
-    written = json.loads(text)
-    parts = written["parts"]
-    if written["kind"] == InputError.__name__:
-        return InputError(**parts)
-    return RefusalError(**parts) if written["kind"] == RefusalError.__name__ else GearsigError(*parts.values())
-
-
 class _Progress:
     """Writes the stage and the share that is complete, now and then."""
 
@@ -296,15 +275,13 @@ class _Progress:
 
 def main(folder: Path) -> int:
     """Diagnose what the folder asks for."""
-    request: _JobRequest = from_plain(
-        _JobRequest, json.loads((folder / REQUEST).read_text(encoding="utf-8")), where=REQUEST
-    )
+    request, model, cache, command = pickle.loads((folder / REQUEST).read_bytes())  # noqa: S301 - the parent's
     try:
         with one_pool(PROCESSES):
-            report = run_gap(request.gap, request.model, cache=request.cache, on_stage=_Progress(folder / PROGRESS))
-            write_results(report, folder / RESULTS, command=request.command)
+            report = run_gap(request, model, cache=cache, on_stage=_Progress(folder / PROGRESS))
+            write_results(report, folder / RESULTS, command=command)
     except GearsigError as error:
-        write_text(folder / ERROR, error_to_json(error))
+        (folder / ERROR).write_bytes(pickle.dumps(error))
         return EXIT_REFUSED
     return 0
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from app.gap_job import Job, JobFailedError, error_from_json, error_to_json, private_folder
+from app.gap_job import Job, JobFailedError, private_folder
 from app.samples import sample_folder
-from gearsig.errors import GearsigError, InputError, RefusalError
+from gearsig.errors import RefusalError
 from gearsig.gap import GapRequest
 from tests.gap.example_report import effect_report
 from tests.gap.stub_diagnosis import CHILD, OUTCOME, SECONDS, environment
@@ -115,17 +115,6 @@ def test_a_killed_process_is_told(job):
     wait(lambda: not job.is_running)
     with pytest.raises(JobFailedError, match="was killed"):
         job.report()
-
-
-@pytest.mark.parametrize(
-    "error",
-    [InputError("a", where="b", allowed="c", remedy="d"), RefusalError("a", remedy="b"), GearsigError("something")],
-)
-def test_errors_come_over_from_another_process(error):
-    again = error_from_json(error_to_json(error))
-    assert type(again) is type(error)
-    assert str(again) == str(error)
-    assert vars(again) == vars(error)
 
 
 def test_the_folder_is_private():
