@@ -224,15 +224,15 @@ class Fleet:
         only = {"name": name, "channel": channel, "place": place}
         return self._table("indicators", machine, point, only, start, end, "machine, point, date")
 
-    def series(self, machine: str = "", point: str = "", *, minimum_level: int = OK) -> DataFrame:
+    def series(self, machine: str = "", point: str = "") -> DataFrame:
         """Return a row per indicator of a measuring point: its last value against its limits, the worst first."""
         self._refreshed()
         where, values = _where(machine, point, {})
         sql = (
-            f"SELECT * EXCLUDE (fingerprint) FROM trends {where} AND name <> '' AND level >= ? "
+            f"SELECT * EXCLUDE (fingerprint) FROM trends {where} AND name <> '' "
             "ORDER BY level DESC, coalesce(abs(change), 0) DESC, machine, point, name"
         )
-        return self._frame(sql, [*values, minimum_level])
+        return self._frame(sql, values)
 
     def status(self) -> DataFrame:
         """Return a row per measuring point, the worst first.

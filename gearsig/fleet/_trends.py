@@ -24,7 +24,6 @@ from gearsig.fleet._statistics import (
     WARNING,
     BoolArray,
     IntArray,
-    Limits,
     alarm_levels,
     change_points,
     decibels,
@@ -292,15 +291,15 @@ def judge(
     y, in_db = decibels(values, baseline)
     x, inside, normalised = regressors(*_conditions(recordings), baseline)
     rate = settings.false_alarm_rate / max(len(series), 1)
-    limits, reach = _limits(y, x, baseline, in_db, rate, settings)
-    judged = (~baseline & inside)[:, None] & np.isfinite(y) & np.isfinite(limits.high)
-    rise = y - limits.expected
+    middle, reach = _limits(y, x, baseline, in_db, rate, settings)
+    judged = (~baseline & inside)[:, None] & np.isfinite(y) & np.isfinite(reach)
+    rise = y - middle
     with np.errstate(invalid="ignore"):
         sample = np.where(np.abs(rise) > reach, np.where(in_db & (rise >= SERIOUS_DB), ALARM, WARNING), OK)
         calm = np.abs(rise) <= RETURN * reach
     sample = np.where(judged, sample, -1)
     basis = [STATISTICAL if known else NONE for known in np.asarray(np.isfinite(reach).any(axis=0)).tolist()]
-    expected, low, high, alarm = _natural_limits(limits.expected, reach, in_db)
+    expected, low, high, alarm = _natural_limits(middle, reach, in_db)
     zones = _zone_limits(recordings)
     is_velocity = np.asarray(series["name"] == "overall velocity", dtype=np.bool_)
     for column in np.flatnonzero(is_velocity):
@@ -343,11 +342,11 @@ def _conditions(recordings: DataFrame) -> tuple[FloatArray, FloatArray]:
 
 def _limits(
     y: FloatArray, x: FloatArray, baseline: BoolArray, in_db: BoolArray, rate: float, settings: TrendSettings
-) -> tuple[Limits, FloatArray]:
-    """Return the limits of prediction, and how far a value may be from what is expected: never less than a change."""
-    limits = prediction_limits(y, x, baseline, rate, min_scatter=np.where(in_db, MIN_SCATTER, 1e-9))
+) -> tuple[FloatArray, FloatArray]:
+    """Return what is expected, and how far a value may be from it: never less than a change."""
+    expected, width = prediction_limits(y, x, baseline, rate, min_scatter=np.where(in_db, MIN_SCATTER, 1e-9))
     min_rise = np.where(in_db, settings.minimum_change_db, 0.0)
-    return limits, np.maximum(limits.high - limits.expected, min_rise)
+    return expected, np.maximum(width, min_rise)
 
 
 def _natural_limits(
@@ -412,10 +411,10 @@ def over_condition(
     x, inside, _ = regressors(*rows, is_baseline)
     y, in_db = decibels(value[:, None], baseline)
     y = np.concatenate([y, np.full((n_added, 1), np.nan)])
-    limits, reach = _limits(y, x, is_baseline, in_db, trends.false_alarm_rate, settings)
+    expected, reach = _limits(y, x, is_baseline, in_db, trends.false_alarm_rate, settings)
     reach[n : 2 * n] = reach[:n]  # each value keeps the limits of its own place
-    natural = np.hstack(_natural_limits(limits.expected, reach, in_db))
-    moved = np.nan_to_num(limits.expected[n : 2 * n, 0] - limits.expected[:n, 0])
+    natural = np.hstack(_natural_limits(expected, reach, in_db))
+    moved = np.nan_to_num(expected[n : 2 * n, 0] - expected[:n, 0])
     if is_iso:  # boundaries of zones are the same at any load
         moved[:] = 0.0
         natural[:, 1], natural[:, 2:] = np.nan, [trends.high[0, column], trends.alarm[0, column]]

@@ -22,7 +22,7 @@ from gearsig.recording import Recording
 from gearsig.report._json import plain
 
 
-def write_answer(answer: MethodAnswer, folder: str | Path, name: str = "") -> tuple[Path, ...]:
+def write_answer(answer: MethodAnswer, folder: str | Path) -> tuple[Path, ...]:
     """Write figure (PNG and SVG), table (CSV), arrays (HDF5) and numbers (JSON), each whole or not at all.
 
     Parameters
@@ -30,8 +30,6 @@ def write_answer(answer: MethodAnswer, folder: str | Path, name: str = "") -> tu
     answer : MethodAnswer
     folder : path
         Made where it is missing.
-    name : str
-        Of the files, without ending; empty: the method's.
 
     Returns
     -------
@@ -39,7 +37,7 @@ def write_answer(answer: MethodAnswer, folder: str | Path, name: str = "") -> tu
     """
     from pandas import DataFrame
 
-    stem = made_folder(Path(folder)) / (name or answer.method)
+    stem = made_folder(Path(folder)) / answer.method
     paths = tuple(stem.with_name(f"{stem.name}{ending}") for ending in (".png", ".svg", ".csv", ".h5", ".json"))
     figure, frame = answer.draw(), DataFrame(dict(answer.table))
     write_whole(paths[0], lambda file: figure.savefig(file, format="png"))

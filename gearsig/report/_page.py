@@ -20,7 +20,7 @@ from gearsig.motion import StartStop
 from gearsig.orders import OrderMap, SynchronousAverage
 from gearsig.plot import FAULT, QUIET, Captioned, ChartLine, Cursor, LinePanel, Picture, embed
 from gearsig.recording import si_factor
-from gearsig.report._files import compiled, render
+from gearsig.report._files import compiled, render, write_pdf
 from gearsig.report._methods import fitting_methods, method_pictures
 from gearsig.report._sections import (
     change_rows,
@@ -658,6 +658,7 @@ def write_page(
     index: str = "",
     methods: Sequence[str] | None = None,
     mark: str = "",
+    pdf: bool = False,
 ) -> Path:
     """Write the report of one recording: verdict, findings, machine, figures, indicators, provenance.
 
@@ -676,27 +677,26 @@ def write_page(
         Further methods that the page shows; None: those that the recording calls for.
     mark : str
         By which a folder of pages knows whose page it is, see `recording_mark`; empty: none.
+    pdf : bool
+        Write it as PDF beside it as well.
 
     Returns
     -------
     Path
         Of the page.
     """
-    html = page_html(analysis, command=command, index=index, methods=methods, mark=mark)
-    return write_text(Path(path), html)
+    parts = page_parts(analysis, command=command, methods=methods)
+    if pdf:
+        write_pdf(Path(path).with_suffix(".pdf"), compiled("page.typ", parts))
+    return write_text(Path(path), _html(analysis, parts, index=index, mark=mark))
 
 
-def page_html(
-    analysis: Analysis,
-    *,
-    command: str = "",
-    index: str = "",
-    date: datetime | None = None,
-    methods: Sequence[str] | None = None,
-    mark: str = "",
-) -> str:
-    """Return the page that `write_page` writes."""
-    parts = page_parts(analysis, command=command, date=date, methods=methods)
+def page_html(analysis: Analysis, *, command: str = "", index: str = "", date: datetime | None = None) -> str:
+    """Return the page that `write_page` writes, with the further methods that the recording calls for."""
+    return _html(analysis, page_parts(analysis, command=command, date=date), index=index)
+
+
+def _html(analysis: Analysis, parts: dict[str, Any], *, index: str = "", mark: str = "") -> str:
     return render(
         "page.html.j2",
         **parts,
