@@ -17,7 +17,7 @@ from gearsig.errors import GearsigError
 from gearsig.fleet._add import AddedRecording
 from gearsig.fleet._fleet import Fleet
 from gearsig.fleet._origin import FilePattern, Origin, PassedOver, origins, passed_over_text
-from gearsig.processes import n_processors, process_pool
+from gearsig.processes import active_cluster, n_processors, process_pool
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ def watch(
                     reported |= {file.path for file in new}
                     on_event(WatchEvent("passed over", datetime.now(UTC), passed_over_text(new), passed_over=new))
                 if ready:
-                    if pool is None:
+                    if pool is None and active_cluster() is None:
                         pool = stack.enter_context(process_pool(n_processes or n_processors()))
                     try:
                         fleet.add(ready, executor=pool, n_processes=n_processes, on_progress=tell, **_options(how))

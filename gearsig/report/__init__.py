@@ -18,6 +18,7 @@ from gearsig.report._files import (
     check_writable,
     page_names,
     recording_mark,
+    write_folder,
     write_pdf,
 )
 from gearsig.report._fleet import write_fleet_page
@@ -185,6 +186,7 @@ __all__ = [
     "verdict_rows",
     "write_answer",
     "write_fleet_page",
+    "write_folder",
     "write_gap_json",
     "write_gap_page",
     "write_index",

@@ -11,14 +11,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, is_dataclass
 from datetime import datetime
 from enum import Enum
-from functools import cache
+from functools import cache, partial
 from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from gearsig import __version__
-from gearsig.cache import write_whole
+from gearsig.cache import made_folder, write_text, write_whole
 from gearsig.errors import InputError
 from gearsig.plot import Picture, font_folder
 from gearsig.recording import without_condition
@@ -26,6 +26,7 @@ from gearsig.rig import recording_stem
 
 if TYPE_CHECKING:
     from jinja2 import Environment
+    from matplotlib.figure import Figure
 
 
 LONGEST_NAME = 50  # a letter may take four bytes, and file systems stop at 255
@@ -143,6 +144,36 @@ def _environment() -> Environment:
     )
     environment.filters["unit"] = unit_text
     return environment
+
+
+def write_folder(
+    folder: str | Path,
+    figures: Mapping[str, Figure] | None = None,
+    texts: Mapping[str, str] | None = None,
+    *,
+    dpi: float | Literal["figure"] = 160,
+) -> tuple[Path, ...]:
+    """Write figures and texts by their names into a folder, which is made, each whole or not at all; return the paths.
+
+    Parameters
+    ----------
+    folder : str or Path
+    figures, texts : mapping, optional
+        Name with ending, such as "map.png" or "map.svg" → figure; likewise for texts.
+    dpi : float or "figure"
+        Dots per inch of the figures; "figure": each its own.
+
+    Raises
+    ------
+    InputError
+        If something cannot be written.
+    """
+    place = made_folder(Path(folder))
+    paths = []
+    for name, figure in (figures or {}).items():
+        draw = partial(figure.savefig, format=name.rpartition(".")[2], dpi=dpi)
+        paths.append(write_whole(place / name, draw, remedy="choose another folder with -o"))
+    return *paths, *(write_text(place / name, text) for name, text in (texts or {}).items())
 
 
 def date_text(date: datetime | None = None) -> str:
