@@ -543,11 +543,10 @@ class Fleet:
     def _check_place(self, machine: str, point: str, *, exactly: bool = False) -> None:
         if not machine and not point and not exactly:
             return
-        where = (
-            "machine = ? AND point = ?" if machine and (point or exactly) else "machine = ?" if machine else "point = ?"
-        )
-        values = [machine, point] if machine and (point or exactly) else [machine or point]
-        if self._rows(f"SELECT 1 FROM recordings WHERE {where} LIMIT 1", values):
+        where, values = _where(machine, point, {})
+        if exactly:  # also the point without a name
+            where, values = "WHERE machine = ? AND point = ?", [machine, point]
+        if self._rows(f"SELECT 1 FROM recordings {where} LIMIT 1", values):
             return
         machines = sorted({m for (m,) in self._rows("SELECT DISTINCT machine FROM recordings")})
         if machine not in machines and machine:

@@ -685,10 +685,7 @@ def trend_of(trends: PointTrends, column: int, machine: str, point: str) -> Tren
             "value": trends.values[:, column],
             "speed_rpm": trends.recordings["speed_rpm"],
             "load_nm": trends.recordings["load_nm"],
-            "expected": trends.expected[:, column],
-            "low": trends.low[:, column],
-            "high": trends.high[:, column],
-            "alarm": trends.alarm[:, column],
+            **{name: getattr(trends, name)[:, column] for name in ("expected", "low", "high", "alarm")},
             "level": [level_name(int(level), trends.basis[column]) for level in trends.levels[:, column]],
             "in_baseline": trends.baseline,
         }

@@ -88,14 +88,21 @@ def _summary(changes: FleetChanges) -> str:
     return f"{head}: {', '.join(parts)}." if parts else f"{head}; nothing changed."
 
 
+def _series(of: Mapping[Any, Any]) -> dict[str, str]:
+    """Return machine, name and place of a series."""
+    return {
+        "machine": " · ".join(filter(None, (of["machine"], of["point"]))),
+        "name": of["name"],
+        "of": ", ".join(filter(None, (of["place"], of["channel"], of["computed_on"]))),
+    }
+
+
 def _row(change: AlarmChange) -> dict[str, str]:
     unit = f" {unit_text(change.unit)}" if change.unit else ""
     return {
         "level": change.level,
         "css_class": LEVEL_CLASSES[change.level],
-        "machine": " · ".join(part for part in (change.machine, change.point) if part),
-        "name": change.name,
-        "of": ", ".join(part for part in (change.place, change.channel, change.computed_on) if part),
+        **_series(vars(change)),
         "value": readable(change.value, 4) + unit,
         "expected": readable(change.expected, 4),
         "limit": readable(change.upper_limit, 4),
@@ -108,9 +115,7 @@ def _row(change: AlarmChange) -> dict[str, str]:
 
 def _shift(row: Mapping[Any, Any]) -> dict[str, str]:
     return {
-        "machine": " · ".join(part for part in (row["machine"], row["point"]) if part),
-        "name": row["name"],
-        "of": ", ".join(part for part in (row["place"], row["channel"], row["computed_on"]) if part),
+        **_series(row),
         "since": f"{row['changed']:%Y-%m-%d}",
         "by": change_text(row["changed_by"], in_db=bool(row["in_db"])),
     }
