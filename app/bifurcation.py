@@ -200,7 +200,6 @@ def load(path: Path) -> KeptValue | None:
 
 DEFINITION, VALUES = "definition.json", "values"
 DIRECTIONS = ("both", "up", "down", "rest")
-"""How often the parent counts what the processes have written."""
 
 
 @dataclass(frozen=True)

@@ -92,7 +92,7 @@ def regressors(
 def prediction_limits(
     y: FloatArray, x: FloatArray, baseline: BoolArray, false_alarm_rate: float, *, min_scatter: FloatArray | float = 0.0
 ) -> tuple[FloatArray, FloatArray]:
-    """Return what is expected, and how far from it an unchanged machine's value is with the stated probability at most.
+    """Return what is expected, and the distance beyond which an unchanged machine lies with the stated probability.
 
     Parameters
     ----------

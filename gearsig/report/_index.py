@@ -151,7 +151,7 @@ def index_of(ordered: Sequence[Entry], failures: Sequence[Failure] = ()) -> dict
         orders[name] = _places([(-_largest(entry, name), i) for i, entry in enumerate(ordered)])
     rows = [
         {
-            "entry": replace(entry, indicators=()),  # what is shown of them are the cells
+            "entry": replace(entry, indicators=(), ratio_db=None),  # what is shown of these are texts
             "css_class": css_class(entry.outcome),
             "href": quote(entry.page),
             "date": f"{entry.date:%Y-%m-%d %H:%M}".removesuffix(" 00:00") if entry.date is not None else "",
