@@ -26,7 +26,6 @@ from gearsig.rig import recording_stem
 
 if TYPE_CHECKING:
     from jinja2 import Environment
-    from matplotlib.figure import Figure
 
 
 LONGEST_NAME = 50  # a letter may take four bytes, and file systems stop at 255
@@ -148,7 +147,7 @@ def _environment() -> Environment:
 
 def write_folder(
     folder: str | Path,
-    figures: Mapping[str, Figure] | None = None,
+    figures: Mapping[str, Any] | None = None,  # the drawing library's type is known in gearsig.plot alone
     texts: Mapping[str, str] | None = None,
     *,
     dpi: float | Literal["figure"] = 160,
