@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gearsig import phase
-from gearsig.cache import read_arrays, remove_parts, write_text, write_whole
+from gearsig.cache import read_arrays, remove_parts, write_whole
 from gearsig.checks import FloatArray, count, one_of, within
 from gearsig.errors import GearsigError, RefusalError
 from gearsig.formatting import csv_rows
 from gearsig.processes import active_cluster, killed_text, n_processors, run_jobs
+from gearsig.report import write_folder
 from sims.continuation import DECAYS, TRANSMISSION_ERROR, Branch, End, SteadyRun
 from sims.cracked import SIGNALS, PairState
 from sims.gear_pair import COORDINATES
@@ -199,7 +200,6 @@ def load(path: Path) -> KeptValue | None:
 
 DEFINITION, VALUES = "definition.json", "values"
 DIRECTIONS = ("both", "up", "down", "rest")
-"""How often the parent counts what the processes have written."""
 
 
 @dataclass(frozen=True)
@@ -360,7 +360,6 @@ def run_value(request: BifurcationRequest, value: float, before: End | None) -> 
 
 
 POINTS, SUMMARY, FIGURE = "points.csv", "bifurcation.json", "bifurcation.png"
-DOTS_PER_INCH = 160
 NAMES = {"up": "rising", "down": "falling", "rest": "from rest"}
 TRANSIENT = f"{DECAYS:g} time constants of the machine's slowest decay are left out at each value"
 BOUNDED = "known at the values tried only; a range that begins or ends where the sweep does may go on beyond it"
@@ -368,20 +367,17 @@ BOUNDED = "known at the values tried only; a range that begins or ends where the
 Values = Mapping[str, Sequence[KeptValue]]
 
 
-def write_results(request: BifurcationRequest, values: Values, folder: Path) -> tuple[Path, Path, Path]:
-    """Write table, summary and figure; return their paths.
+def write_results(request: BifurcationRequest, values: Values, folder: Path) -> tuple[Path, ...]:
+    """Write figure, table and summary; return their paths.
 
     Raises
     ------
     RefusalError
         If no value gave points.
     """
-    figure = figure_of(request.branch, values)
-    table = write_text(folder / POINTS, points_csv(request.branch, values))
+    figures = {FIGURE: figure_of(request.branch, values)}
     text = json.dumps(summary(request, values), indent=2, ensure_ascii=False) + "\n"
-    picture = folder / FIGURE
-    figure.savefig(picture, dpi=DOTS_PER_INCH)
-    return picture, table, write_text(folder / SUMMARY, text)
+    return write_folder(folder, figures, {POINTS: points_csv(request.branch, values), SUMMARY: text})
 
 
 def diagrams(branch: Branch, values: Values) -> dict[str, phase.BifurcationDiagram]:

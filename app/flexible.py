@@ -12,10 +12,10 @@ import numpy as np
 
 from gearsig import plot
 from gearsig.angle import find_shaft_angle, resample_to_angle
-from gearsig.cache import write_text
 from gearsig.checks import FloatArray, positive
 from gearsig.formatting import csv_rows
 from gearsig.orders import OrderMap, order_map
+from gearsig.report import write_folder
 from sims import reduced_fe
 from sims.gear_pair import MeasuredRun, build_rig
 from sims.machine import Operation, Profile
@@ -197,15 +197,10 @@ RANGE = (0.52, 1.25)
 
 def write_study(study: Study, folder: Path, title: str) -> tuple[Path, ...]:
     """Write all figures as PNG, the sweeps as CSV and a summary as JSON; return the paths."""
-    folder.mkdir(parents=True, exist_ok=True)
-    paths = []
-    for name, figure in figures(study, title).items():
-        paths.append(folder / f"{name}.png")
-        figure.savefig(paths[-1], dpi=160)
-    paths.append(write_text(folder / "sweeps.csv", sweeps_csv(study)))
-    paths.append(write_text(folder / "maps.csv", maps_csv(study.maps)))
-    paths.append(write_text(folder / "study.json", json.dumps(summary(study), indent=2, ensure_ascii=False) + "\n"))
-    return tuple(paths)
+    drawn = {f"{name}.png": figure for name, figure in figures(study, title).items()}
+    text = json.dumps(summary(study), indent=2, ensure_ascii=False) + "\n"
+    tables = {"sweeps.csv": sweeps_csv(study), "maps.csv": maps_csv(study.maps)}
+    return write_folder(folder, drawn, {**tables, "study.json": text})
 
 
 def figures(study: Study, title: str) -> dict[str, Figure]:

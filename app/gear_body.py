@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gearsig.cache import made_folder, write_text
 from gearsig.checks import FloatArray, count, positive
 from gearsig.errors import InputError
 from gearsig.formatting import counted, csv_rows, signed
 from gearsig.plot import CurvePanel, curves_figure, gear_mesh_figure, gear_modes_figure, gear_stress_figure
+from gearsig.report import write_folder
 from sims import fe_gear
 from sims.fe_gear import (
     CraigBamptonGear,
@@ -155,11 +155,7 @@ HELD = {"free": "free", "bore": "bore held", "springs": "hub on springs"}
 
 def write_gear_body(study: GearBodyStudy, folder: Path, *, vtk: bool = False) -> tuple[Path, ...]:
     """Write the figures as PNG, and where there are: VTK file, reduced gear, table of Craig–Bampton."""
-    made_folder(folder)
-    paths = []
-    for name, figure in figures(study).items():
-        paths.append(folder / f"{name}.png")
-        figure.savefig(paths[-1], dpi=160)
+    paths = [*write_folder(folder, {f"{name}.png": figure for name, figure in figures(study).items()})]
     if vtk:
         paths.append(fe_gear.write_vtk(folder / "gear.vtu", study.mesh, _fields(study)))
     if study.reduced is not None:
@@ -421,12 +417,8 @@ def growth_figure(study: GrowthStudy) -> Figure:
     return curves_figure(panels, n_columns=len(panels), title="growth of a root crack", height_in=2.8)
 
 
-def write_growth(study: GrowthStudy, folder: Path) -> list[Path]:
+def write_growth(study: GrowthStudy, folder: Path) -> tuple[Path, ...]:
     """Write growth.png and .svg, growth.csv, growth.json."""
-    made_folder(folder)
-    paths, figure = [folder / "growth.png", folder / "growth.svg"], growth_figure(study)
-    for path in paths:
-        figure.savefig(path, dpi=160)
     columns = ["depth_mm", "k_mpa_sqrt_m", "turns_5", "turns_50", "turns_95"]
     rows = zip(study.growth.depth_mm, study.growth.k_mpa_sqrt_m, *study.growth.turns, strict=True)
     table = csv_rows(columns, ([f"{value:.6g}" for value in row] for row in rows))
@@ -443,6 +435,6 @@ def write_growth(study: GrowthStudy, folder: Path) -> list[Path]:
         "law": study.law.source,
         "assumptions": list(ASSUMPTIONS),
     }
-    write_text(folder / "growth.csv", table)
-    write_text(folder / "growth.json", json.dumps(content, indent=1, ensure_ascii=False) + "\n")
-    return [*paths, folder / "growth.csv", folder / "growth.json"]
+    text = json.dumps(content, indent=1, ensure_ascii=False) + "\n"
+    figures = dict.fromkeys(("growth.png", "growth.svg"), growth_figure(study))
+    return write_folder(folder, figures, {"growth.csv": table, "growth.json": text})

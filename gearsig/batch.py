@@ -9,7 +9,7 @@ from concurrent.futures import Executor
 from contextlib import closing, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from gearsig.errors import GearsigError, unexpected_text
 from gearsig.formatting import file_label
@@ -257,15 +257,14 @@ def _report_one(job: _Job) -> Entry | Failure:
     """Analyse one recording and write its page; every error becomes a reason."""
     from gearsig.cache import write_text
     from gearsig.diagnosis import LongAnalysis
-    from gearsig.report import Entry, entry_of, from_plain, page_pdf, plain, recording_mark, write_page, write_pdf
+    from gearsig.report import Entry, entry_of, from_plain, plain, recording_mark, write_page
 
     try:
         result = job.options.analyze(job.path)
         analysis = result.as_one() if isinstance(result, LongAnalysis) else result
         mark = recording_mark(job.path)
-        write_page(analysis, job.page, command=job.command, index="index.html", methods=job.methods, mark=mark)
-        if job.pdf:
-            write_pdf(job.page.with_suffix(".pdf"), page_pdf(analysis, command=job.command, methods=job.methods))
+        how: dict[str, Any] = {"command": job.command, "methods": job.methods, "pdf": job.pdf}
+        write_page(analysis, job.page, index="index.html", mark=mark, **how)
         entry = plain(replace(entry_of(analysis, job.name, job.page.name), is_reference=job.is_reference))
         with suppress(GearsigError):  # a page that the next run makes again
             write_text(_result_path(job), json.dumps({"made_of": job.made_of, "entry": entry}) + "\n")

@@ -248,16 +248,14 @@ def diagnose_majority(case: VisibleCase) -> GapReport:  # noqa: ARG001 - that is
 # --------------------
 
 
-def diagnose_unseen(case: VisibleCase) -> GapReport:
-    """Diagnose a case with the product, but for what was learned from the independent rig's development gears."""
-    with without_machines_of(INDEPENDENT):
-        return diagnose(case)
+def unseen(diagnose_case: Diagnoser) -> Diagnoser:
+    """Return a diagnoser without what was learned from the independent rig's development gears."""
 
+    def diagnosed(case: VisibleCase) -> GapReport:
+        with without_machines_of(INDEPENDENT):
+            return diagnose_case(case)
 
-def diagnose_forest_unseen(case: VisibleCase) -> GapReport:
-    """Return what the forests say of a case without what was learned from those gears."""
-    with without_machines_of(INDEPENDENT):
-        return diagnose_forest(case)
+    return diagnosed
 
 
 # --------------------
@@ -354,8 +352,8 @@ DIAGNOSERS: dict[str, Diagnoser] = {
     FOREST: diagnose_forest,
     MAJORITY: diagnose_majority,
     RULES: diagnose_rules,
-    GAP_UNSEEN: diagnose_unseen,
-    FOREST_UNSEEN: diagnose_forest_unseen,
+    GAP_UNSEEN: unseen(diagnose),
+    FOREST_UNSEEN: unseen(diagnose_forest),
     START_STOP: diagnose_drive,
 }
 """Those that `gearsig benchmark gap` knows by name."""

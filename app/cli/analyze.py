@@ -252,7 +252,7 @@ def make_report(
                     files,
                     output,
                     rig=options.open_rig(rig),
-                    **options.on_workers(workers, jobs),
+                    n_processes=jobs,
                     on_progress=advance,
                     **how,
                 )

@@ -114,8 +114,8 @@ def speed(
     Example: gearsig benchmark speed --only wavelet
     """
     from app.benchmark.speed import METHODS, measure, rows, table
-    from gearsig.cache import write_text
     from gearsig.formatting import csv_rows
+    from gearsig.report import write_folder
 
     chosen = [m for m in METHODS if not only or any(word.lower() in m.name.lower() for word in only)]
     if not chosen:
@@ -129,7 +129,7 @@ def speed(
     if output is not None:
         records = list(rows(results))
         numbers = csv_rows(records[0], (record.values() for record in records))
-        paths = write_text(output / "speed.md", text), write_text(output / "speed.csv", numbers)
+        paths = write_folder(output, texts={"speed.md": text, "speed.csv": numbers})
         typer.echo(f"{paths[0]} (table), {paths[1].name} (its numbers).")
 
 

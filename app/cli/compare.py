@@ -129,13 +129,11 @@ def read_pair(text: str, simulated: Recording, recorded: Recording) -> tuple[str
 
 def write_comparison(comparison: Comparison, folder: Path, command: str) -> None:
     """Write page, data and table; all are made before the first is written, and each appears when it is complete."""
-    from gearsig.cache import write_text
-    from gearsig.report import comparison_page, comparison_to_json, orders_csv
+    from gearsig.report import comparison_page, comparison_to_json, orders_csv, write_folder
 
     texts = {
         TABLE: orders_csv(comparison),
         DATA: comparison_to_json(comparison),
         PAGE: comparison_page(comparison, command=command),
     }
-    for name, text in texts.items():
-        write_text(folder / name, text)
+    write_folder(folder, texts=texts)

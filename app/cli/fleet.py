@@ -127,7 +127,7 @@ def add(
                 reference_rate_hz=reference_fs,
                 torque_nm=options.torque_of(torque),
                 memory_bytes=1e9 * memory,
-                **options.on_workers(workers, jobs),
+                n_processes=jobs,
                 on_progress=advance,
             )
         except KeyboardInterrupt:
@@ -344,7 +344,7 @@ def watch(
             f"{event.time:%Y-%m-%dT%H:%M:%SZ} {event.kind}: {words}", err=event.kind in ("problem", "passed over")
         )
 
-    with options.open_cluster(cluster) as workers:
+    with options.open_cluster(cluster):
         try:
             n_failed = run_watch(
                 fleet,
@@ -353,7 +353,7 @@ def watch(
                 interval_s=interval,
                 settle_s=settle,
                 once=once,
-                **options.on_workers(workers, jobs),
+                n_processes=jobs,
                 pattern=pattern,
                 machine=machine,
                 point=point,

@@ -6,6 +6,7 @@ growth`: how fast a root crack grows, and how many turns are left.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -52,15 +53,13 @@ def flexible(
     from app.flexible import RANGE, flexible_study, write_study
     from sims.presets import preset as preset_named
     from sims.reduced_fe import ReducedPair
-    from sims.simulator import SimulationSetup
 
     request = options.read_request(MODEL, preset, settings, effects, None, None, "1s", "20480Hz", seed)
     first, last = span(speeds, "rpm", "--speeds", example="900..4100")
     torques_nm = tuple(quantity(text, "N m", "--torques") for text in torques.split(","))
     if fresh:
         options.clear_other_versions(MODEL)
-    setup = SimulationSetup(request.preset, request.parameters, request.effects)
-    ready = ReducedPair().prepare(setup, np.random.default_rng(seed))
+    ready = ReducedPair().prepare(request.setup, np.random.default_rng(seed))
     chosen = preset_named(MODEL, request.preset)
     with progress_bar("preparing") as show:
         study = flexible_study(
@@ -226,13 +225,12 @@ def growth(
     from gearsig.report import check_writable
     from sims.cracked import CrackedPair
     from sims.presets import preset as preset_named
-    from sims.simulator import SimulationSetup
 
     one_of(gear, "--gear", ("driver", "driven"))
     check_writable(output)
     request = options.read_request(CRACKED, preset, settings, None, None, None, "1s", "20480Hz", seed)
     chosen = preset_named(CRACKED, request.preset)
-    setup = SimulationSetup(request.preset, {**request.parameters, "crack_depth_mm": 0.0})
+    setup = replace(request.setup, parameters={**request.parameters, "crack_depth_mm": 0.0})
     study = growth_study(
         CrackedPair().prepare(setup, np.random.default_rng(seed)).machine.mesh,
         1 if gear == "driver" else 2,
@@ -252,8 +250,6 @@ def growth(
 
 
 def _law(paris: str, threshold: float, toughness: float) -> GrowthLaw:
-    from dataclasses import replace
-
     from sims.reduced_fe import STEEL_IN_AIR, GrowthLaw, GrowthStage
 
     if not paris:

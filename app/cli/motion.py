@@ -42,9 +42,8 @@ def start_stop(
 
     Example: gearsig start-stop drive.h5 --rig drive.toml -o drive
     """
-    from gearsig.cache import write_text
     from gearsig.motion import examine_start_stop
-    from gearsig.report import check_writable, start_stop_json, start_stop_text
+    from gearsig.report import check_writable, start_stop_json, start_stop_text, write_folder
 
     if output is not None:
         check_writable(output)
@@ -54,8 +53,7 @@ def start_stop(
     if output is not None:
         from gearsig.plot import start_stop_figure
 
-        write_text(output / DATA, data)
-        start_stop_figure(examined).savefig(output / PICTURE)
+        write_folder(output, {PICTURE: start_stop_figure(examined)}, {DATA: data}, dpi="figure")
     typer.echo(data if json else start_stop_text(examined))
     if output is not None and not json:
         typer.echo(f"\nIn {output}: {DATA}, {PICTURE}.")
@@ -155,20 +153,16 @@ def read_datum(text: str) -> str | float:
 
 def write_force(estimate: ForceEstimate, study: NoiseStudy | None, folder: Path) -> tuple[str, ...]:
     """Write data, table and pictures; return the files' names. Without a reference there is no picture."""
-    from gearsig.cache import write_text
     from gearsig.plot import force_figure, noise_figure
-    from gearsig.report import force_csv, force_json
+    from gearsig.report import force_csv, force_json, write_folder
 
-    write_text(folder / FORCE_DATA, force_json(estimate, study))
-    write_text(folder / TABLE, force_csv(estimate))
-    pictures = {}
+    texts, pictures = {FORCE_DATA: force_json(estimate, study), TABLE: force_csv(estimate)}, {}
     if estimate.references_n:
         pictures[FORCE_PICTURE] = force_figure(estimate)
     if study is not None:
         pictures[NOISE_PICTURE] = noise_figure(study)
-    for name, figure in pictures.items():
-        figure.savefig(folder / name)
-    return (FORCE_DATA, TABLE, *pictures)
+    write_folder(folder, pictures, texts, dpi="figure")
+    return (*texts, *pictures)
 
 
 FITTED_NAMES = (

@@ -129,13 +129,6 @@ def open_cluster(address: str) -> Iterator[Cluster | None]:
         yield opened
 
 
-def on_workers(workers: Cluster | None, n_processes: int | None) -> dict[str, Any]:
-    """Return what a library function takes to run its jobs on a cluster, else in so many processes."""
-    if workers is None:
-        return {"n_processes": n_processes}
-    return {"n_processes": workers.n_workers, "executor": workers.executor}
-
-
 def open_rig(path: Path | None, recording: Path | None = None) -> Rig | None:
     """Read the rig file that is given, else the one of the same name beside the recording, and say so."""
     from gearsig.rig import read_rig, rig_file_beside

@@ -146,16 +146,8 @@ def paper(name: str, on_progress: Progress = lambda _stage, _done: None) -> Pape
 
 def write_paper(publication: Paper, folder: Path, *, command: str = "") -> tuple[Path, ...]:
     """Write each figure as PNG and SVG, the claims as JSON, and the page that shows them beside each other."""
-    from gearsig.cache import made_folder, write_text
-    from gearsig.report import Section, benchmark_html
+    from gearsig.report import Section, benchmark_html, write_folder
 
-    made_folder(folder)
-    paths = []
-    for item in publication.figures:
-        for ending in (".png", ".svg"):
-            paths.append(folder / f"{item.name}{ending}")
-            item.figure.savefig(paths[-1], dpi=160)
-    paths.append(write_text(folder / "claims.json", _claims_json(publication)))
     header = ("the publication says", "the model gives", "verdict")
     sections = [
         Section(
@@ -172,8 +164,8 @@ def write_paper(publication: Paper, folder: Path, *, command: str = "") -> tuple
     facts = [("publication", publication.source), ("machine", publication.machine)]
     facts += [("command", command)] if command else []
     page = benchmark_html(publication.title, publication.summary, sections, facts, datetime.now().astimezone())
-    paths.append(write_text(folder / "index.html", page))
-    return tuple(paths)
+    drawn = {f"{item.name}{end}": item.figure for item in publication.figures for end in (".png", ".svg")}
+    return write_folder(folder, drawn, {"claims.json": _claims_json(publication), "index.html": page})
 
 
 def _claims_json(paper: Paper) -> str:

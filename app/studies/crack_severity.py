@@ -7,7 +7,6 @@ intervals.
 
 from __future__ import annotations
 
-import argparse
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,7 +16,7 @@ from typing import Any
 import numpy as np
 import typer
 
-from app.studies import answers_of, drawn_rigs
+from app.studies import answers_of, drawn_rigs, run_study
 from app.studies.drawn_rigs import DrawnRig, draw_rig, simulate_rig
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError, RefusalError
@@ -419,24 +418,16 @@ EVEN_EVERY = 6
 _DIGITS = 7
 
 
-def main() -> None:
-    """Simulate, fit, write."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--cases", type=int, default=N_CASES)
-    parser.add_argument("--processes", type=int, default=2)
-    parser.add_argument("--to", type=Path, default=FILE)
-    parser.add_argument("--state", default="", help="the simulator's commit, for the provenance")
-    arguments = parser.parse_args()
-    observed = observe_all(arguments.cases, arguments.processes)
-    text = json.dumps(calibration_of(observed, arguments.cases, arguments.state), indent=1)
-    arguments.to.write_text(text + "\n", encoding="utf-8")
-    typer.echo(f"{len(observed)} of {arguments.cases} cases; written to {arguments.to}")
+def main(cases: int = N_CASES, processes: int = 2, to: Path = FILE, state: str = "") -> None:
+    """Simulate, fit, write; `state` is the simulator's commit, for the provenance."""
+    observed = observe_all(cases, processes)
+    text = json.dumps(calibration_of(observed, cases, state), indent=1)
+    to.write_text(text + "\n", encoding="utf-8")
+    typer.echo(f"{len(observed)} of {cases} cases; written to {to}")
 
 
 def observe_all(n_cases: int, n_processes: int) -> list[tuple[int, CaseFeatures]]:
     """Return what the drawn cases show, by their index; some cannot be made, or show too few mesh harmonics."""
-    from app.studies.crack_severity import observe_case
-
     answers = answers_of(observe_case, range(n_cases), n_processes)
     return [(index, answer) for index, answer in answers if isinstance(answer, CaseFeatures)]
 
@@ -552,4 +543,4 @@ def _provenance(observed: Sequence[tuple[int, CaseFeatures]], n_drawn: int, simu
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

@@ -515,7 +515,7 @@ def channel_analysis(
 
     The envelope shown is the one in which the surest family of impacts was found, else the one whose lines stand out
     most; the channel's own band is shown where it bears out a damage that is claimed of a bearing. `changes` are
-    differences from a reference's averages, by shaft and channel.
+    differences from a reference's averages, by shaft and channel: those of shafts with a damaged tooth are shown.
     """
     kurtogram_band = next((band for band in kurtogram_bands if band.envelope.channel == name), None)
     candidates = [e for e in (*envelopes, *([kurtogram_band.envelope] if kurtogram_band else [])) if e.channel == name]
@@ -526,12 +526,13 @@ def channel_analysis(
     if kurtogram_band is not None and not any(witness(kurtogram_band, order) for order in orders if order is not None):
         kurtogram_band = None
     averages = {}
+    damaged = {f.where.shaft for f in findings if f.is_claim and f.where.angle_deg is not None}
     for shaft in signals.shafts:
         averages[shaft.shaft, "average"] = shaft.averages[name]
         if name in shaft.separated:
             parts = shaft.separated[name]
             averages |= {(shaft.shaft, p.kind): p for p in (parts.residual, parts.difference, parts.regular)}
-        if (change := changes.get((shaft.shaft, name))) is not None:
+        if shaft.shaft in damaged and (change := changes.get((shaft.shaft, name))) is not None:
             averages[shaft.shaft, change.kind] = change
     return ChannelAnalysis(
         channel=name,

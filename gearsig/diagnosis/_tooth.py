@@ -475,11 +475,16 @@ def with_changed_teeth(
 
     with the shift s and each mesh harmonic's gain g of `gearsig.severity.difference_lines`. A local event of it is
     tested as one of the average itself is. It takes the place of what the recording alone tells of teeth; where there
-    is none, "no damage shows" does so on shafts where a change of a useful size would have shown. The differences, by
-    shaft and channel, are those of shafts with such a tooth.
+    is none, "no damage shows" does so on shafts where a change of a useful size would have shown. The differences, of
+    all shafts that compare, come by shaft and channel.
     """
     able = _able(signals)
     pairs = [(c, largest_event(c.since, signals)) for c in (_compared(signals, s, healthy) for s in able) if c]
+    changes = {
+        (c.since.shaft, name): replace(parts.difference, kind="change")
+        for c, _ in pairs
+        for name, parts in c.since.separated.items()
+    }
     # Looking at the recording alone came before: two tests for each shaft.
     compared = [
         _Examined(signals, c.since, event, min(1.0, 2 * len(able) * event.place.p_value), since_reference=True)
@@ -487,16 +492,12 @@ def with_changed_teeth(
         if not c.is_healthys(event)
     ]
     new = _findings(signals, compared)
-    if damaged := {f.where.shaft for f in new if f.is_claim}:
-        since = [(e.shaft.shaft, e.shaft.separated) for e in compared if e.shaft.shaft in damaged]
-        changes = {
-            (shaft, name): replace(of.difference, kind="change") for shaft, parts in since for name, of in parts.items()
-        }
+    if any(f.is_claim for f in new):
         return [*(f for f in findings if f.code not in _OF_TEETH), *new], changes
     if len(compared) < len(able) or any(f.is_claim and f.code in _OF_TEETH for f in findings):
-        return list(findings), {}
+        return list(findings), changes
     new = [f for f in new if f.code in _STATEMENTS]
-    return [*(f for f in findings if f.code not in _STATEMENTS), *new] if new else list(findings), {}
+    return [*(f for f in findings if f.code not in _STATEMENTS), *new] if new else list(findings), changes
 
 
 ChangedAverages = Mapping[tuple[str, str], SynchronousAverage]

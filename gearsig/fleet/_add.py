@@ -113,8 +113,6 @@ class AddResult:
         Recordings that the store held already.
     n_elsewhere : int
         Those that another process took meanwhile.
-    ran : str
-        Where the jobs ran, and which workers were lost; empty for local processes.
     passed_over : tuple of PassedOver
         Recordings that the pattern leaves out.
     """
@@ -122,7 +120,6 @@ class AddResult:
     added: tuple[AddedRecording, ...]
     n_known: int
     n_elsewhere: int = 0
-    ran: str = ""
     passed_over: tuple[PassedOver, ...] = ()
 
     @property

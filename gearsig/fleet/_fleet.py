@@ -224,15 +224,15 @@ class Fleet:
         only = {"name": name, "channel": channel, "place": place}
         return self._table("indicators", machine, point, only, start, end, "machine, point, date")
 
-    def series(self, machine: str = "", point: str = "", *, minimum_level: int = OK) -> DataFrame:
+    def series(self, machine: str = "", point: str = "") -> DataFrame:
         """Return a row per indicator of a measuring point: its last value against its limits, the worst first."""
         self._refreshed()
         where, values = _where(machine, point, {})
         sql = (
-            f"SELECT * EXCLUDE (fingerprint) FROM trends {where} AND name <> '' AND level >= ? "
+            f"SELECT * EXCLUDE (fingerprint) FROM trends {where} AND name <> '' "
             "ORDER BY level DESC, coalesce(abs(change), 0) DESC, machine, point, name"
         )
-        return self._frame(sql, [*values, minimum_level])
+        return self._frame(sql, values)
 
     def status(self) -> DataFrame:
         """Return a row per measuring point, the worst first.
@@ -543,11 +543,10 @@ class Fleet:
     def _check_place(self, machine: str, point: str, *, exactly: bool = False) -> None:
         if not machine and not point and not exactly:
             return
-        where = (
-            "machine = ? AND point = ?" if machine and (point or exactly) else "machine = ?" if machine else "point = ?"
-        )
-        values = [machine, point] if machine and (point or exactly) else [machine or point]
-        if self._rows(f"SELECT 1 FROM recordings WHERE {where} LIMIT 1", values):
+        where, values = _where(machine, point, {})
+        if exactly:  # also the point without a name
+            where, values = "WHERE machine = ? AND point = ?", [machine, point]
+        if self._rows(f"SELECT 1 FROM recordings {where} LIMIT 1", values):
             return
         machines = sorted({m for (m,) in self._rows("SELECT DISTINCT machine FROM recordings")})
         if machine not in machines and machine:

@@ -100,8 +100,13 @@ class FilePattern:
     def __post_init__(self) -> None:
         self._compiled()
 
+<<<<<<< HEAD
     def match(self, path: Path, root: Path | None = None) -> dict[str, str | datetime | timedelta] | None:
         """Return what the pattern names in a path, None if the path is of another kind.
+=======
+    def match(self, path: Path, root: Path | None = None) -> dict[str, str | datetime] | PassedOver:
+        """Return what the pattern names in a path; for a path of another kind what speaks against it.
+>>>>>>> app
 
         Below `root` it is tried on the whole of the path first.
 
@@ -110,6 +115,7 @@ class FilePattern:
         >>> found = FilePattern("{machine}/{point}_{date:%Y%m%d}.csv").match(Path("/data/pump 3/DE_20260131.csv"))
         >>> found["machine"], found["point"], found["date"].isoformat()
         ('pump 3', 'DE', '2026-01-31T00:00:00')
+<<<<<<< HEAD
         """
         named = self.examined(path, root)
         return None if isinstance(named, PassedOver) else named
@@ -120,6 +126,9 @@ class FilePattern:
         Examples
         --------
         >>> FilePattern("{point}_{date:%Y%m%d}.csv").examined(Path("/data/DE_20261301.csv")).reason
+=======
+        >>> FilePattern("{point}_{date:%Y%m%d}.csv").match(Path("/data/DE_20261301.csv")).reason
+>>>>>>> app
         '20261301 is no date in the form %Y%m%d'
         """
         expression, form = self._compiled()
@@ -304,6 +313,7 @@ def origins(
     date: datetime | None = None,
     rig: Rig | None = None,
     on_passed_over: Callable[[PassedOver], object] | None = None,
+    may_be_none: bool = False,
 ) -> list[Origin]:
     """Find recordings and say of which machine, point and date each is.
 
@@ -324,6 +334,8 @@ def origins(
         Of all; None: the rig file of the same name beside each.
     on_passed_over : callable or None
         Called with a `PassedOver` for each recording that does not match the pattern.
+    may_be_none : bool
+        Whether nothing may be found, as in a folder that is watched.
 
     Raises
     ------
@@ -331,39 +343,16 @@ def origins(
         If a file is missing, the pattern is no pattern, or nothing is found.
     """
     searched, passed_over = list(places), list[PassedOver]()
-
-    def pass_over(file: PassedOver) -> None:
-        passed_over.append(file)
-        if on_passed_over is not None:
-            on_passed_over(file)
-
-    result = matching_origins(searched, pass_over, pattern=pattern, machine=machine, point=point, date=date, rig=rig)
-    if not result:
-        complaint = f" that match {pattern!r}" if pattern else ""
-        complaint += f"; {passed_over_text(passed_over)}" if passed_over else ""
-        raise no_recordings(searched, complaint=complaint)
-    return result
-
-
-def matching_origins(
-    places: Iterable[str | Path],
-    on_passed_over: Callable[[PassedOver], object],
-    *,
-    pattern: str = "",
-    machine: str = "",
-    point: str = "",
-    date: datetime | None = None,
-    rig: Rig | None = None,
-) -> list[Origin]:
-    """Return what `origins` does, but nothing where nothing is found."""
     file_pattern = FilePattern(pattern) if pattern else None
-    recordings = find_recordings(places)
+    recordings = find_recordings(searched)
     rigs = _rig_names(rig)
     result = []
     for path, root in recordings:
-        named = file_pattern.examined(path, root) if file_pattern is not None else {}
+        named = file_pattern.match(path, root) if file_pattern is not None else {}
         if isinstance(named, PassedOver):
-            on_passed_over(named)
+            passed_over.append(named)
+            if on_passed_over is not None:
+                on_passed_over(named)
             continue
         try:
             stat = path.stat()
@@ -405,7 +394,15 @@ def matching_origins(
                 stat.st_mtime_ns,
             )
         )
+<<<<<<< HEAD
     return sorted(result, key=lambda o: (o.machine, o.point, o.date, o.path))
+=======
+    if not result and not may_be_none:
+        complaint = f" that match {pattern!r}" if pattern else ""
+        complaint += f"; {passed_over_text(passed_over)}" if passed_over else ""
+        raise no_recordings(searched, complaint=complaint)
+    return result
+>>>>>>> app
 
 
 N_NAMED = 3

@@ -19,7 +19,6 @@ Recordings that depend on each other (minutes apart), or scatter with long tails
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import exp
 from typing import Any
 
@@ -45,27 +44,6 @@ OUTSIDE = 1.25
 
 CUSUM_K = 0.5
 """Allowance of the CUSUM in standard deviations: it is quickest for a shift of one."""
-
-
-@dataclass(frozen=True)
-class Limits:
-    """What each value is compared with; (n_recordings, n_series) unless said.
-
-    Parameters
-    ----------
-    expected, low, high : array
-        Of the baseline's regression at each recording's speed and load; nan where there is none.
-    scatter : array, (n_series,)
-        Residual standard deviation of the baseline.
-    n_baseline : array, (n_series,)
-        Recordings of the baseline that have the indicator.
-    """
-
-    expected: FloatArray
-    low: FloatArray
-    high: FloatArray
-    scatter: FloatArray
-    n_baseline: IntArray
 
 
 def regressors(
@@ -113,8 +91,8 @@ def regressors(
 
 def prediction_limits(
     y: FloatArray, x: FloatArray, baseline: BoolArray, false_alarm_rate: float, *, min_scatter: FloatArray | float = 0.0
-) -> Limits:
-    """Return the limits that a value of an unchanged machine leaves with the stated probability, half on each side.
+) -> tuple[FloatArray, FloatArray]:
+    """Return what is expected, and the distance beyond which an unchanged machine lies with the stated probability.
 
     Parameters
     ----------
@@ -124,20 +102,25 @@ def prediction_limits(
         See `regressors`.
     baseline : bool array, (n_recordings,)
     false_alarm_rate : float
-        Of one value of one series.
+        Of one value of one series, half on each side.
     min_scatter : float or array, (n_series,)
         Less is not believed.
+
+    Returns
+    -------
+    array, (n_recordings, n_series)
+        Of the baseline's regression at each recording's speed and load; nan where there is none.
+    array, (n_recordings, n_series)
+        Half the width of the interval about it.
     """
     from scipy.special import stdtrit
 
     n, m = y.shape
     p = x.shape[1]
     expected, width = np.full((n, m), np.nan), np.full((n, m), np.nan)
-    scatter, n_baseline = np.full(m, np.nan), np.zeros(m, dtype=np.int64)
     min_scatters = np.broadcast_to(np.asarray(min_scatter, dtype=np.float64), (m,))
     for pattern, columns in _patterns(np.isfinite(y) & baseline[:, None]):
         freedom = int(pattern.sum()) - p
-        n_baseline[columns] = int(pattern.sum())
         if freedom < MIN_FREEDOM or np.linalg.matrix_rank(x[pattern]) < p:
             continue
         inverse = np.linalg.inv(x[pattern].T @ x[pattern])
@@ -148,8 +131,7 @@ def prediction_limits(
         t = -float(stdtrit(freedom, 0.5 * false_alarm_rate))
         expected[:, columns] = x @ b
         width[:, columns] = t * reach[:, None] * s
-        scatter[columns] = s
-    return Limits(expected, expected - width, expected + width, scatter, n_baseline)
+    return expected, width
 
 
 def _patterns(known: BoolArray) -> list[tuple[BoolArray, IntArray]]:

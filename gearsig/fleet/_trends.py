@@ -24,7 +24,6 @@ from gearsig.fleet._statistics import (
     WARNING,
     BoolArray,
     IntArray,
-    Limits,
     alarm_levels,
     change_points,
     decibels,
@@ -295,15 +294,19 @@ def judge(
     in_db = is_level | is_ratio
     x, inside, normalised = regressors(*_conditions(recordings), baseline)
     rate = settings.false_alarm_rate / max(len(series), 1)
-    limits, reach = _limits(y, x, baseline, in_db, rate, settings)
-    judged = (~baseline & inside)[:, None] & np.isfinite(y) & np.isfinite(limits.high)
-    rise = y - limits.expected
+    middle, reach = _limits(y, x, baseline, in_db, rate, settings)
+    judged = (~baseline & inside)[:, None] & np.isfinite(y) & np.isfinite(reach)
+    rise = y - middle
     with np.errstate(invalid="ignore"):
         sample = np.where(np.abs(rise) > reach, np.where(in_db & (rise >= SERIOUS_DB), ALARM, WARNING), OK)
         calm = np.abs(rise) <= RETURN * reach
     sample = np.where(judged, sample, -1)
     basis = [STATISTICAL if known else NONE for known in np.asarray(np.isfinite(reach).any(axis=0)).tolist()]
+<<<<<<< HEAD
     expected, low, high, alarm = _natural_limits(limits.expected, reach, in_db, is_level)
+=======
+    expected, low, high, alarm = _natural_limits(middle, reach, in_db)
+>>>>>>> app
     zones = _zone_limits(recordings)
     is_velocity = np.asarray(series["name"] == "overall velocity", dtype=np.bool_)
     for column in np.flatnonzero(is_velocity):
@@ -346,11 +349,11 @@ def _conditions(recordings: DataFrame) -> tuple[FloatArray, FloatArray]:
 
 def _limits(
     y: FloatArray, x: FloatArray, baseline: BoolArray, in_db: BoolArray, rate: float, settings: TrendSettings
-) -> tuple[Limits, FloatArray]:
-    """Return the limits of prediction, and how far a value may be from what is expected: never less than a change."""
-    limits = prediction_limits(y, x, baseline, rate, min_scatter=np.where(in_db, MIN_SCATTER, 1e-9))
+) -> tuple[FloatArray, FloatArray]:
+    """Return what is expected, and how far a value may be from it: never less than a change."""
+    expected, width = prediction_limits(y, x, baseline, rate, min_scatter=np.where(in_db, MIN_SCATTER, 1e-9))
     min_rise = np.where(in_db, settings.minimum_change_db, 0.0)
-    return limits, np.maximum(limits.high - limits.expected, min_rise)
+    return expected, np.maximum(width, min_rise)
 
 
 def _natural_limits(
@@ -418,10 +421,15 @@ def over_condition(
     y, is_level = decibels(value[:, None], baseline, is_ratio | _is_signed(series))
     in_db = is_level | is_ratio
     y = np.concatenate([y, np.full((n_added, 1), np.nan)])
-    limits, reach = _limits(y, x, is_baseline, in_db, trends.false_alarm_rate, settings)
+    expected, reach = _limits(y, x, is_baseline, in_db, trends.false_alarm_rate, settings)
     reach[n : 2 * n] = reach[:n]  # each value keeps the limits of its own place
+<<<<<<< HEAD
     natural = np.hstack(_natural_limits(limits.expected, reach, in_db, is_level))
     moved = np.nan_to_num(limits.expected[n : 2 * n, 0] - limits.expected[:n, 0])
+=======
+    natural = np.hstack(_natural_limits(expected, reach, in_db))
+    moved = np.nan_to_num(expected[n : 2 * n, 0] - expected[:n, 0])
+>>>>>>> app
     if is_iso:  # boundaries of zones are the same at any load
         moved[:] = 0.0
         natural[:, 1], natural[:, 2:] = np.nan, [trends.high[0, column], trends.alarm[0, column]]
@@ -704,10 +712,7 @@ def trend_of(trends: PointTrends, column: int, machine: str, point: str) -> Tren
             "value": trends.values[:, column],
             "speed_rpm": trends.recordings["speed_rpm"],
             "load_nm": trends.recordings["load_nm"],
-            "expected": trends.expected[:, column],
-            "low": trends.low[:, column],
-            "high": trends.high[:, column],
-            "alarm": trends.alarm[:, column],
+            **{name: getattr(trends, name)[:, column] for name in ("expected", "low", "high", "alarm")},
             "level": [level_name(int(level), trends.basis[column]) for level in trends.levels[:, column]],
             "in_baseline": trends.baseline,
         }

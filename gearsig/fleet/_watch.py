@@ -16,8 +16,8 @@ from gearsig.checks import not_negative, positive
 from gearsig.errors import GearsigError
 from gearsig.fleet._add import AddedRecording
 from gearsig.fleet._fleet import Fleet
-from gearsig.fleet._origin import FilePattern, Origin, PassedOver, matching_origins, passed_over_text
-from gearsig.processes import n_processors, process_pool
+from gearsig.fleet._origin import FilePattern, Origin, PassedOver, origins, passed_over_text
+from gearsig.processes import active_cluster, n_processors, process_pool
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ def watch(
                     reported |= {file.path for file in new}
                     on_event(WatchEvent("passed over", datetime.now(UTC), passed_over_text(new), passed_over=new))
                 if ready:
-                    if pool is None:
+                    if pool is None and active_cluster() is None:
                         pool = stack.enter_context(process_pool(n_processes or n_processors()))
                     try:
                         fleet.add(ready, executor=pool, n_processes=n_processes, on_progress=tell, **_options(how))
@@ -176,7 +176,7 @@ def _ready(
     of_origin = {name: how[name] for name in (*_OF_ORIGIN, "rig") if name in how}
     now_s, wall_s = time.monotonic(), time.time()
     ready, n_waiting = [], 0
-    for origin in matching_origins(present_roots, on_passed_over, **of_origin):
+    for origin in origins(present_roots, on_passed_over=on_passed_over, may_be_none=True, **of_origin):
         signature = origin.n_bytes, origin.mtime_ns
         known = seen.get(origin.path)
         if known is None:

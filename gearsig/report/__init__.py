@@ -18,9 +18,10 @@ from gearsig.report._files import (
     check_writable,
     page_names,
     recording_mark,
+    write_folder,
     write_pdf,
 )
-from gearsig.report._fleet import fleet_page_html, fleet_page_pdf, write_fleet_page
+from gearsig.report._fleet import write_fleet_page
 from gearsig.report._gap_page import (
     CHECK_FIRST,
     CauseRow,
@@ -132,8 +133,6 @@ __all__ = [
     "finding_card",
     "finding_cards",
     "fitting_methods",
-    "fleet_page_html",
-    "fleet_page_pdf",
     "floors_text",
     "force_csv",
     "force_json",
@@ -187,6 +186,7 @@ __all__ = [
     "verdict_rows",
     "write_answer",
     "write_fleet_page",
+    "write_folder",
     "write_gap_json",
     "write_gap_page",
     "write_index",

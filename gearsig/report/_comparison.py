@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from textwrap import fill
 
 from gearsig import __version__
@@ -39,6 +38,7 @@ from gearsig.formatting import (
 from gearsig.plot import Captioned, Cursor, Picture, embed
 from gearsig.report._files import date_text, render
 from gearsig.report._json import Layout, document, plain
+from gearsig.report._sections import Rows
 
 # --------------------
 # The pictures of a comparison, and what to look at in each.
@@ -280,35 +280,6 @@ def _level_texts(level: LevelPair) -> tuple[str, str, str, str]:
     return recorded, simulated, signed(level.difference_db, n), scatter_text(scatter)
 
 
-Rows = tuple[tuple[str, str], ...]
-
-
-@dataclass(frozen=True)
-class LevelRow:
-    """A level as the page shows it."""
-
-    label: str
-    order: str
-    recorded: str
-    simulated: str
-    difference: str
-    scatter: str
-    note: str
-    is_beyond: bool
-
-
-@dataclass(frozen=True)
-class ChannelSection:
-    """One channel of the page."""
-
-    title: str
-    unit: str
-    figures: Rows
-    pictures: tuple[Picture, ...]
-    main: tuple[LevelRow, ...]
-    sidebands: tuple[LevelRow, ...]
-
-
 def comparison_page(comparison: Comparison, *, command: str = "") -> str:
     """Return the page of a comparison: verdict, what was compared, and each channel with figures and tables.
 
@@ -335,19 +306,20 @@ def comparison_page(comparison: Comparison, *, command: str = "") -> str:
     )
 
 
-def _section(comparison: Comparison, channel: ChannelComparison, i: int) -> ChannelSection:
+def _section(comparison: Comparison, channel: ChannelComparison, i: int) -> dict[str, object]:
+    """Return one channel as the page shows it."""
     main = [line for line in (*channel.lines, *channel.other_lines) if line.kind != "sideband" and line.is_seen]
     sidebands = [line for line in channel.lines if line.kind == "sideband" and line.is_seen]
     sidebands.sort(key=lambda line: -abs(line.level.difference_db))
-    # Pictures of four channels: a page of more is too large to send.
-    return ChannelSection(
-        channel.name,
-        f"dB re 1 {unit_text(channel.unit)}, rms" if channel.unit else "dB, unit not known",
-        channel_rows(channel),
-        tuple(channel_pictures(comparison, channel)) if i < 4 else (),
-        tuple(_line_row(line) for line in main),
-        tuple(_line_row(line) for line in sidebands[:40]),
-    )
+    return {
+        "title": channel.name,
+        "unit": f"dB re 1 {unit_text(channel.unit)}, rms" if channel.unit else "dB, unit not known",
+        "figures": channel_rows(channel),
+        # Pictures of four channels: a page of more is too large to send.
+        "pictures": tuple(channel_pictures(comparison, channel)) if i < 4 else (),
+        "main": [_line_row(line) for line in main],
+        "sidebands": [_line_row(line) for line in sidebands[:40]],
+    }
 
 
 def channel_rows(channel: ChannelComparison) -> Rows:
@@ -380,10 +352,11 @@ def _possible(shaft: ShaftComparison) -> str:
     return f"two such averages reach {shaft.best_correlation:.3f}"
 
 
-def _line_row(line: LineLevel) -> LevelRow:
-    return LevelRow(
-        line.label, readable(line.order, 6), *_level_texts(line.level), missing_words(line), line.level.is_beyond
-    )
+def _line_row(line: LineLevel) -> dict[str, object]:
+    """Return a level as the page shows it."""
+    texts = dict(zip(("recorded", "simulated", "difference", "scatter"), _level_texts(line.level), strict=True))
+    about = {"label": line.label, "order": readable(line.order, 6), "note": missing_words(line)}
+    return {**about, **texts, "is_beyond": line.level.is_beyond}
 
 
 def _record_rows(facts: RecordFacts) -> Rows:

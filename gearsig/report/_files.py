@@ -8,16 +8,17 @@ import re
 import secrets
 from base64 import b64decode
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass
 from datetime import datetime
-from functools import cache
+from enum import Enum
+from functools import cache, partial
 from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from gearsig import __version__
-from gearsig.cache import write_whole
+from gearsig.cache import made_folder, write_text, write_whole
 from gearsig.errors import InputError
 from gearsig.plot import Picture, font_folder
 from gearsig.recording import without_condition
@@ -144,6 +145,36 @@ def _environment() -> Environment:
     return environment
 
 
+def write_folder(
+    folder: str | Path,
+    figures: Mapping[str, Any] | None = None,  # the drawing library's type is known in gearsig.plot alone
+    texts: Mapping[str, str] | None = None,
+    *,
+    dpi: float | Literal["figure"] = 160,
+) -> tuple[Path, ...]:
+    """Write figures and texts by their names into a folder, which is made, each whole or not at all; return the paths.
+
+    Parameters
+    ----------
+    folder : str or Path
+    figures, texts : mapping, optional
+        Name with ending, such as "map.png" or "map.svg" → figure; likewise for texts.
+    dpi : float or "figure"
+        Dots per inch of the figures; "figure": each its own.
+
+    Raises
+    ------
+    InputError
+        If something cannot be written.
+    """
+    place = made_folder(Path(folder))
+    paths = []
+    for name, figure in (figures or {}).items():
+        draw = partial(figure.savefig, format=name.rpartition(".")[2], dpi=dpi)
+        paths.append(write_whole(place / name, draw, remedy="choose another folder with -o"))
+    return *paths, *(write_text(place / name, text) for name, text in (texts or {}).items())
+
+
 def date_text(date: datetime | None = None) -> str:
     """Return when a page was made, as pages say it; None: now."""
     return (date or datetime.now().astimezone()).strftime("%Y-%m-%d %H:%M %Z").strip()
@@ -182,22 +213,33 @@ def check_pdf() -> None:
         raise InputError("PDF needs the package typst", remedy="pip install 'gearsig[pdf]'") from None
 
 
-def compiled(template: str, data: Mapping[str, Any], pictures: Mapping[str, bytes]) -> bytes:
-    """Return the PDF that a template makes of data; fonts are matplotlib's, so that every machine sets it alike."""
+def compiled(template: str, values: Mapping[str, Any]) -> bytes:
+    """Return the PDF that a template makes of the values that the HTML page is made of.
+
+    Pictures come as files; fonts are matplotlib's, so that every machine sets it alike.
+    """
     check_pdf()
     import typst
 
-    source = files("gearsig.report").joinpath("templates", template).read_bytes()
-    content = json.dumps(data, ensure_ascii=False, default=str).encode()
+    pictures: dict[str, bytes] = {}
+
+    def described(value: Any) -> object:
+        if isinstance(value, Picture):
+            return _put_picture(value, pictures)
+        return vars(value) if is_dataclass(value) else value.value if isinstance(value, Enum) else str(value)
+
+    content = json.dumps({**values, "version": __version__}, ensure_ascii=False, default=described).encode()
     with TemporaryDirectory(prefix="gearsig-") as folder:
-        for name, part in {"main.typ": source, "data.json": content, **pictures}.items():
+        main = Path(folder) / template
+        for name in (template, "print.typ"):
+            (Path(folder) / name).write_bytes(files("gearsig.report").joinpath("templates", name).read_bytes())
+        for name, part in {"data.json": content, **pictures}.items():
             (Path(folder) / name).write_bytes(part)
-        main, fonts = Path(folder) / "main.typ", [font_folder()]
-        made = typst.compile(main, root=Path(folder), font_paths=fonts, ignore_system_fonts=True)
+        made = typst.compile(main, root=Path(folder), font_paths=[font_folder()], ignore_system_fonts=True)
     return bytes(made)
 
 
-def put_picture(picture: Picture, pictures: dict[str, bytes]) -> dict[str, object]:
+def _put_picture(picture: Picture, pictures: dict[str, bytes]) -> dict[str, object]:
     """Add a picture to the files, and return what the template says of it."""
     if picture.svg:
         name = f"picture{len(pictures)}.svg"

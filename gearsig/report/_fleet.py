@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -14,63 +13,20 @@ from gearsig.errors import InputError
 from gearsig.fleet import AlarmChange, Fleet, FleetChanges, change_text, counts_text, fleet_changes, trends_text
 from gearsig.formatting import moment_text, readable, unit_text
 from gearsig.plot import Picture, fleet_trend_picture
-from gearsig.report._files import compiled, date_text, put_picture, render, write_pdf
+from gearsig.report._files import compiled, date_text, render, write_pdf
 
 LEVEL_CLASSES = {"alarm": "fault", "warning": "suspicion", "unknown": "cannot-tell", "ok": "no-fault"}
 MAX_ROWS, MAX_POINTS, MAX_PICTURES = 60, 200, 8
 
 
-@dataclass(frozen=True)
-class AlarmRow:
-    """An alarm as the page shows it."""
-
-    level: str
-    css_class: str
-    machine: str
-    name: str
-    of: str
-    value: str
-    expected: str
-    limit: str
-    change: str
-    raised: str
-    cleared: str
-    basis: str
-
-
-def fleet_page_html(fleet: Fleet, since: datetime | None = None, *, date: datetime | None = None) -> str:
-    """Return the page that says what changed in a fleet.
-
-    Parameters
-    ----------
-    fleet : Fleet
-    since : datetime or None
-        In UTC; None: since ever.
-    date : datetime or None
-        Of the page; None: now.
-    """
-    return render("fleet.html.j2", **_page_values(fleet, since, date))
-
-
-def fleet_page_pdf(fleet: Fleet, since: datetime | None = None, *, date: datetime | None = None) -> bytes:
-    """Return the page that `fleet_page_html` makes as PDF.
-
-    Raises
-    ------
-    InputError
-        If typst is not installed.
-    """
-    return _pdf(_page_values(fleet, since, date))
-
-
-def _page_values(fleet: Fleet, since: datetime | None, date: datetime | None) -> dict[str, Any]:
+def _page_values(fleet: Fleet, since: datetime | None) -> dict[str, Any]:
     """Return what the page shows, by the names of its template."""
     changes = fleet_changes(fleet, since)
     status = changes.status.head(MAX_POINTS).to_dict("records")
     n_points = len(changes.status)
     return {
         "since": f"since {since:%Y-%m-%d %H:%M} UTC" if since is not None else "since the beginning",
-        "date": date_text(date),
+        "date": date_text(),
         "version": __version__,
         "summary": _summary(changes),
         "counts": f"{counts_text(changes.status)}." if n_points else "",
@@ -81,8 +37,8 @@ def _page_values(fleet: Fleet, since: datetime | None, date: datetime | None) ->
         "shifted": [_shift(row) for row in changes.shifted.head(MAX_ROWS).to_dict("records")],
         "failures": changes.failures,
         "status": [
-            {str(key): value for key, value in row.items()}
-            | {
+            {
+                **{name: row[name] for name in ("level", "machine", "point", "n_recordings")},
                 "css_class": LEVEL_CLASSES[row["level"]],
                 "last": f"{row['last']:%Y-%m-%d %H:%M}",
                 "outcome": row["outcome"] or "–",
@@ -95,64 +51,25 @@ def _page_values(fleet: Fleet, since: datetime | None, date: datetime | None) ->
 
 
 def write_fleet_page(fleet: Fleet, path: str | Path, since: datetime | None = None, *, pdf: bool = False) -> Path:
-    """Write the page that `fleet_page_html` makes, and beside it the same as PDF where that is asked for."""
-    values = _page_values(fleet, since, None)
+    """Write the page that says what changed in a fleet, and beside it the same as PDF where that is asked for.
+
+    Parameters
+    ----------
+    fleet : Fleet
+    path : str or Path
+    since : datetime or None
+        In UTC; None: since ever.
+    pdf : bool
+
+    Raises
+    ------
+    InputError
+        If typst is not installed.
+    """
+    values = _page_values(fleet, since)
     if pdf:
-        write_pdf(Path(path).with_suffix(".pdf"), _pdf(values))
+        write_pdf(Path(path).with_suffix(".pdf"), compiled("fleet.typ", values))
     return write_text(Path(path), render("fleet.html.j2", **values))
-
-
-def _pdf(values: dict[str, Any]) -> bytes:
-    """Return the page's values as PDF."""
-    pictures: dict[str, bytes] = {}
-    alarm = ("", "machine", "indicator", "of", "now", "expected", "limit", "change", "raised", "cleared", "limits")
-    of_alarm = ("level", "machine", "name", "of", "value", "expected", "limit", "change", "raised", "cleared", "basis")
-    tables = [
-        (
-            "Other diagnoses than before",
-            ("now", "machine", "point", "before", "verdict"),
-            [
-                (row.now.replace(" ", "-"), [row.now, row.machine, row.point, row.before or "new", row.verdict])
-                for row in values["diagnoses"]
-            ],
-        ),
-        *(
-            (title, alarm, [(row.css_class, [getattr(row, name) for name in of_alarm]) for row in values[key]])
-            for title, key in (("Alarms raised", "raised"), ("Alarms cleared", "cleared"))
-        ),
-        (
-            "Levels that changed within their limits",
-            ("machine", "indicator", "of", "since", "by"),
-            [("", list(row.values())) for row in values["shifted"]],
-        ),
-        ("Not analysed", ("file", "reason"), [("", list(row)) for row in values["failures"]]),
-        (
-            "All measuring points, worst first",
-            ("", "machine", "point", "last", "recordings", "diagnosis", "trends"),
-            [
-                (
-                    row["css_class"],
-                    [row[k] for k in ("level", "machine", "point", "last", "n_recordings", "outcome", "trends")],
-                )
-                for row in values["status"]
-            ],
-        ),
-    ]
-    data = {
-        "title": f"Fleet: what changed {values['since']}",
-        "made": f"{values['date']}, gearsig {values['version']}",
-        "tables": [
-            {
-                "title": title,
-                "columns": columns,
-                "rows": [{"css_class": css_class, "cells": [str(cell) for cell in cells]} for css_class, cells in rows],
-            }
-            for title, columns, rows in tables
-            if rows
-        ],
-        "pictures": [(heading, put_picture(picture, pictures)) for heading, picture in values["pictures"]],
-    }
-    return compiled("fleet.typ", data | {name: values[name] for name in ("summary", "counts", "n_more")}, pictures)
 
 
 def _summary(changes: FleetChanges) -> str:
@@ -171,8 +88,18 @@ def _summary(changes: FleetChanges) -> str:
     return f"{head}: {', '.join(parts)}." if parts else f"{head}; nothing changed."
 
 
-def _row(change: AlarmChange) -> AlarmRow:
+def _series(of: Mapping[Any, Any]) -> dict[str, str]:
+    """Return machine, name and place of a series."""
+    return {
+        "machine": " · ".join(filter(None, (of["machine"], of["point"]))),
+        "name": of["name"],
+        "of": ", ".join(filter(None, (of["place"], of["channel"], of["computed_on"]))),
+    }
+
+
+def _row(change: AlarmChange) -> dict[str, str]:
     unit = f" {unit_text(change.unit)}" if change.unit else ""
+<<<<<<< HEAD
     return AlarmRow(
         change.level,
         LEVEL_CLASSES[change.level],
@@ -187,14 +114,33 @@ def _row(change: AlarmChange) -> AlarmRow:
         moment_text(change.cleared) if change.cleared is not None else "",
         change.basis,
     )
+=======
+    return {
+        "level": change.level,
+        "css_class": LEVEL_CLASSES[change.level],
+        **_series(vars(change)),
+        "value": readable(change.value, 4) + unit,
+        "expected": readable(change.expected, 4),
+        "limit": readable(change.upper_limit, 4),
+        "change": change_text(change.change, in_db=change.in_db),
+        "raised": f"{change.raised:%Y-%m-%d}",
+        "cleared": f"{change.cleared:%Y-%m-%d}" if change.cleared is not None else "",
+        "basis": change.basis,
+    }
+>>>>>>> app
 
 
 def _shift(row: Mapping[Any, Any]) -> dict[str, str]:
     return {
+<<<<<<< HEAD
         "machine": " · ".join(part for part in (row["machine"], row["point"]) if part),
         "name": row["name"],
         "of": ", ".join(part for part in (row["place"], row["channel"], row["computed_on"]) if part),
         "since": moment_text(row["changed"]),
+=======
+        **_series(row),
+        "since": f"{row['changed']:%Y-%m-%d}",
+>>>>>>> app
         "by": change_text(row["changed_by"], in_db=bool(row["in_db"])),
     }
 

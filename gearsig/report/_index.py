@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from math import inf, isfinite
 from pathlib import Path
@@ -130,44 +130,11 @@ OUTCOME_WORDS = {
 }
 
 
-@dataclass(frozen=True)
-class IndexCell:
-    """An indicator of a recording: its largest value and its length as a bar."""
+def index_of(ordered: Sequence[Entry], failures: Sequence[Failure] = ()) -> dict[str, Any]:
+    """Return what the index says, in HTML as in PDF: entries, worst first, with their key indicators compared.
 
-    text: str
-    percent: float
-
-
-@dataclass(frozen=True)
-class IndexRow:
-    """A recording in the table, with its place in each order that the table can be sorted by."""
-
-    entry: Entry
-    css_class: str
-    href: str
-    date: str
-    confidence: str
-    ratio: str
-    cells: tuple[IndexCell, ...]
-    places: tuple[int, ...]
-
-
-@dataclass(frozen=True)
-class Index:
-    """What the index says, in HTML as in PDF."""
-
-    rows: tuple[IndexRow, ...]
-    columns: tuple[str, ...]
-    orders: tuple[str, ...]
-    has_dates: bool
-    summary: str
-    outcomes: tuple[tuple[str, str, int], ...]
-    machines: tuple[str, ...]
-
-
-def index_of(entries: Sequence[Entry], failures: Sequence[Failure] = ()) -> Index:
-    """Sort entries, worst first, and compare their key indicators."""
-    ordered = sorted(entries, key=by_severity)
+    Each row has its place in each of the orders that the table can be sorted by.
+    """
     present = {i.name for entry in ordered for i in entry.indicators if isfinite(i.value)}
     names = [name for name in KEY_INDICATORS if name in present][:3]
     columns = [_column(ordered, name) for name in names]
@@ -182,32 +149,32 @@ def index_of(entries: Sequence[Entry], failures: Sequence[Failure] = ()) -> Inde
         orders["latest first"] = _places([(age, i) for i, age in enumerate(ages)])
     for name in names:
         orders[name] = _places([(-_largest(entry, name), i) for i, entry in enumerate(ordered)])
-    rows = tuple(
-        IndexRow(
-            entry,
-            css_class(entry.outcome),
-            quote(entry.page),
-            f"{entry.date:%Y-%m-%d %H:%M}".removesuffix(" 00:00") if entry.date is not None else "",
-            percent(entry.confidence) if entry.confidence is not None else "",
-            _size_text(entry),
-            tuple(cells[i] for _, cells in columns),
-            tuple(place[i] for place in orders.values()),
-        )
+    rows = [
+        {
+            "entry": replace(entry, indicators=(), ratio_db=None),  # what is shown of these are texts
+            "css_class": css_class(entry.outcome),
+            "href": quote(entry.page),
+            "date": f"{entry.date:%Y-%m-%d %H:%M}".removesuffix(" 00:00") if entry.date is not None else "",
+            "confidence": percent(entry.confidence) if entry.confidence is not None else "",
+            "ratio": _size_text(entry),
+            "cells": [cells[i] for _, cells in columns],
+            "places": [place[i] for place in orders.values()],
+        }
         for i, entry in enumerate(ordered)
-    )
+    ]
     counts = Counter(entry.outcome for entry in ordered)
     parts = [f"{n} {OUTCOME_WORDS[outcome]}" for outcome, n in counts.items()]
     parts += [f"{len(failures)} not analysed"] if failures else []
     n_files = len(ordered) + len(failures)
-    return Index(
-        rows,
-        tuple(heading for heading, _ in columns),
-        tuple(orders),
-        has_dates,
-        f"{n_files} recording{'s' * (n_files != 1)}: {', '.join(parts)}" if parts else "No recordings",
-        tuple((css_class(outcome), outcome.value, n) for outcome, n in counts.items()),
-        tuple(dict.fromkeys(entry.machine for entry in ordered if entry.machine)),
-    )
+    return {
+        "rows": rows,
+        "columns": [heading for heading, _ in columns],
+        "orders": list(orders),
+        "has_dates": has_dates,
+        "summary": f"{n_files} recording{'s' * (n_files != 1)}: {', '.join(parts)}" if parts else "No recordings",
+        "outcomes": [(css_class(outcome), outcome.value, n) for outcome, n in counts.items()],
+        "machines": list(dict.fromkeys(entry.machine for entry in ordered if entry.machine)),
+    }
 
 
 def _places(keys: Sequence[Any]) -> list[int]:
@@ -256,36 +223,25 @@ def write_index(
     Path
         Of the page.
     """
-    path = Path(path)
-    index = index_of(entries, failures)
-    made = date_text()
-    html = render(
-        "index.html.j2",
-        index=index,
-        failures=failures,
-        command=command,
-        version=__version__,
-        date=made,
-        legend=LEGEND,
-        n_missing=n_missing,
-    )
+    path, ordered = Path(path), sorted(entries, key=by_severity)
+    values = {"index": index_of(ordered, failures), "failures": failures, "date": date_text(), "legend": LEGEND}
+    html = render("index.html.j2", **values, command=command, version=__version__, n_missing=n_missing)
     if not n_missing:
-        write_batch(index, path.parent, failures=failures)
+        write_batch(ordered, path.parent, failures=failures)
     if pdf and not n_missing:
-        write_pdf(path.with_suffix(".pdf"), _index_pdf(index, failures, made))
+        write_pdf(path.with_suffix(".pdf"), compiled("index.typ", values))
     return write_text(path, html)
 
 
-def write_batch(index: Index, folder: Path, *, failures: Sequence[Failure] = ()) -> None:
+def write_batch(ordered: Sequence[Entry], folder: Path, *, failures: Sequence[Failure] = ()) -> None:
     """Write `batch.csv` and `batch.json`: one row for each recording, worst first; a failed one has a reason.
 
     Indicators are named with their unit: "rms (m/s²)".
     """
     # Channels may count in units of their own: the largest value of each unit is a column.
-    columns_of = {(i.name, i.unit): with_unit(i.name, i.unit) for row in index.rows for i in row.entry.indicators}
+    columns_of = {(i.name, i.unit): with_unit(i.name, i.unit) for entry in ordered for i in entry.indicators}
     records: list[dict[str, Any]] = []
-    for row in index.rows:
-        entry = row.entry
+    for entry in ordered:
         values = {column: _largest(entry, *key) for key, column in columns_of.items()}
         records.append(
             {
@@ -308,7 +264,7 @@ def write_batch(index: Index, folder: Path, *, failures: Sequence[Failure] = ())
     write_text(
         folder / "batch.json", json.dumps({"schema": "gearsig.batch", "version": 2, "recordings": records}, indent=1)
     )
-    header = list(records[0]) if index.rows else ["recording", "outcome", "reason"]
+    header = list(records[0]) if ordered else ["recording", "outcome", "reason"]
     cells = ([spreadsheet_cell(record.get(name, "")) for name in header] for record in records)
     write_text(folder / "batch.csv", csv_rows(header, cells))
 
@@ -320,36 +276,8 @@ LEGEND = (
 )
 
 
-def _index_pdf(index: Index, failures: Sequence[Failure], date: str) -> bytes:
-    rows = [
-        {
-            "name": row.entry.name,
-            "machine": row.entry.machine,
-            "date": row.date,
-            "outcome": row.entry.outcome.value,
-            "css_class": row.css_class,
-            "conclusion": row.entry.conclusion,
-            "confidence": row.confidence,
-            "sure_of": row.entry.sure_of,
-            "ratio": row.ratio,
-            "cells": [cell.text for cell in row.cells],
-        }
-        for row in index.rows
-    ]
-    data = {
-        "summary": index.summary,
-        "columns": index.columns,
-        "has_dates": index.has_dates,
-        "rows": rows,
-        "failures": [[failure.name, failure.reason] for failure in failures],
-        "legend": LEGEND,
-        "date": f"{date}, gearsig {__version__}",
-    }
-    return compiled("index.typ", data, {})
-
-
-def _column(entries: Sequence[Entry], name: str) -> tuple[str, list[IndexCell]]:
-    """Return an indicator's heading, and its largest value in each recording.
+def _column(entries: Sequence[Entry], name: str) -> tuple[str, list[dict[str, Any]]]:
+    """Return an indicator's heading, and its largest value in each recording with its length as a bar.
 
     Bars begin at zero: they stand where the column has one unit and no negative value.
     """
@@ -361,12 +289,12 @@ def _column(entries: Sequence[Entry], name: str) -> tuple[str, list[IndexCell]]:
     shown = {i.unit for i in largest if i is not None}
     has_bars = len(shown) == 1 and min(values) >= 0 and top > 0
     cells = [
-        IndexCell("–", 0.0)
+        {"text": "–", "percent": 0.0}
         if i is None
-        else IndexCell(
-            readable(i.value, 3) + ("" if len(shown) == 1 else f" {unit_text(i.unit)}"),
-            round(100 * i.value / top, 1) if has_bars else 0.0,
-        )
+        else {
+            "text": readable(i.value, 3) + ("" if len(shown) == 1 else f" {unit_text(i.unit)}"),
+            "percent": round(100 * i.value / top, 1) if has_bars else 0.0,
+        }
         for i in largest
     ]
     return with_unit(name, units.pop() if len(units) == 1 else ""), cells

@@ -12,17 +12,18 @@ from typing import IO, Any
 import numpy as np
 
 from gearsig.angle import ShaftAngle
-from gearsig.cache import made_folder, write_text, write_whole
+from gearsig.cache import write_whole
 from gearsig.checks import closest_match_hint, one_of
 from gearsig.errors import InputError, RefusalError
 from gearsig.methods import METHODS, TRANSFORMS, MethodAnswer, apply_method
 from gearsig.plot import Picture, embed, svg_panel
 from gearsig.prepared import PreparedRecording
 from gearsig.recording import Recording
+from gearsig.report._files import write_folder
 from gearsig.report._json import plain
 
 
-def write_answer(answer: MethodAnswer, folder: str | Path, name: str = "") -> tuple[Path, ...]:
+def write_answer(answer: MethodAnswer, folder: str | Path) -> tuple[Path, ...]:
     """Write figure (PNG and SVG), table (CSV), arrays (HDF5) and numbers (JSON), each whole or not at all.
 
     Parameters
@@ -30,8 +31,6 @@ def write_answer(answer: MethodAnswer, folder: str | Path, name: str = "") -> tu
     answer : MethodAnswer
     folder : path
         Made where it is missing.
-    name : str
-        Of the files, without ending; empty: the method's.
 
     Returns
     -------
@@ -39,15 +38,13 @@ def write_answer(answer: MethodAnswer, folder: str | Path, name: str = "") -> tu
     """
     from pandas import DataFrame
 
-    stem = made_folder(Path(folder)) / (name or answer.method)
-    paths = tuple(stem.with_name(f"{stem.name}{ending}") for ending in (".png", ".svg", ".csv", ".h5", ".json"))
-    figure, frame = answer.draw(), DataFrame(dict(answer.table))
-    write_whole(paths[0], lambda file: figure.savefig(file, format="png"))
-    write_whole(paths[1], lambda file: figure.savefig(file, format="svg"))
-    write_whole(paths[2], lambda file: frame.to_csv(file, index=False, float_format="%.9g"))
-    write_whole(paths[3], lambda file: _write_arrays(answer, file))
-    write_text(paths[4], answer_json(answer))
-    return paths
+    stem, figure = answer.method, answer.draw()
+    table: str = DataFrame(dict(answer.table)).to_csv(index=False, float_format="%.9g")
+    texts = {f"{stem}.csv": table, f"{stem}.json": answer_json(answer)}
+    drawn = dict.fromkeys((f"{stem}.png", f"{stem}.svg"), figure)
+    png, svg, csv, numbers = write_folder(folder, drawn, texts, dpi="figure")
+    arrays = write_whole(csv.with_suffix(".h5"), lambda file: _write_arrays(answer, file))
+    return png, svg, csv, arrays, numbers
 
 
 def _write_arrays(answer: MethodAnswer, file: IO[bytes]) -> None:

@@ -3,26 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
-from gearsig import __version__, plot
+from gearsig import plot
 from gearsig.angle import ShaftAngle
 from gearsig.cache import write_text
-from gearsig.checks import FloatArray
 from gearsig.diagnosis import CHANGED, Analysis, ChannelAnalysis, Finding, Kind, Where, changes, with_known_angle
 from gearsig.errors import RefusalError
 from gearsig.formatting import readable, unit_text
 from gearsig.motion import StartStop
 from gearsig.orders import OrderMap, SynchronousAverage
 from gearsig.plot import FAULT, QUIET, Captioned, ChartLine, Cursor, LinePanel, Picture, embed
-from gearsig.prepared import circular_correlation
 from gearsig.recording import si_factor
-from gearsig.report._files import compiled, put_picture, render
+from gearsig.report._files import compiled, render, write_pdf
 from gearsig.report._methods import fitting_methods, method_pictures
 from gearsig.report._sections import (
     change_rows,
@@ -35,7 +33,7 @@ from gearsig.report._sections import (
     speed_rows,
     truth_rows,
 )
-from gearsig.severity import LARGEST_MARK_SHIFT, CrackEstimate
+from gearsig.severity import CrackEstimate
 from gearsig.spectra import LARGEST_SLIP, Spectrum
 
 CLAIMED = (Kind.FAULT, Kind.SUSPICION, Kind.DATA_PROBLEM)
@@ -185,21 +183,16 @@ class VerdictPicture:
         Of a tooth.
     finding : Finding or None
         That it shows.
-    change : SynchronousAverage or None
-        Of a crack that was found beside a reference: what differs from it. A crack seldom shows in the ring itself.
     """
 
     about: Literal["tooth", "bearing", "resonance", "motion", "lines"]
     channel: ChannelAnalysis
     shaft: str = ""
     finding: Finding | None = None
-    change: SynchronousAverage | None = None
 
     @property
     def average(self) -> SynchronousAverage:
         """Of a tooth: the mean revolution in which a single tooth stands out most."""
-        if self.change is not None:
-            return self.change
         told = ("change", "residual", "difference", "average")
         kinds = [kind for kind in told if (self.shaft, kind) in self.channel.averages]
         return self.channel.averages[self.shaft, kinds[0]]
@@ -218,9 +211,7 @@ def verdict_picture(analysis: Analysis) -> VerdictPicture | None:
         channel = next((channels[name] for name in where.channels if name in channels), next(iter(channels.values())))
         shaft = where.gear.rpartition("/")[2] or where.shaft
         if (where.tooth or where.angle_deg is not None) and any(of == shaft for of, _ in channel.averages):
-            change = _change_by_crack(analysis, shaft)
-            channel = channels[change.channel] if change is not None else channel
-            return VerdictPicture("tooth", channel, shaft, finding, change)
+            return VerdictPicture("tooth", _changed_most(analysis.channels, shaft) or channel, shaft, finding)
         if (about := _shown_by(finding, channel)) is not None:
             return VerdictPicture(about, channel, "", finding)
     # that of what stands beside it in words
@@ -228,18 +219,15 @@ def verdict_picture(analysis: Analysis) -> VerdictPicture | None:
     return VerdictPicture("lines", channels[next((name for name in named if name in channels), next(iter(channels)))])
 
 
-def _change_by_crack(analysis: Analysis, shaft: str) -> SynchronousAverage | None:
-    """Return what the average of a cracked gear's shaft differs by from the reference's; None where none was found."""
-    crack = analysis.crack
-    if not isinstance(crack, CrackEstimate) or not crack.with_reference or crack.shaft != shaft:
-        return None
-    beside = _beside_reference(analysis, crack, analysis.teeth_on(shaft))
-    name, now, then = beside if beside is not None else ("", None, None)
-    if now is None or then is None:
-        return None
-    average = next(c for c in analysis.channels if c.channel == name).averages[shaft, "average"]
-    factor = float(si_factor("acceleration", average.unit) or 1.0)
-    return replace(average, values=(now - then) / factor, kind="change")
+def _changed_most(channels: Sequence[ChannelAnalysis], shaft: str) -> ChannelAnalysis | None:
+    """Return the channel whose average of a shaft changed most since the reference; None where none is compared."""
+    kept = [channel for channel in channels if (shaft, "change") in channel.averages]
+
+    def share(channel: ChannelAnalysis) -> float:
+        change, average = (float(np.std(channel.averages[shaft, kind].values)) for kind in ("change", "average"))
+        return change / average if average else 0.0
+
+    return max(kept, key=share, default=None)
 
 
 def _shown_by(finding: Finding, channel: ChannelAnalysis) -> Literal["bearing", "resonance", "lines"] | None:
@@ -257,26 +245,29 @@ def crack_picture(analysis: Analysis) -> Picture | None:
     crack = analysis.crack
     if not isinstance(crack, CrackEstimate) or analysis.rig is None:
         return None
-    teeth = analysis.rig.teeth_of(crack.gear)
-    beside = _beside_reference(analysis, crack, teeth) if teeth is not None else None
-    if teeth is None or beside is None:
+    teeth, kind = analysis.rig.teeth_of(crack.gear), (crack.shaft, "average")
+    seen = [c for c in analysis.channels if kind in c.averages and si_factor("acceleration", c.averages[kind].unit)]
+    channel = _changed_most(seen, crack.shaft) or next(iter(seen), None)
+    if teeth is None or channel is None:
         return None
-    name, now, then = beside
+    name, average, change = channel.channel, channel.averages[kind], channel.averages.get((crack.shaft, "change"))
+    factor = float(si_factor("acceleration", average.unit) or 1.0)
     # A tooth enters half a pitch before the middle of its own; the blow stands in the middle of the figure.
     entry = (crack.angle_deg / 360.0 - 0.5 / teeth) % 1.0
-    turned = round((entry - 0.5) * len(now))
-    angle = (np.arange(len(now)) + turned) * 360.0 / len(now)
-    lines = [ChartLine(angle, np.roll(now, -turned), "now")]
-    if then is not None:
-        healthy = np.roll(then, -turned)
-        lines = [ChartLine(angle, healthy, "reference", QUIET), *lines]
-        lines.append(ChartLine(angle, lines[1].y - healthy, "change", FAULT))
+    turned = round((entry - 0.5) * len(average.values))
+    angle = (np.arange(len(average.values)) + turned) * 360.0 / len(average.values)
+    now = np.roll(factor * average.values, -turned)
+    lines = [ChartLine(angle, now, "now")]
+    if change is not None:
+        # The change is without mesh lines: beside it the reference's teeth stand in the mesh as it is now.
+        since = np.roll(factor * change.values, -turned)
+        lines = [ChartLine(angle, now - since, "reference", QUIET), *lines, ChartLine(angle, since, "change", FAULT)]
     reach = min(0.5, 8.0 / teeth)  # of a revolution: the blow and a few healthy teeth on either side
-    reference = " beside the reference" if then is not None else ""
+    reference = " beside the reference" if change is not None else ""
     caption = (
         "A crack changes the few mesh cycles after its tooth enters, and nothing else; a change all round is another "
         "load, speed or sensor."
-        if then is not None
+        if change is not None
         else "A crack swings the few mesh cycles after its tooth enters out of the pattern of the others."
     )
     panel = LinePanel(
@@ -292,39 +283,6 @@ def crack_picture(analysis: Analysis) -> Picture | None:
         f"Average of {name} over {crack.shaft}{reference}; marked: {crack.text}",
         f"Average of {name} over {crack.shaft}{reference}",
     )
-
-
-def _beside_reference(
-    analysis: Analysis, crack: CrackEstimate, teeth: int | None
-) -> tuple[str, FloatArray, FloatArray | None] | None:
-    """Return the acceleration that changed most: its name, its average in m/s², and the reference's at its angles."""
-    references = {} if analysis.reference is None else {c.channel: c for c in analysis.reference.channels}
-    averages: list[tuple[float, str, FloatArray, FloatArray | None]] = []
-    for channel in analysis.channels:
-        average = channel.averages.get((crack.shaft, "average"))
-        factor = si_factor("acceleration", average.unit) if average is not None else None
-        if average is None or factor is None:
-            continue
-        now, then = average.values * factor, None
-        size = float(np.std(now))
-        reference_channel = references.get(channel.channel)
-        reference = reference_channel.averages.get((crack.shaft, "average")) if reference_channel is not None else None
-        if reference is not None and reference.unit == average.unit:
-            turn = LARGEST_MARK_SHIFT / teeth if teeth and crack.tooth is not None else 0.5
-            then = factor * _on_angles_of(average.values, reference.values, turn)
-        change = float(np.std(now - then)) / size if then is not None and size > 0 else 0.0
-        averages.append((change, channel.channel, now, then))
-    return max(averages, key=lambda entry: entry[0])[1:] if averages else None
-
-
-def _on_angles_of(values: FloatArray, reference: FloatArray, largest_turn_rev: float) -> FloatArray:
-    """Return the reference's average on the angles of another, turned within limits to where the two agree best."""
-    n = len(values)
-    lines = np.fft.rfft(reference)[: n // 2 + 1] * (n / len(reference))
-    result = np.fft.irfft(np.pad(lines, (0, n // 2 + 1 - len(lines))), n)
-    agreement = circular_correlation(values, result)
-    agreement[np.abs(np.fft.fftfreq(n)) > largest_turn_rev] = -np.inf
-    return np.roll(result, int(np.argmax(agreement)))
 
 
 def start_stop_figures(examined: StartStop) -> Iterator[Captioned]:
@@ -700,6 +658,7 @@ def write_page(
     index: str = "",
     methods: Sequence[str] | None = None,
     mark: str = "",
+    pdf: bool = False,
 ) -> Path:
     """Write the report of one recording: verdict, findings, machine, figures, indicators, provenance.
 
@@ -718,27 +677,26 @@ def write_page(
         Further methods that the page shows; None: those that the recording calls for.
     mark : str
         By which a folder of pages knows whose page it is, see `recording_mark`; empty: none.
+    pdf : bool
+        Write it as PDF beside it as well.
 
     Returns
     -------
     Path
         Of the page.
     """
-    html = page_html(analysis, command=command, index=index, methods=methods, mark=mark)
-    return write_text(Path(path), html)
+    parts = page_parts(analysis, command=command, methods=methods)
+    if pdf:
+        write_pdf(Path(path).with_suffix(".pdf"), compiled("page.typ", parts))
+    return write_text(Path(path), _html(analysis, parts, index=index, mark=mark))
 
 
-def page_html(
-    analysis: Analysis,
-    *,
-    command: str = "",
-    index: str = "",
-    date: datetime | None = None,
-    methods: Sequence[str] | None = None,
-    mark: str = "",
-) -> str:
-    """Return the page that `write_page` writes."""
-    parts = page_parts(analysis, command=command, date=date, methods=methods)
+def page_html(analysis: Analysis, *, command: str = "", index: str = "", date: datetime | None = None) -> str:
+    """Return the page that `write_page` writes, with the further methods that the recording calls for."""
+    return _html(analysis, page_parts(analysis, command=command, date=date), index=index)
+
+
+def _html(analysis: Analysis, parts: dict[str, Any], *, index: str = "", mark: str = "") -> str:
     return render(
         "page.html.j2",
         **parts,
@@ -794,35 +752,4 @@ def page_pdf(analysis: Analysis, *, command: str = "", methods: Sequence[str] | 
     InputError
         If typst is not installed.
     """
-    parts = page_parts(analysis, command=command, methods=methods)
-    pictures: dict[str, bytes] = {}
-    verdict = parts["verdict_picture"]
-    data = {
-        "title": parts["title"],
-        "machine": parts["machine_name"],
-        "headline": parts["headline"],
-        "explanation": parts["explanation"],
-        "outcome": parts["outcome"],
-        "css_class": parts["outcome_class"],
-        "reference": parts["reference"],
-        "date": dict(parts["provenance"]).get("date", ""),
-        "made": f"gearsig {__version__}",
-        "changes": [
-            asdict(row) | {"change": row.change, "repeatability": f"± {row.repeatability_db:.1f}"}
-            for row in parts["changes"]
-        ],
-        "verdict_picture": None if verdict is None else put_picture(verdict, pictures),
-        "findings": [asdict(card) for card in parts["findings"]],
-        "further": [asdict(card) for card in parts["further"]],
-        "groups": [
-            {
-                "title": group.title,
-                "wide": [put_picture(picture, pictures) for picture in group.wide],
-                "small": [put_picture(picture, pictures) for picture in group.small],
-            }
-            for group in parts["gallery"].groups
-        ],
-        "facts": [*parts["machine"], *parts["speed"], *(("warning", text) for text in parts["warnings"])],
-        "provenance": parts["provenance"],
-    }
-    return compiled("page.typ", data, pictures)
+    return compiled("page.typ", page_parts(analysis, command=command, methods=methods))

@@ -164,13 +164,9 @@ class ChangeRow:
 
     label: str
     change_db: float
-    repeatability_db: float
+    change: str
+    repeatability: str
     percent: float
-
-    @property
-    def change(self) -> str:
-        """The change with its sign."""
-        return f"{signed(self.change_db)} dB"
 
 
 def change_rows(analysis: Analysis) -> tuple[ChangeRow, ...]:
@@ -178,7 +174,11 @@ def change_rows(analysis: Analysis) -> tuple[ChangeRow, ...]:
     changed = sorted((c for c in analysis.level_changes if c.is_change), key=lambda c: -abs(c.change_db))[:8]
     return tuple(
         ChangeRow(
-            _label_of(c, changed), c.change_db, c.repeatability_db, 100 * abs(c.change_db) / abs(changed[0].change_db)
+            _label_of(c, changed),
+            c.change_db,
+            f"{signed(c.change_db)} dB",
+            f"± {c.repeatability_db:.1f}",
+            100 * abs(c.change_db) / abs(changed[0].change_db),
         )
         for c in changed
     )
@@ -324,36 +324,17 @@ Key = tuple[str, str, str, str]
 Compared = tuple[Indicator, IndicatorChange | None]
 
 
-@dataclass(frozen=True)
-class IndicatorRow:
-    """One indicator on all channels."""
-
-    name: str
-    unit: str
-    computed_on: str
-    band: str
-    values: tuple[str, ...]
-    note: str
-    references: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class IndicatorTable:
-    """The indicators of one place: a gear, a shaft, or the channels as a whole."""
-
-    title: str
-    channels: tuple[str, ...]
-    rows: tuple[IndicatorRow, ...]
-
-
 def indicator_tables(
-    indicators: Sequence[Indicator], then: Sequence[IndicatorChange | None] = ()
-) -> tuple[IndicatorTable, ...]:
-    """Group indicators by what they belong to; each row then compares the channels, and these with the reference."""
+    indicators: Sequence[Indicator], then: Sequence[IndicatorChange | None]
+) -> list[dict[str, object]]:
+    """Return a table for each gear, bearing and shaft, and for the channels as a whole.
+
+    Each row compares the channels, and these with the reference.
+    """
     places: dict[str, list[Compared]] = {}
-    for indicator, change in zip(indicators, then or [None] * len(indicators), strict=True):
+    for indicator, change in zip(indicators, then, strict=True):
         places.setdefault(_place(indicator), []).append((indicator, change))
-    return tuple(_table(title, items) for title, items in places.items())
+    return [_table(title, items) for title, items in places.items()]
 
 
 def _place(indicator: Indicator) -> str:
@@ -368,24 +349,27 @@ def _capital(text: str) -> str:
     return text[:1].upper() + text[1:] if text.startswith(("gear ", "bearing ", "shaft ")) else text
 
 
-def _table(title: str, items: list[Compared]) -> IndicatorTable:
+def _table(title: str, items: list[Compared]) -> dict[str, object]:
     channels = tuple(dict.fromkeys(item.channel for item, _ in items))
     rows: dict[Key, dict[str, Compared]] = {}
     for item, change in items:
         rows.setdefault((item.name, item.unit, item.computed_on, item.band), {})[item.channel] = item, change
-    return IndicatorTable(title, channels, tuple(_row(key, row, channels) for key, row in rows.items()))
+    return {"title": title, "channels": channels, "rows": [_row(key, row, channels) for key, row in rows.items()]}
 
 
-def _row(key: Key, row: dict[str, Compared], channels: tuple[str, ...]) -> IndicatorRow:
-    values = tuple(readable(row[channel][0].value) if channel in row else "" for channel in channels)
-    references = tuple(_reference_text(row[channel][1]) if channel in row else "" for channel in channels)
+def _row(key: Key, row: dict[str, Compared], channels: tuple[str, ...]) -> dict[str, object]:
+    cells = [
+        (readable(row[channel][0].value), _reference_text(row[channel][1])) if channel in row else ("", "")
+        for channel in channels
+    ]
     notes: dict[str, list[str]] = {}
     for channel, (item, _) in row.items():
         if item.note:
             notes.setdefault(item.note, []).append(channel)
     texts = [note if len(named) == len(row) else f"{', '.join(named)}: {note}" for note, named in notes.items()]
     name, unit, computed_on, band = key
-    return IndicatorRow(name, unit_text(unit), computed_on, band, values, "; ".join(texts), references)
+    about = {"name": name, "unit": unit_text(unit), "computed_on": computed_on, "band": band, "note": "; ".join(texts)}
+    return {**about, "cells": cells}
 
 
 def _reference_text(change: IndicatorChange | None) -> str:

@@ -10,21 +10,12 @@ import numpy as np
 import pytest
 
 from app.cli.compare import DATA, PAGE, TABLE, read_pair
-from app.cli.main import main
 from gearsig.errors import InputError
 from gearsig.recording import Channel, Recording
+from tests.app.test_cli import run
 from tests.comparison.machines import LINES, TEETH, gear_record
 
 RIG = f'[[pair]]\nname = "p"\ndriver = "in"\ndriven = "out"\ndriver_teeth = {TEETH[0]}\ndriven_teeth = {TEETH[1]}\n'
-
-
-def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
-    """Run the command; return exit code, standard output and standard error."""
-    with pytest.raises(SystemExit) as stopped:
-        main([str(a) for a in arguments])
-    out, err = capsys.readouterr()
-    code = stopped.value.code
-    return (code if isinstance(code, int) else int(code is not None)), out, err
 
 
 def export(path: Path, record: Recording, unit: str = "m/s^2", name: str = "a1") -> Path:

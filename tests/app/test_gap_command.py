@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
-from app.cli.main import main
 from app.gap_job import check_folder, write_results
 from app.samples import sample_folder
 from gearsig.cache import cache_folder
 from gearsig.errors import InputError, RefusalError
 from gearsig.gap import GapReport, GapRequest, read_gap_inputs
 from gearsig.rig import Bearing, OperatingPoint, read_rig, write_rig
+from tests.app.test_cli import run as command
 from tests.gap.example_report import TWIN, cannot_separate_report, effect_report, no_gap_report, with_few_curves
 
 SAMPLES = sample_folder()
@@ -44,11 +44,7 @@ def stub(monkeypatch: pytest.MonkeyPatch) -> Stub:
 
 
 def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
-    with pytest.raises(SystemExit) as stopped:
-        main(["gap", *(str(a) for a in arguments)])
-    out, err = capsys.readouterr()
-    code = stopped.value.code
-    return (code if isinstance(code, int) else int(code is not None)), out, err
+    return command(capsys, "gap", *arguments)
 
 
 def copied(folder: Path, stem: str, **changes: object) -> Path:

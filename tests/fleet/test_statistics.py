@@ -24,8 +24,8 @@ def test_an_unchanged_machine_leaves_its_limits_as_often_as_stated(n_baseline):
     rng, rate = np.random.default_rng(1), 0.02
     y = 3.0 + 0.7 * rng.normal(size=(n_baseline + 1, N_SERIES))
     baseline = np.arange(n_baseline + 1) < n_baseline
-    limits = prediction_limits(y, np.ones((n_baseline + 1, 1)), baseline, rate)
-    outside = (y[-1] > limits.high[-1]) | (y[-1] < limits.low[-1])
+    expected, reach = prediction_limits(y, np.ones((n_baseline + 1, 1)), baseline, rate)
+    outside = np.abs(y[-1] - expected[-1]) > reach[-1]
     assert outside.mean() == pytest.approx(rate, abs=4 * np.sqrt(rate / N_SERIES))
 
 
@@ -38,10 +38,10 @@ def test_limits_follow_speed_and_load_with_the_same_rate():
     assert names == ("speed", "load")
     assert inside[-1]
     y = (40 * np.log10(speed) + 10 * np.log10(load))[:, None] + 0.8 * rng.normal(size=(n, N_SERIES))
-    limits = prediction_limits(y, x, baseline, rate)
-    outside = (y[-1] > limits.high[-1]) | (y[-1] < limits.low[-1])
+    expected, reach = prediction_limits(y, x, baseline, rate)
+    outside = np.abs(y[-1] - expected[-1]) > reach[-1]
     assert outside.mean() == pytest.approx(rate, abs=4 * np.sqrt(rate / N_SERIES))
-    assert np.allclose(limits.expected[-1].mean(), 40 * np.log10(1450) + 10 * np.log10(60), atol=0.05)
+    assert np.allclose(expected[-1].mean(), 40 * np.log10(1450) + 10 * np.log10(60), atol=0.05)
 
 
 def test_a_speed_far_from_the_baselines_is_not_judged():

@@ -198,10 +198,8 @@ KINDS = {
 
 def show_average(analysis: Analysis, channel: ChannelAnalysis) -> None:
     """Show one mean revolution of a chosen shaft: at first the signal that the verdict is seen in best."""
-    averages, picture = dict(channel.averages), verdict_picture(analysis)
+    averages, picture = channel.averages, verdict_picture(analysis)
     shown = picture if picture is not None and picture.about == "tooth" and picture.channel is channel else None
-    if shown is not None and shown.change is not None:
-        averages[shown.shaft, "change"] = shown.change
     shafts = list(dict.fromkeys(shaft for shaft, _ in channel.averages))
     if not shafts:
         st.info("There is no synchronous average: it takes a known speed and enough revolutions.")

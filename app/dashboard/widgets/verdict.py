@@ -13,7 +13,7 @@ from app.dashboard.widgets.charts import show_lines
 from app.dashboard.widgets.spectrum import offer_ring, show_ring, show_spectrum
 from app.dashboard.widgets.texts import as_typed, in_page_words, one_line
 from gearsig.diagnosis import BEARING_PARTS, CHANGED, Analysis, Finding, Kind, Outcome
-from gearsig.formatting import counted, enumerated, readable, signed
+from gearsig.formatting import counted, enumerated, readable
 from gearsig.plot import marks_of
 from gearsig.report import (
     FindingCard,
@@ -128,8 +128,7 @@ def _show_changes(analysis: Analysis, reference: Analysis) -> None:
     st.markdown(f"**Changed since the reference** :gray[{as_typed(reference.recording.provenance.source)}]")
     rows = "".join(
         f'<tr><td>{escape(one_line(row.label))}</td><td class="bar"><i class="{"up" if row.change_db > 0 else "down"}" '
-        f'style="width:{row.percent:.0f}%"></i></td><td>{signed(row.change_db)} dB</td>'
-        f"<td>± {row.repeatability_db:.1f}</td></tr>"
+        f'style="width:{row.percent:.0f}%"></i></td><td>{row.change}</td><td>{row.repeatability}</td></tr>'
         for row in shown
     )
     st.html(f'<table class="changes">{rows}</table>')

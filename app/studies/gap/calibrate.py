@@ -8,7 +8,6 @@ the sharpness are fitted to the same cases: a dozen numbers for some thousand ca
 
 from __future__ import annotations
 
-import argparse
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -19,6 +18,7 @@ from typing import Any
 import numpy as np
 import typer
 
+from app.studies import run_study
 from app.studies.gap.lumped import LUMPED
 from gearsig.checks import FloatArray
 from gearsig.gap import (
@@ -301,11 +301,8 @@ def calibration_error(answers: Sequence[tuple[AttributedCase, Mapping[str, float
     return sum(parts) / len(largest) if len(largest) else 0.0
 
 
-def main() -> None:
+def main(to: Path = CALIBRATION_FILE) -> None:
     """Weigh the population's machines, fit, write, and print how good that is."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--to", type=Path, default=CALIBRATION_FILE)
-    arguments = parser.parse_args()
     population = load_population()
     values: dict[str, Any] = {}
     n_cases = 0
@@ -321,8 +318,8 @@ def main() -> None:
         typer.echo("\n".join(table(fitted, single)))
         typer.echo("two conditions:\n" + "\n".join(table(fitted, several)))
     values["provenance"] = {"made_by": "python -m app.studies.gap.calibrate", "seed": SEED, "n_cases": n_cases}
-    arguments.to.write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
+    to.write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

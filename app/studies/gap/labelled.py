@@ -8,17 +8,16 @@ others are diagnosed.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import typer
 
-from app.studies import answers_of
+from app.studies import answers_of, run_study
 from app.studies.gap.by_hand import with_foreign_vibration
 from app.studies.gap.gearboxes import (
     CRACKED,
@@ -33,7 +32,7 @@ from app.studies.gap.gearboxes import (
     write,
 )
 from app.studies.gap.quasi_static import EFFECTS, QUASI_STATIC, QuasiStaticDay, StaticMachine, record
-from gearsig.checks import FloatArray
+from gearsig.checks import FloatArray, one_of
 from gearsig.gap import (
     INDEPENDENT,
     NONE,
@@ -158,9 +157,9 @@ COUNTS, STRONG = (0, 1, 2, 4), 3.0
 """Labelled recordings of each effect; structural floors from which an effect counts as strong."""
 
 
-def score(path: Path) -> None:
+def score(raw: Path) -> None:
     """Print how often the likeliest effect is the true one, by how many recordings of each are labelled."""
-    table = np.load(path, allow_pickle=False)
+    table = np.load(raw, allow_pickle=False)
     simulators = table["simulator"].astype(str)
     for simulator in np.unique(simulators):
         with without_machines_of(simulator):
@@ -219,27 +218,18 @@ def _scored(cases: Sequence[_Case], recogniser: Recogniser, n: int) -> str:
     )
 
 
-def main() -> None:
-    """Record machines, or score a table of them."""
-    from app.studies.gap.labelled import samples_of_job as of_job
-
-    parser = argparse.ArgumentParser(description=__doc__)
-    steps = parser.add_subparsers(dest="step", required=True)
-    simulation = steps.add_parser("simulate", help="record machines")
-    simulation.add_argument("--machines", type=int, default=4, help="of each simulator")
-    simulation.add_argument("--simulator", choices=list(_MAKE), action="append", help="default: all of these")
-    simulation.add_argument("--to", type=Path, required=True)
-    steps.add_parser("score", help="diagnose them").add_argument("raw", type=Path)
-    arguments = parser.parse_args()
-    if arguments.step == "score":
-        score(arguments.raw)
-        return
-    jobs = [(name, i) for i in range(arguments.machines) for name in arguments.simulator or _MAKE]
+def simulate(
+    to: Annotated[Path, typer.Option()],
+    machines: Annotated[int, typer.Option(help="of each simulator")] = 4,
+    simulator: Annotated[list[str] | None, typer.Option(help=f"{', '.join(_MAKE)}; default: all of these")] = None,
+) -> None:
+    """Record machines."""
+    names = [one_of(name, "simulator", _MAKE) for name in simulator or _MAKE]
     samples: list[PopulationSample] = []
-    for _, new_samples in answers_of(of_job, jobs, 2):
+    for _, new_samples in answers_of(samples_of_job, [(name, i) for i in range(machines) for name in names], 2):
         samples += new_samples
-        write(arguments.to, samples)
+        write(to, samples)
 
 
 if __name__ == "__main__":
-    main()
+    run_study(simulate, score)

@@ -119,11 +119,6 @@ def _surface_roughness(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> Lump
     return LumpedFault(gaps_m=gaps, friction=float(rig.numbers["friction"]) * (1.0 + 0.04 * rms_um))
 
 
-def _sliding_friction(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
-    del rig, shape
-    return LumpedFault(friction=log_uniform(rng, 0.075, 0.2))
-
-
 def _eccentricity(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
     """A gear off its axis, which its mass is as well, by less."""
     del shape
@@ -157,20 +152,9 @@ def _misalignment(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFau
     )
 
 
-def _torque_ripple(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
-    del rig, shape
+def _torque_ripple(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:  # noqa: ARG001 - form
     order = float(rng.choice([2.0, 3.0, 4.0, 6.0, 12.0]))
     return LumpedFault(ripple=(log_uniform(rng, 0.06, 0.5), order, rng.uniform(0, 2 * pi)))
-
-
-def _speed_fluctuation(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
-    del rig, shape
-    return LumpedFault(wander=(log_uniform(rng, 0.005, 0.04), rng.uniform(0.6, 3.0)))
-
-
-def _backlash(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
-    del rig, shape
-    return LumpedFault(backlash=log_uniform(rng, 1.7, 9.0))
 
 
 def _race(kind: float, narrow_mm: float, wide_mm: float) -> LumpedEffect:
@@ -190,11 +174,6 @@ def _race(kind: float, narrow_mm: float, wide_mm: float) -> LumpedEffect:
     return race
 
 
-def _bearing_clearance(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
-    del rig, shape
-    return LumpedFault(clearance_m={int(rng.integers(2)): log_uniform(rng, 20e-6, 150e-6)})
-
-
 def _transfer_path(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
     """A loose sensor, or a housing that has become softer here and stiffer there."""
     del shape
@@ -206,16 +185,6 @@ def _transfer_path(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFa
     return LumpedFault(moved_modes=1.0 + size * signs, damped_modes=1.0 + 4.0 * size)
 
 
-def _mains_hum(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
-    del rig, shape
-    return LumpedFault(hum=log_uniform(rng, 0.04, 0.6))
-
-
-def _clipping(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
-    del rig, shape
-    return LumpedFault(clipped=(int(rng.integers(3)), rng.uniform(0.35, 0.9)))
-
-
 EFFECTS: dict[str, LumpedEffect] = {
     "root_crack": _root_crack,
     "tooth_spall": _tooth_spall,
@@ -223,19 +192,23 @@ EFFECTS: dict[str, LumpedEffect] = {
     "tooth_wear": _tooth_wear,
     "pitch_error": _pitch_error,
     "surface_roughness": _surface_roughness,
-    "sliding_friction": _sliding_friction,
+    "sliding_friction": lambda _rig, _shape, rng: LumpedFault(friction=log_uniform(rng, 0.075, 0.2)),
     "eccentricity": _eccentricity,
     "unbalance": _unbalance,
     "misalignment": _misalignment,
     "torque_ripple": _torque_ripple,
-    "speed_fluctuation": _speed_fluctuation,
-    "backlash": _backlash,
+    "speed_fluctuation": lambda _rig, _shape, rng: LumpedFault(
+        wander=(log_uniform(rng, 0.005, 0.04), rng.uniform(0.6, 3.0))
+    ),
+    "backlash": lambda _rig, _shape, rng: LumpedFault(backlash=log_uniform(rng, 1.7, 9.0)),
     "bearing_outer_race": _race(1.0, 0.5, 2.4),
     "bearing_inner_race": _race(2.0, 0.6, 3.2),
-    "bearing_clearance": _bearing_clearance,
+    "bearing_clearance": lambda _rig, _shape, rng: LumpedFault(
+        clearance_m={int(rng.integers(2)): log_uniform(rng, 20e-6, 150e-6)}
+    ),
     "transfer_path": _transfer_path,
-    "mains_hum": _mains_hum,
-    "clipping": _clipping,
+    "mains_hum": lambda _rig, _shape, rng: LumpedFault(hum=log_uniform(rng, 0.04, 0.6)),
+    "clipping": lambda _rig, _shape, rng: LumpedFault(clipped=(int(rng.integers(3)), rng.uniform(0.35, 0.9))),
 }
 
 # --------------------

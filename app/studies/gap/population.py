@@ -12,26 +12,23 @@ development gears.
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import typer
 from numpy.typing import NDArray
 
-from app.studies import answers_of
+from app.studies import answers_of, run_study
 from app.studies.gap.gearboxes import CRACKED, REDUCED, PopulationSample, one_case, one_rig, write
 from app.studies.gap.lumped import LUMPED, lumped_samples
 from app.studies.gap.quasi_static import QUASI_STATIC, static_samples
 from gearsig.cache import write_whole
-from gearsig.gap import BY_HAND, INDEPENDENT, LEARNED_FILE, learn, load_population, population_file, write_learned
-
-MACHINES = {CRACKED.name: 36, REDUCED.name: 21, INDEPENDENT: 195, QUASI_STATIC: 122, LUMPED: 46}
-"""Of each simulator, unless asked for otherwise."""
+from gearsig.gap import BY_HAND, INDEPENDENT, LEARNED_FILE, load_population, population_file, write_learned
+from gearsig.gap import learn as learned_of
 
 _SAMPLES_OF: dict[str, Callable[[int], list[PopulationSample]]] = {
     CRACKED.name: partial(one_rig, CRACKED),
@@ -43,57 +40,43 @@ _SAMPLES_OF: dict[str, Callable[[int], list[PopulationSample]]] = {
 """What a machine's number makes, by simulator."""
 
 
-def main() -> None:
-    """Simulate machines, or pack what was simulated."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    steps = parser.add_subparsers(dest="step", required=True)
-    simulation = steps.add_parser("simulate", help="record machines and reduce them to a raw table")
-    for name, n in MACHINES.items():
-        simulation.add_argument(f"--{name}", type=int, default=n, help=f"machines of this simulator (default: {n})")
-    simulation.add_argument("--processes", type=int, default=2)
-    simulation.add_argument("--to", type=Path, required=True)
-    whole = steps.add_parser("make", help="simulate, pack and learn")
-    whole.add_argument("--processes", type=int, default=2)
-    packing = steps.add_parser("pack", help="pack raw tables for the library")
-    packing.add_argument("raw", type=Path, nargs="+")
-    packing.add_argument("--to", type=Path, default=population_file())
-    learning = steps.add_parser("learn", help="write what a diagnosis asks of the population")
-    learning.add_argument("--to", type=Path, default=LEARNED_FILE)
-    arguments = vars(parser.parse_args())
-    if arguments["step"] == "pack":
-        pack(arguments["raw"], arguments["to"])
-    elif arguments["step"] == "learn":
-        write_learned(learn(load_population()), arguments["to"])
-        typer.echo(f"{arguments['to'].stat().st_size / 1e6:.2f} MB")
-    elif arguments["step"] == "simulate":
-        simulate(
-            jobs_of({name: arguments[name.replace("-", "_")] for name in MACHINES}),
-            arguments["processes"],
-            arguments["to"],
-        )
-    else:
-        with TemporaryDirectory() as folder:
-            raw = Path(folder) / "raw.npz"
-            simulate(jobs_of(MACHINES), arguments["processes"], raw)
-            pack([raw], population_file())
-        write_learned(learn(load_population()), LEARNED_FILE)
+def make(processes: int = 2) -> None:
+    """Simulate, pack and learn."""
+    with TemporaryDirectory() as folder:
+        raw = Path(folder) / "raw.npz"
+        simulate(raw, processes=processes)
+        pack([raw])
+    learn()
+
+
+def simulate(
+    to: Annotated[Path, typer.Option()],
+    cracked: int = 36,
+    reduced_fe: int = 21,
+    independent: int = 195,
+    quasi_static: int = 122,
+    lumped: int = 46,
+    processes: int = 2,
+) -> None:
+    """Record so many machines of each simulator and reduce them to a raw table, which is written now and then."""
+    numbers = (cracked, reduced_fe, independent, quasi_static, lumped)
+    jobs, samples = jobs_of(dict(zip(_SAMPLES_OF, numbers, strict=True))), list[PopulationSample]()
+    for n_done, (_, of_machine) in enumerate(answers_of(samples_of_job, jobs, processes), start=1):
+        samples += of_machine
+        if samples and (n_done % 10 == 0 or n_done == len(jobs)):
+            write(to, samples)
+
+
+def learn(to: Path = LEARNED_FILE) -> None:
+    """Write what a diagnosis asks of the population."""
+    write_learned(learned_of(load_population()), to)
+    typer.echo(f"{to.stat().st_size / 1e6:.2f} MB")
 
 
 def jobs_of(machines: Mapping[str, int]) -> list[tuple[str, int]]:
     """Return simulator and number of each machine, all simulators at an even pace: a part is a smaller population."""
     paced = [((i + 0.5) / n, name, i) for name, n in machines.items() for i in range(n)]
     return [(name, i) for _, name, i in sorted(paced)]
-
-
-def simulate(jobs: Sequence[tuple[str, int]], n_processes: int, to: Path) -> None:
-    """Record machines, given by simulator and number, and write the table of their samples now and then."""
-    from app.studies.gap.population import samples_of_job
-
-    samples: list[PopulationSample] = []
-    for n_done, (_, of_machine) in enumerate(answers_of(samples_of_job, jobs, n_processes), start=1):
-        samples += of_machine
-        if samples and (n_done % 10 == 0 or n_done == len(jobs)):
-            write(to, samples)
 
 
 def samples_of_job(job: tuple[str, int]) -> list[PopulationSample]:
@@ -111,9 +94,9 @@ TABLES = {
 """Name in the library → name in the raw tables."""
 
 
-def pack(paths: Sequence[Path], to: Path) -> None:
+def pack(raw_tables: list[Path], to: Path = population_file()) -> None:  # noqa: B008 - an option's default
     """Read raw tables, write one packed table."""
-    raw = [np.load(path, allow_pickle=False) for path in paths]
+    raw = [np.load(path, allow_pickle=False) for path in raw_tables]
     tables = {name: _rounded(np.concatenate([sample[key] for sample in raw])) for name, key in TABLES.items()}
     rigs = np.concatenate([sample["rig"] for sample in raw]).astype(np.int64)
     simulated_rigs, first = np.unique(rigs, return_index=True)  # one twin for all recordings of a machine
@@ -139,4 +122,4 @@ def _rounded(table: NDArray[np.float32]) -> NDArray[np.float16]:
 
 
 if __name__ == "__main__":
-    main()
+    run_study(make, simulate, pack, learn)

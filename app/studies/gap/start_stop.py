@@ -7,15 +7,15 @@ file's provenance says which cases it was made of: `--numbers` makes some of tho
 
 from __future__ import annotations
 
-import argparse
 import json
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+import typer
 
 from app.benchmark.start_stop import labelled_recordings, needs_reference, planned
-from app.studies import answers_of
+from app.studies import answers_of, run_study
 from gearsig.checks import FloatArray
 from gearsig.gap import NONE, UNKNOWN, Attribution, GapCalibration
 from gearsig.gap.start_stop import (
@@ -106,20 +106,18 @@ def _calibration(values: FloatArray, named_from: float = MIN_NAMED) -> GapCalibr
     return GapCalibration(max(sharpness, 0.05), weight, NEUTRAL_SHRINK, none, unknown, named_from, APART)
 
 
-def main() -> None:
+def main(
+    cases: int = 100,
+    seed: int = 71,
+    processes: int = 2,
+    numbers: Annotated[str, typer.Option(help="of the planned cases, e.g. 0-38,140-177; default: all")] = "",
+) -> None:
     """Make the cases, fit, write."""
-    from app.studies.gap.start_stop import collect
-
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--cases", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=71)
-    parser.add_argument("--processes", type=int, default=2)
-    parser.add_argument("--numbers", default="", help="of the planned cases, e.g. 0-38,140-177; default: all")
-    arguments = parser.parse_args()
-    plan = planned(arguments.cases, arguments.seed)
-    jobs = [(arguments.seed, i, plan[i]) for i in numbers_of(arguments.numbers, len(plan))]
-    rows = [row for _, seen in answers_of(collect, jobs, arguments.processes) for row in seen]
-    write_floors(rows, arguments.seed, f"{arguments.numbers or 'all'} of {len(plan)} planned")
+    plan = planned(cases, seed)
+    jobs = [(seed, i, plan[i]) for i in numbers_of(numbers, len(plan))]
+    rows = [row for _, seen in answers_of(collect, jobs, processes) for row in seen]
+    content = floors_of(rows, seed, f"{numbers or 'all'} of {len(plan)} planned")
+    FLOORS_FILE.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 
 
 def numbers_of(text: str, n_planned: int) -> list[int]:
@@ -128,11 +126,6 @@ def numbers_of(text: str, n_planned: int) -> list[int]:
         return list(range(n_planned))
     ends = [part.partition("-") for part in text.split(",")]
     return [i for low, _, high in ends for i in range(int(low), int(high or low) + 1)]
-
-
-def write_floors(rows: Sequence[Row], seed: int, drawn: str) -> None:
-    """Write what a seed's cases give into the package."""
-    FLOORS_FILE.write_text(json.dumps(floors_of(rows, seed, drawn), indent=1) + "\n", encoding="utf-8")
 
 
 def floors_of(rows: Sequence[Row], seed: int, drawn: str = "all") -> dict[str, Any]:
@@ -155,4 +148,4 @@ def floors_of(rows: Sequence[Row], seed: int, drawn: str = "all") -> dict[str, A
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

@@ -9,18 +9,18 @@ independent rig, with encoders, and names them by all.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
 from math import exp, floor, log
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import typer
 from numpy.typing import NDArray
 
+from app.studies import run_study
 from app.studies.gap.quasi_static import (
     EFFECTS,
     OUT_OF_REACH_M,
@@ -371,7 +371,7 @@ def _print_accuracy(
 ENCODER_COUNTS = 200_000
 
 
-def blind(n_each: int) -> None:
+def name_blindly(n_each: int) -> None:
     """Name faults of the independent rig's development gears by its encoders, and print how often that is right."""
     rng = np.random.default_rng([SEED, 9])
     rows: list[tuple[str, str, float]] = []
@@ -391,25 +391,22 @@ def blind(n_each: int) -> None:
     _print_accuracy(f"independent rig, {unlike} unlike any or not seen", columns[0], columns[1], columns[2])
 
 
-def main() -> None:
+def main(
+    each: Annotated[int, typer.Option(help="faults of each kind and simulator")] = 600,
+    blind: Annotated[int, typer.Option(help="faults of each kind on the independent rig")] = 0,
+    to: Path = TOOTH_ERRORS_FILE,
+) -> None:
     """Draw, print, write."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--each", type=int, default=600, help="faults of each kind and simulator")
-    parser.add_argument("--blind", type=int, default=0, help="faults of each kind on the independent rig")
-    parser.add_argument("--to", type=Path, default=TOOTH_ERRORS_FILE)
-    arguments = parser.parse_args()
-    by_simulator = {name: known_tooth_errors_of(name, arguments.each) for name in SIMULATORS}
+    by_simulator = {name: known_tooth_errors_of(name, each) for name in SIMULATORS}
     for name, held_out in by_simulator.items():
         taught = together([known for title, known in by_simulator.items() if title != name])
         _print_accuracy(f"{name} left out", held_out.faults, *named(taught, held_out.descriptors))
     everything = together([*by_simulator.values()])
     rows, faults = everything.descriptors.astype(np.float16), everything.faults
-    write_whole(
-        arguments.to, lambda file: np.savez_compressed(file, allow_pickle=False, descriptors=rows, faults=faults)
-    )
-    if arguments.blind:
-        blind(arguments.blind)
+    write_whole(to, lambda file: np.savez_compressed(file, allow_pickle=False, descriptors=rows, faults=faults))
+    if blind:
+        name_blindly(blind)
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)

@@ -9,16 +9,17 @@ trials must do no harm. With `--run-up` a run-up of each healthy specimen measur
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Annotated, Literal
 
 import numpy as np
 import typer
 
 from app.benchmark.cases import Plan, PlannedCase
+from app.studies import run_study
 from app.studies.gap.calibrate import STRONG
 from gearsig.errors import GearsigError, RefusalError
 from gearsig.gap import (
@@ -210,24 +211,22 @@ def report_lines(rows: Sequence[Answered]) -> Iterator[str]:
 
 
 @one_pool(2)
-def main() -> None:
+def main(
+    source: Literal["same", "blind", "reduced-fe"] = "same",
+    rigs: int = 6,
+    seed: int = 8101,
+    role: str = "development",
+    run_up: Annotated[bool, typer.Option("--run-up", help="of simulators; the independent rig has none")] = False,
+) -> None:
     """Record, ask, print."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--source", choices=("same", "blind", "reduced-fe"), default="same")
-    parser.add_argument("--rigs", type=int, default=6)
-    parser.add_argument("--seed", type=int, default=8101)
-    parser.add_argument("--role", default="development")
-    parser.add_argument("--run-up", action="store_true", help="of simulators; the independent rig has none")
-    arguments = parser.parse_args()
-    plan, rows = Plan(1000, arguments.seed, arguments.role, reference="with", longest_s=LONGEST_S), []
-    for number, case in drawn_cases(plan, arguments.rigs):
+    plan, rows = Plan(1000, seed, role, reference="with", longest_s=LONGEST_S), []
+    for number, case in drawn_cases(plan, rigs):
         first = case.conditions[0]
         rig = case.rig.description(first.stated_rpm, first.stated_nm)
-        if arguments.source == "blind":
+        if source == "blind":
             recorded = independent(plan, number)
         else:
-            seed = arguments.seed + number
-            recorded = simulated(case, arguments.source, seed, with_run_up=arguments.run_up)
+            recorded = simulated(case, source, seed + number, with_run_up=run_up)
         with tempfile.TemporaryDirectory() as cache:
             for recorded_fault in recorded:
                 try:
@@ -249,4 +248,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_study(main)
