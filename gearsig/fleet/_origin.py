@@ -100,13 +100,8 @@ class FilePattern:
     def __post_init__(self) -> None:
         self._compiled()
 
-<<<<<<< HEAD
-    def match(self, path: Path, root: Path | None = None) -> dict[str, str | datetime | timedelta] | None:
-        """Return what the pattern names in a path, None if the path is of another kind.
-=======
-    def match(self, path: Path, root: Path | None = None) -> dict[str, str | datetime] | PassedOver:
+    def match(self, path: Path, root: Path | None = None) -> dict[str, str | datetime | timedelta] | PassedOver:
         """Return what the pattern names in a path; for a path of another kind what speaks against it.
->>>>>>> app
 
         Below `root` it is tried on the whole of the path first.
 
@@ -115,20 +110,7 @@ class FilePattern:
         >>> found = FilePattern("{machine}/{point}_{date:%Y%m%d}.csv").match(Path("/data/pump 3/DE_20260131.csv"))
         >>> found["machine"], found["point"], found["date"].isoformat()
         ('pump 3', 'DE', '2026-01-31T00:00:00')
-<<<<<<< HEAD
-        """
-        named = self.examined(path, root)
-        return None if isinstance(named, PassedOver) else named
-
-    def examined(self, path: Path, root: Path | None = None) -> dict[str, str | datetime | timedelta] | PassedOver:
-        """Return what `match` does, but for a path of another kind what speaks against it.
-
-        Examples
-        --------
-        >>> FilePattern("{point}_{date:%Y%m%d}.csv").examined(Path("/data/DE_20261301.csv")).reason
-=======
         >>> FilePattern("{point}_{date:%Y%m%d}.csv").match(Path("/data/DE_20261301.csv")).reason
->>>>>>> app
         '20261301 is no date in the form %Y%m%d'
         """
         expression, form = self._compiled()
@@ -394,15 +376,11 @@ def origins(
                 stat.st_mtime_ns,
             )
         )
-<<<<<<< HEAD
-    return sorted(result, key=lambda o: (o.machine, o.point, o.date, o.path))
-=======
     if not result and not may_be_none:
         complaint = f" that match {pattern!r}" if pattern else ""
         complaint += f"; {passed_over_text(passed_over)}" if passed_over else ""
         raise no_recordings(searched, complaint=complaint)
-    return result
->>>>>>> app
+    return sorted(result, key=lambda o: (o.machine, o.point, o.date, o.path))
 
 
 N_NAMED = 3

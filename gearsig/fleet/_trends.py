@@ -302,11 +302,7 @@ def judge(
         calm = np.abs(rise) <= RETURN * reach
     sample = np.where(judged, sample, -1)
     basis = [STATISTICAL if known else NONE for known in np.asarray(np.isfinite(reach).any(axis=0)).tolist()]
-<<<<<<< HEAD
-    expected, low, high, alarm = _natural_limits(limits.expected, reach, in_db, is_level)
-=======
-    expected, low, high, alarm = _natural_limits(middle, reach, in_db)
->>>>>>> app
+    expected, low, high, alarm = _natural_limits(middle, reach, in_db, is_level)
     zones = _zone_limits(recordings)
     is_velocity = np.asarray(series["name"] == "overall velocity", dtype=np.bool_)
     for column in np.flatnonzero(is_velocity):
@@ -423,13 +419,8 @@ def over_condition(
     y = np.concatenate([y, np.full((n_added, 1), np.nan)])
     expected, reach = _limits(y, x, is_baseline, in_db, trends.false_alarm_rate, settings)
     reach[n : 2 * n] = reach[:n]  # each value keeps the limits of its own place
-<<<<<<< HEAD
-    natural = np.hstack(_natural_limits(limits.expected, reach, in_db, is_level))
-    moved = np.nan_to_num(limits.expected[n : 2 * n, 0] - limits.expected[:n, 0])
-=======
-    natural = np.hstack(_natural_limits(expected, reach, in_db))
+    natural = np.hstack(_natural_limits(expected, reach, in_db, is_level))
     moved = np.nan_to_num(expected[n : 2 * n, 0] - expected[:n, 0])
->>>>>>> app
     if is_iso:  # boundaries of zones are the same at any load
         moved[:] = 0.0
         natural[:, 1], natural[:, 2:] = np.nan, [trends.high[0, column], trends.alarm[0, column]]

@@ -99,22 +99,6 @@ def _series(of: Mapping[Any, Any]) -> dict[str, str]:
 
 def _row(change: AlarmChange) -> dict[str, str]:
     unit = f" {unit_text(change.unit)}" if change.unit else ""
-<<<<<<< HEAD
-    return AlarmRow(
-        change.level,
-        LEVEL_CLASSES[change.level],
-        " · ".join(part for part in (change.machine, change.point) if part),
-        change.name,
-        ", ".join(part for part in (change.place, change.channel, change.computed_on) if part),
-        readable(change.value, 4) + unit,
-        readable(change.expected, 4),
-        readable(change.upper_limit, 4),
-        change_text(change.change, in_db=change.in_db),
-        moment_text(change.raised),
-        moment_text(change.cleared) if change.cleared is not None else "",
-        change.basis,
-    )
-=======
     return {
         "level": change.level,
         "css_class": LEVEL_CLASSES[change.level],
@@ -123,24 +107,16 @@ def _row(change: AlarmChange) -> dict[str, str]:
         "expected": readable(change.expected, 4),
         "limit": readable(change.upper_limit, 4),
         "change": change_text(change.change, in_db=change.in_db),
-        "raised": f"{change.raised:%Y-%m-%d}",
-        "cleared": f"{change.cleared:%Y-%m-%d}" if change.cleared is not None else "",
+        "raised": moment_text(change.raised),
+        "cleared": moment_text(change.cleared) if change.cleared is not None else "",
         "basis": change.basis,
     }
->>>>>>> app
 
 
 def _shift(row: Mapping[Any, Any]) -> dict[str, str]:
     return {
-<<<<<<< HEAD
-        "machine": " · ".join(part for part in (row["machine"], row["point"]) if part),
-        "name": row["name"],
-        "of": ", ".join(part for part in (row["place"], row["channel"], row["computed_on"]) if part),
-        "since": moment_text(row["changed"]),
-=======
         **_series(row),
-        "since": f"{row['changed']:%Y-%m-%d}",
->>>>>>> app
+        "since": moment_text(row['changed']),
         "by": change_text(row["changed_by"], in_db=bool(row["in_db"])),
     }
 
