@@ -11,8 +11,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.checks import FloatArray, count, freeze, limits, one_of, positive, read_only, within
-from gearsig.compiled import njit
+from gearsig.checks import FloatArray, count, freeze, limits, one_of, positive, within
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Channel, Recording
 from gearsig.results import Result
@@ -310,8 +309,8 @@ def continuations(values: FloatArray, n_beyond: int = BEYOND_THE_ENDS) -> tuple[
 
 
 def ends_meet(values: FloatArray) -> bool:
-    """Whether the step from a record's end to its beginning is no larger than any within it."""
-    return bool(_ends_meet(read_only(values)))
+    """Whether the step from a record's end to its beginning is no larger than the largest within it."""
+    return not abs(values[0] - values[-1]) > np.abs(np.diff(values)).max(initial=0.0)
 
 
 def joined_ends(values: FloatArray, *, continued: bool = False) -> FloatArray:
@@ -351,14 +350,6 @@ def _continued_length(n_samples: int) -> int:
     from scipy.fft import next_fast_len
 
     return int(next_fast_len(n_samples + 2 * min(BEYOND_THE_ENDS, n_samples - 1), real=True))
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _ends_meet(x):  # type: ignore[no-untyped-def]
-    largest = 0.0
-    for i in range(1, x.shape[0]):
-        largest = max(largest, abs(x[i] - x[i - 1]))
-    return not abs(x[0] - x[x.shape[0] - 1]) > largest
 
 
 PERIODS_OF_EDGE = 50
