@@ -210,18 +210,12 @@ def _interval_heights(x: FloatArray) -> FloatArray:
     return np.maximum(lines[:-1], lines[1:])
 
 
-@lru_cache(maxsize=8)
-def _hann(n: int) -> FloatArray:
-    """Hann window for spectra; kept, as many blocks of one length follow each other."""
-    window: FloatArray = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(n) / n)
-    return window
-
-
 def _mean_power(x: FloatArray, n_segment: int) -> FloatArray:
     from scipy.fft import rfft
+    from scipy.signal.windows import hann
 
     precision = np.result_type(x.dtype, np.float32)
-    window = _hann(n_segment).astype(precision)
+    window = hann(n_segment, sym=False).astype(precision)
     step = max(1, n_segment // 2)
     power = np.zeros(n_segment // 2 + 1)
     for start in range(0, len(x) - n_segment + 1, step):

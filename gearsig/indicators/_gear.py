@@ -156,12 +156,9 @@ def healthy_records(variances: Sequence[float], *, z: float = 2.33, n_first: int
 
 def envelope(values: FloatArray) -> FloatArray:
     """|x + i H[x]| of a periodic signal, by its Fourier lines."""
-    n = len(values)
-    lines = np.fft.fft(values)
-    lines[1 : (n + 1) // 2] *= 2
-    lines[n // 2 + 1 :] = 0
-    magnitude: FloatArray = np.abs(np.fft.ifft(lines))
-    return magnitude
+    from scipy.signal import hilbert
+
+    return np.abs(hilbert(values))
 
 
 def _check(present: SynchronousAverage, history: Sequence[SynchronousAverage], *kinds: str) -> None:

@@ -9,10 +9,9 @@ from typing import Literal
 import numpy as np
 
 from gearsig.checks import FloatArray, count, freeze, positive, within
-from gearsig.compiled import njit
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import percent, seconds_text
-from gearsig.phase._neighbours import nearest_apart, spaced
+from gearsig.phase._neighbours import IndexArray, nearest_apart, spaced
 from gearsig.phase._plane import PhasePortrait, checked_series, mean_period_samples
 from gearsig.recording import Recording
 from gearsig.results import Result
@@ -243,17 +242,16 @@ def average_mutual_information(
     step = max(1, ceil(longest / MAX_DELAYS))
     delays = np.arange(0, longest + 1, step)
     bins, n_bins = equally_filled_bins(x)
-    information = np.empty(len(delays))
-    mutual_information(bins, n_bins, delays, information)
+    information = np.array([mutual_information(bins, n_bins, int(delay)) for delay in delays])
     delay, rule = _choose(information, _scatter(len(x) - longest, n_bins), step, x)
     return MutualInformation(information, step, rate, delay, rule, n_bins, source)
 
 
-def equally_filled_bins(x: FloatArray) -> tuple[np.ndarray, int]:
+def equally_filled_bins(x: FloatArray) -> tuple[IndexArray, int]:
     """Return each sample's bin, bounded by quantiles; equal samples always share one (quantised signals)."""
     n_bins = int(np.clip(np.sqrt(len(x) / SAMPLES_PER_CELL), 4, MAX_BINS))
     inner = np.quantile(x, np.arange(1, n_bins) / n_bins)
-    return np.searchsorted(inner, x, side="right").astype(np.int64), n_bins
+    return np.searchsorted(inner, x, side="right"), n_bins
 
 
 def _longest_delay(x: FloatArray, max_delay: int | None) -> int:
@@ -301,31 +299,22 @@ def first_minimum(information: FloatArray, scatter: float) -> int:
     return 0
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
-def mutual_information(bins, n_bins, delays, out):  # type: ignore[no-untyped-def]
-    """out[k] = Σ p(i, j) ln(p(i, j) / (p(i) p(j))) of bins[t], bins[t + delays[k]], less its bias.
+def mutual_information(bins: IndexArray, n_bins: int, delay: int) -> float:
+    """Return Σ p(i, j) ln(p(i, j) / (p(i) p(j))) of bins[t], bins[t + delay], less its bias.
 
     Counting alone makes the estimate too large by (filled cells - filled rows - filled columns + 1) / 2N.
 
     Source of the correction: M. S. Roulston, *Estimating the errors on measured entropy and mutual information*,
     Physica D 125 (1999).
     """
-    joint = np.empty((n_bins, n_bins), dtype=np.int64)
-    for k in range(delays.shape[0]):
-        n = bins.shape[0] - delays[k]
-        joint[:] = 0
-        for t in range(n):
-            joint[bins[t], bins[t + delays[k]]] += 1
-        rows, columns = joint.sum(axis=1), joint.sum(axis=0)
-        total, filled = 0.0, 0
-        for i in range(n_bins):
-            for j in range(n_bins):
-                c = joint[i, j]
-                if c > 0:
-                    filled += 1
-                    total += c * np.log(c * float(n) / (float(rows[i]) * float(columns[j])))
-        bias = (filled - np.count_nonzero(rows) - np.count_nonzero(columns) + 1) / (2.0 * n)
-        out[k] = max(total / n - bias, 0.0)
+    n = len(bins) - delay
+    cells = np.bincount(bins[:n] * n_bins + bins[delay:], minlength=n_bins**2).reshape(n_bins, n_bins)
+    rows, columns = cells.sum(axis=1), cells.sum(axis=0)
+    filled = cells > 0
+    counts = cells[filled]
+    total = float(np.sum(counts * np.log(counts * float(n) / np.multiply.outer(rows, columns)[filled])))
+    bias = (np.count_nonzero(filled) - np.count_nonzero(rows) - np.count_nonzero(columns) + 1) / (2.0 * n)
+    return max(total / n - bias, 0.0)
 
 
 N_LIBRARY, N_REFERENCES = 20_000, 2_000

@@ -361,25 +361,13 @@ def _comb_totals(scores, candidates, origins, factors, first, resolution, inside
 
 def _sharpest(excess: LinesOverFloor, origins: FloatArray, factors: NDArray[np.int_], candidates: FloatArray) -> int:
     """Return the candidate whose harmonics meet the peaks best: ln(A/A₀) of each by itself, not cut at any limit."""
-    spectrum = excess.spectrum
-    sums = np.zeros(len(candidates))
-    _sum_heights(
-        spectrum.values, excess.floor, excess.masked, candidates, origins, factors, float(spectrum.positions[0]),
-        spectrum.resolution, sums,
-    )  # fmt: skip
+    values, sums = excess.spectrum.values, np.zeros(len(candidates))
+    for origin, factor in zip(origins, factors, strict=True):
+        lines = np.clip(excess.line_numbers(origin + factor * candidates), 0, len(values) - 1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            heights = np.minimum(np.log(values[lines] / excess.floor[lines]), 40.0)  # over a floor of nothing
+        sums += np.where(excess.masked[lines] | ~(values[lines] > 0.0), 0.0, heights)
     return int(np.argmax(sums))
-
-
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
-def _sum_heights(values, floor, masked, candidates, origins, factors, first, resolution, sums):  # type: ignore[no-untyped-def]
-    last = len(values) - 1
-    for i in range(len(factors)):
-        for j in range(len(candidates)):
-            place = int(np.rint((origins[i] + factors[i] * candidates[j] - first) / resolution))
-            k = min(max(place, 0), last)
-            ratio = values[k] / floor[k]
-            if not masked[k] and ratio > 0.0:
-                sums[j] += min(np.log(ratio), 40.0)  # over a floor of nothing
 
 
 def tail_probability(excess: LinesOverFloor, n_terms: int, score: float) -> float:

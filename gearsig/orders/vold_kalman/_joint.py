@@ -453,16 +453,17 @@ def _data_terms(
         whole = np.tile(products.sum(axis=0), (last - first, 1)) if active is None and last * d <= n else None
         # e_k* y on the right, e_k* e_m in the matrix; e is a phasor, or cos and -sin of each order in turn.
         for k, e_k in enumerate(regressors):
-            add_projections(right, k, first, _summed(values * e_k.conj(), basis))
+            for s, projected in enumerate(_summed(values * e_k.conj(), basis).T):
+                right[first + s : first + s + len(projected), k] += projected
             for m, e_m in enumerate(regressors[:k]):
-                add_products(matrix, k, m, first, pairs, _summed(e_k.conj() * e_m, products))
+                _add_products(matrix, k, m, first, pairs, _summed(e_k.conj() * e_m, products))
             if whole is not None and np.iscomplexobj(e_k):
                 square = whole
             elif whole is not None and k % 2:
                 square = whole - square
             else:
                 square = _summed(e_k.real**2 + e_k.imag**2 if np.iscomplexobj(e_k) else e_k * e_k, products)
-            add_products(matrix, k, k, first, pairs, square)
+            _add_products(matrix, k, k, first, pairs, square)
     return matrix, right
 
 
@@ -507,30 +508,19 @@ def _add_structure(matrix: Array, weights: FloatArray, differences: FloatArray, 
                 squares = np.zeros((last - first) * d)
                 squares[: rows.stop - rows.start] = (r if len(r) == 1 else r[rows]) ** 2
                 grams = squares.reshape(-1, d) @ products
-            add_products(matrix, k, k, first, pairs, grams)
+            _add_products(matrix, k, k, first, pairs, grams)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
-def add_products(matrix: Array, k: int, m: int, first: int, pairs: NDArray[np.int64], grams: Array) -> None:
+def _add_products(matrix: Array, k: int, m: int, first: int, pairs: NDArray[np.int64], grams: Array) -> None:
     """Add each cell's products of pieces s <= t, (n_cells, n_pairs), to the splines that the pieces belong to.
 
     matrix[t - s, cell + s] at unknowns k and m and, conjugate, m and k; the first cell is `first`.
     """
-    for cell in range(grams.shape[0]):
-        for i in range(grams.shape[1]):
-            s, t = pairs[i, 0], pairs[i, 1]
-            value = grams[cell, i]
-            matrix[t - s, first + cell + s, k, m] += value
-            if m != k:
-                matrix[t - s, first + cell + s, m, k] += np.conj(value)
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
-def add_projections(right: Array, k: int, first: int, projected: Array) -> None:
-    """Add each cell's projections on its pieces, (n_cells, n_pieces), to the splines that the pieces belong to."""
-    for cell in range(projected.shape[0]):
-        for s in range(projected.shape[1]):
-            right[first + cell + s, k] += projected[cell, s]
+    for (s, t), products in zip(pairs, grams.T, strict=True):
+        cells = slice(first + s, first + s + len(products))
+        matrix[t - s, cells, k, m] += products
+        if m != k:
+            matrix[t - s, cells, m, k] += products.conj()
 
 
 def _solve_spline_system(matrix: Array, right: Array) -> Array:
