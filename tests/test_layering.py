@@ -173,7 +173,7 @@ def test_rooms_are_entered_by_their_faces() -> None:
         "from gearsig.orders import _average",
         "from gearsig.orders import _average as average",
         "from gearsig.orders._average import synchronous_average",
-        "from gearsig.orders.vold_kalman._joint import rotate",
+        "from gearsig.orders.vold_kalman._joint import solve_band",
         "from gearsig.batch import _failure",
         "from ..orders import _average",
         "from ..orders._average import synchronous_average",

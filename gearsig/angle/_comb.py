@@ -178,8 +178,7 @@ def line_evidence(samples: FloatArray, rate: float, n_segment: int, top: float, 
     n_keep = min(n_segment // 2, int(top / rate * n_segment) + 4)
     ratios = [_log_ratio(_mean_power(row, n_segment)[:n_keep]) for row in samples]
     log_ratio = np.mean(ratios, axis=0)
-    height = np.empty(n_keep - 1)
-    _interval_heights(log_ratio, height)
+    height = _interval_heights(log_ratio)
     high = np.flatnonzero(height)
     positive = height[high]
     order = np.argsort(positive)
@@ -199,35 +198,24 @@ def line_evidence(samples: FloatArray, rate: float, n_segment: int, top: float, 
     return LineEvidence(likelihoods, log_ratio, rate / n_segment, top)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _interval_heights(x, height):  # type: ignore[no-untyped-def]
+def _interval_heights(x: FloatArray) -> FloatArray:
     """Height of the higher end of each interval between two bins, 0 where neither is a line.
 
     The flanks of a line are not lines: only what is the largest within two bins each way counts. A candidate may so
     miss a line's middle by half a bin.
     """
-    n = len(x)
-    height[:] = 0.0
-    for i in range(n):
-        if x[i] > 0.0 and x[i] >= max(x[max(i - 1, 0)], x[max(i - 2, 0)], x[min(i + 1, n - 1)], x[min(i + 2, n - 1)]):
-            if i > 0:
-                height[i - 1] = max(height[i - 1], x[i])
-            if i < n - 1:
-                height[i] = x[i]
+    from scipy.ndimage import maximum_filter1d
 
-
-@lru_cache(maxsize=8)
-def _hann(n: int) -> FloatArray:
-    """Hann window for spectra; kept, as many blocks of one length follow each other."""
-    window: FloatArray = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(n) / n)
-    return window
+    lines = np.where((x > 0.0) & (x >= maximum_filter1d(x, 5, mode="nearest")), x, 0.0)
+    return np.maximum(lines[:-1], lines[1:])
 
 
 def _mean_power(x: FloatArray, n_segment: int) -> FloatArray:
     from scipy.fft import rfft
+    from scipy.signal.windows import hann
 
     precision = np.result_type(x.dtype, np.float32)
-    window = _hann(n_segment).astype(precision)
+    window = hann(n_segment, sym=False).astype(precision)
     step = max(1, n_segment // 2)
     power = np.zeros(n_segment // 2 + 1)
     for start in range(0, len(x) - n_segment + 1, step):

@@ -371,26 +371,6 @@ def _knots(angle: ShaftAngle) -> tuple[FloatArray, ...]:
     return tuple(read_only(np.ascontiguousarray(a, np.float64)) for a in arrays)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
-def scales_at(knots, speed, times, factor, lowest, out):  # type: ignore[no-untyped-def]
-    """Take factor · speed at sorted times, kept between `lowest` and 1, and return the smallest of them.
-
-    The speed is taken as linear between the knots' slopes: enough for choosing a cut-off frequency.
-    """
-    k = 0
-    n = knots.shape[0]
-    smallest = 1.0
-    rise = (speed[1] - speed[0]) / (knots[1] - knots[0])
-    for i in range(times.shape[0]):
-        while k < n - 2 and knots[k + 1] < times[i]:
-            k += 1
-            rise = (speed[k + 1] - speed[k]) / (knots[k + 1] - knots[k])
-        scale = factor * (speed[k] + rise * (times[i] - knots[k]))
-        out[i] = min(max(scale, lowest), 1.0)
-        smallest = min(smallest, out[i])
-    return smallest
-
-
 _CHUNK = 1 << 15  # angles at a time: positions and a segment of the signal stay in the cache
 _MAX_VALUES = 1 << 28  # 2 GB of results; beyond it a typing error is likelier than a wish
 CHUNKS_FOR_THREADS = 8  # fewer take less time than threads do to begin
@@ -561,9 +541,9 @@ def _fill(
         around = slice(knot, min(len(knots), int(np.searchsorted(knots, times[-1])) + 1))
         # The speed is linear between knots here: if none of them is slow, no time between them is.
         coarse = float(speeds[around].min()) * n_per_rev / rate < 1.0 - 1e-6
-        scale = np.empty(stop - start if coarse else 0)
         if coarse:
-            coarse = scales_at(knots[around], speeds[around], times, n_per_rev / rate, LOWEST_SCALE, scale) < 1.0 - 1e-6
+            scale = np.clip(n_per_rev / rate * np.interp(times, knots[around], speeds[around]), LOWEST_SCALE, 1.0)
+            coarse = float(scale.min()) < 1.0 - 1e-6
         times *= rate
         positions = np.clip(times, REACH, recording.n_samples - 1 - REACH, out=times)
         for signal, out in zip(signals, samples, strict=True):

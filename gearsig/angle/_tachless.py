@@ -26,7 +26,6 @@ from gearsig.angle._comb import (
 from gearsig.angle._resample import resample_to_angle, times_of_revolutions
 from gearsig.angle._types import AngleSignal, ShaftAngle, monotone_slopes
 from gearsig.checks import FloatArray, positive
-from gearsig.compiled import njit
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Recording
 from gearsig.rig import Rig
@@ -59,28 +58,17 @@ def track_speed(
     return (starts + n_block / 2) / rate, speeds[kept[np.arange(len(path)), path]]
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _best_path(places, scores, highest_cost):  # type: ignore[no-untyped-def]
+def _best_path(places: FloatArray, scores: FloatArray, highest_cost: float) -> list[int]:
     """Candidate per block on the path with the highest Σ score - Σ min((Δ place)²/2, highest_cost)."""
-    n_blocks, n = scores.shape
-    total = scores[0].copy()
-    came_from = np.zeros((n_blocks, n), dtype=np.int64)
-    for b in range(1, n_blocks):
-        following = np.empty(n)
-        for i in range(n):
-            best = -1e300
-            for j in range(n):
-                value = total[j] - min(0.5 * (places[b, i] - places[b - 1, j]) ** 2, highest_cost)
-                if value > best:
-                    best = value
-                    came_from[b, i] = j
-            following[i] = best + scores[b, i]
-        total = following
-    path = np.empty(n_blocks, dtype=np.int64)
-    path[-1] = np.argmax(total)
-    for b in range(n_blocks - 1, 0, -1):
-        path[b - 1] = came_from[b, path[b]]
-    return path
+    total, came_from = scores[0], []
+    for before, here, score in zip(places[:-1], places[1:], scores[1:], strict=True):
+        values = total - np.minimum(0.5 * (here[:, None] - before) ** 2, highest_cost)
+        came_from.append(values.argmax(axis=1))
+        total = values.max(axis=1) + score
+    path = [int(np.argmax(total))]
+    for came in reversed(came_from):
+        path.append(int(came[path[-1]]))
+    return path[::-1]
 
 
 # A rough shaft angle made exact by the phase of mesh harmonics.

@@ -100,7 +100,7 @@ class DenoiseSettings:
         An orthogonal or biorthogonal wavelet of PyWavelets; "sym8" is smooth and nearly symmetric. For biorthogonal
         wavelets the noise of the coefficients is only nearly what the thresholds assume.
     n_levels : int or None
-        None: as many as leave eight filter lengths on the coarsest one, `deepest_level` at most.
+        None: as many as leave eight filter lengths on the coarsest one.
     noise : str
         Where the noise's standard deviation is estimated. White noise has the same on all levels, a signal only adds to
         it: "quietest level" takes the least of all, "finest level" the usual one, which must be free of signal: that of
@@ -280,21 +280,17 @@ def denoise(
     return Denoised(clean, x - clean, fs, levels, levels[0].noise, settings, unit, source)
 
 
-def deepest_level(n_samples: int, wavelet: str) -> int:
-    """Return the deepest level at which a coefficient still sees the signal more than its continuation; 0 if none."""
+def _with_levels(settings: DenoiseSettings, x: FloatArray) -> DenoiseSettings:
     import pywt
 
-    return int(pywt.dwt_max_level(n_samples, pywt.Wavelet(wavelet).dec_len))
-
-
-def _with_levels(settings: DenoiseSettings, x: FloatArray) -> DenoiseSettings:
     if float(x.min()) == float(x.max()):
         raise InputError(
             f"the signal is constant ({x[0]:g})",
             where="values",
             remedy="check the channel: there is no noise to remove",
         )
-    deepest = deepest_level(len(x), settings.wavelet)
+    # The deepest level at which a coefficient still sees the signal more than its continuation.
+    deepest = pywt.dwt_max_level(len(x), settings.wavelet)
     if deepest < (settings.n_levels or 1):
         raise InputError(
             f"n_levels is {settings.n_levels or 1} for {len(x)} samples and wavelet {settings.wavelet}",
@@ -304,7 +300,7 @@ def _with_levels(settings: DenoiseSettings, x: FloatArray) -> DenoiseSettings:
     if settings.n_levels is not None:
         return settings
     # The level that has eight filter lengths of coefficients: its noise can still be told.
-    return replace(settings, n_levels=max(1, deepest_level(len(x) // 8, settings.wavelet)))
+    return replace(settings, n_levels=max(1, pywt.dwt_max_level(len(x) // 8, settings.wavelet)))
 
 
 def _denoise_shifted(

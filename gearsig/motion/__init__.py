@@ -58,7 +58,7 @@ from gearsig.motion._segments import (
     shaft_speed_rad_s,
 )
 from gearsig.motion._start_stop import StartStop, examine_start_stop
-from gearsig.motion._transmission_error import AngleSource, TransmissionError, transmission_error
+from gearsig.motion._transmission_error import TransmissionError, transmission_error
 
 __all__ = [
     "AS_PRINTED",
@@ -73,7 +73,6 @@ __all__ = [
     "TEETH",
     "TOOTH_FORCE",
     "AngleProfile",
-    "AngleSource",
     "Burst",
     "FittedParameter",
     "ForceEstimate",

@@ -501,69 +501,74 @@ def _contact_parameters(motion: PairMotion, fit: RobustFit, *, has_both_flanks: 
         "half_backlash_um", "um", c.half_backlash_um, (0.0, float("inf")), False, ONE_FLANK, c.half_backlash_um
     )
     if has_both_flanks:
-        play = _plain(fit, "half_backlash", "half_backlash_um", "um", c.half_backlash_um, 1e6)
+        play = _parameter(fit, "half_backlash", "half_backlash_um", "um", c.half_backlash_um, lambda a_m: 1e6 * a_m)
     return [
         play,
-        _stiffness(fit, c.stiffness_n_per_m_lambda, has_both_flanks=has_both_flanks),
-        _restitution(fit, c.damping_law, c.restitution),
-        _plain(fit, "driver inertia", "driver_inertia_kg_m2", "kg m^2", c.driver_inertia_kg_m2),
-        _plain(fit, "friction", "friction_coefficient", "", c.friction_coefficient),
+        # From one flank a filter ahead of the torque's samples feigns the stiffness, twenty times too high.
+        _parameter(
+            fit,
+            "log stiffness",
+            "stiffness_n_per_m_lambda",
+            "N/m^λ",
+            c.stiffness_n_per_m_lambda,
+            lambda log_k: float(np.exp(min(log_k, 700.0))),
+            why_not="" if has_both_flanks else ONE_ZERO,
+        ),
+        _parameter(
+            fit, "damping", "restitution", "", c.restitution, lambda factor: _restitution(c.damping_law, factor)
+        ),
+        _parameter(fit, "driver inertia", "driver_inertia_kg_m2", "kg m^2", c.driver_inertia_kg_m2),
+        _parameter(fit, "friction", "friction_coefficient", "", c.friction_coefficient),
     ]
 
 
 def _load_parameters(motion: PairMotion, fit: RobustFit) -> list[FittedParameter]:
-    inverse, half = fit.value("inverse inertia"), NORMAL_95 * fit.deviation("inverse inertia")
-    is_told = inverse > 0.0 and half < MAX_RELATIVE_HALF_WIDTH * inverse
-    highest = 1.0 / (inverse - half) if inverse > half else float("inf")
-    lowest = 1.0 / (inverse + half) if inverse + half > 0.0 else float("inf")
+    inertia = _parameter(
+        fit,
+        "inverse inertia",
+        "driven_inertia_kg_m2",
+        "kg m^2",
+        motion.contact.driven_inertia_kg_m2,
+        lambda inverse: 1.0 / inverse if inverse > 0.0 else float("inf"),
+    )
     return [
-        FittedParameter(
-            "driven_inertia_kg_m2",
-            "kg m^2",
-            1.0 / inverse if inverse > 0.0 else float("nan"),
-            (lowest, highest),
-            is_told,
-            "" if is_told else _reason_text(fit, "inverse inertia"),
-            motion.contact.driven_inertia_kg_m2,
-            _alike(fit, "inverse inertia"),
-        ),
-        _plain(fit, "load_friction_nm", "load_friction_nm", "N m", None),
-        _plain(fit, "load_viscous_nm_s_per_rad", "load_viscous_nm_s_per_rad", "N m s/rad", None),
+        inertia if np.isfinite(inertia.value) else replace(inertia, value=float("nan")),
+        _parameter(fit, "load_friction_nm", "load_friction_nm", "N m", None),
+        _parameter(fit, "load_viscous_nm_s_per_rad", "load_viscous_nm_s_per_rad", "N m s/rad", None),
     ]
 
 
-def _plain(
-    fit: RobustFit, parameter: str, name: str, unit: str, rig_value: float | None, factor: float = 1.0
+def _parameter(
+    fit: RobustFit,
+    term: str,
+    name: str,
+    unit: str,
+    rig_value: float | None,
+    turned: Callable[[float], float] = float,
+    *,
+    why_not: str = "",
 ) -> FittedParameter:
-    value, half = factor * fit.value(parameter), factor * NORMAL_95 * fit.deviation(parameter)
-    is_told = half < MAX_RELATIVE_HALF_WIDTH * abs(value)
-    why = "" if is_told else _reason_text(fit, parameter)
+    """Return the parameter that a term of an equation stands for; `turned` makes it of the term's value.
+
+    It is told where the term is: a logarithm within a half, others within half of their value, which those that fall
+    as the parameter grows must have above zero.
+    """
+    value, half = fit.value(term), NORMAL_95 * fit.deviation(term)
+    size = 1.0 if term == "log stiffness" else value if term in FALLING else abs(value)
+    low, high = sorted((turned(value - half), turned(value + half)))
+    is_told = half < MAX_RELATIVE_HALF_WIDTH * size and not why_not
+    alike = _alike(fit, term)
+    why = "the record hardly depends on it" + (f", and it is mistaken for {alike}" if alike else "")
     return FittedParameter(
-        name, unit, value, (value - half, value + half), is_told, why, rig_value, _alike(fit, parameter)
+        name, unit, turned(value), (low, high), is_told, "" if is_told else why_not or why, rig_value, alike
     )
 
 
-def _stiffness(fit: RobustFit, rig_value: float, *, has_both_flanks: bool) -> FittedParameter:
-    """Return the stiffness; from one flank a filter ahead of the torque's samples feigns it, twenty times too high."""
-    parameter = "log stiffness"
-    log_k, half = fit.value(parameter), NORMAL_95 * fit.deviation(parameter)
-    is_told = half < MAX_RELATIVE_HALF_WIDTH and has_both_flanks
-    low, middle, high = (float(np.exp(min(v, 700.0))) for v in (log_k - half, log_k, log_k + half))
-    why = "" if is_told else _reason_text(fit, parameter) if has_both_flanks else ONE_ZERO
-    return FittedParameter(
-        "stiffness_n_per_m_lambda", "N/m^λ", middle, (low, high), is_told, why, rig_value, _alike(fit, parameter)
-    )
-
-
-def _restitution(fit: RobustFit, law: str, rig_value: float) -> FittedParameter:
-    """Turn c = β v into the restitution of the rig's law; it is told where c is."""
-    c, half = fit.value("damping"), NORMAL_95 * fit.deviation("damping")
-    is_told = c > 0.0 and half < MAX_RELATIVE_HALF_WIDTH * c
+def _restitution(law: str, factor: float) -> float:
+    """Return the restitution at which a law of damping has a factor c = β v."""
     grid = np.linspace(0.01, 1.0, 2_001)
     factors = np.array([damping_ratio_s_per_m(law, float(e), 1.0) for e in grid])
-    low, middle, high = (float(np.interp(v, factors[::-1], grid[::-1])) for v in (c + half, c, c - half))
-    why = "" if is_told else _reason_text(fit, "damping")
-    return FittedParameter("restitution", "", middle, (low, high), is_told, why, rig_value, _alike(fit, "damping"))
+    return float(np.interp(factor, factors[::-1], grid[::-1]))
 
 
 def _alike(fit: RobustFit, parameter: str) -> str:
@@ -573,11 +578,6 @@ def _alike(fit: RobustFit, parameter: str) -> str:
         return ""
     sign = -1.0 if (parameter in FALLING) != (like in FALLING) else 1.0
     return f"{NAMES_OF_RESULT.get(like, like)} (correlation {sign * correlation:.2f})"
-
-
-def _reason_text(fit: RobustFit, parameter: str) -> str:
-    like = _alike(fit, parameter)
-    return "the record hardly depends on it" + (f", and it is mistaken for {like}" if like else "")
 
 
 CERTAIN = 5.0

@@ -132,10 +132,10 @@ class Impact:
     note: str = ""
 
 
-def find_impacts(
-    motion: PairMotion, datum_m: float, *, half_backlash_m: float | None = None, min_speed_mps: float | None = None
-) -> tuple[Impact, ...]:
+def find_impacts(motion: PairMotion, datum_m: float, *, half_backlash_m: float | None = None) -> tuple[Impact, ...]:
     """Find the moments at which the flanks met after a flight through the play.
+
+    Approaches slower than five standard deviations of the compression rate's scatter are left out.
 
     Parameters
     ----------
@@ -144,8 +144,6 @@ def find_impacts(
         Compression in the middle of the play, from `estimate_backlash` or `find_datum`.
     half_backlash_m : float or None
         None: the rig's. A measured one finds flanks that are worn.
-    min_speed_mps : float or None
-        Slower approaches are left out. None: five standard deviations of the compression rate's scatter.
 
     Raises
     ------
@@ -175,15 +173,15 @@ def find_impacts(
             remedy="encoders of more counts; where the motion is slow, --bandwidth of gearsig start-stop",
         )
     g = depth(q, a)
-    slowest = 5.0 * scatter_of(rate) if min_speed_mps is None else min_speed_mps
-    flights = _Flights(motion, q, a, (noise, scatter_of(rate)))
+    rate_noise = scatter_of(rate)
+    flights = _Flights(motion, q, a, (noise, rate_noise))
     runs = _runs(np.where(np.abs(g) > 0.0, np.sign(g), 0.0).astype(np.int64), g, NOISE_DEPTH * noise)
     impacts = []
     for before, run, after in zip(runs[:-1], runs[1:], [*runs[2:], None][: len(runs) - 1], strict=True):
         if run[0] == 0 or before[0] != 0 or before[2] - before[1] < MIN_FLIGHT_SAMPLES:
             continue
         impact = _impact(motion, flights, g, before, run, after)
-        if impact.speed_mps > slowest:
+        if impact.speed_mps > 5.0 * rate_noise:
             impacts.append(impact)
     return tuple(impacts)
 

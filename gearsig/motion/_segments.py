@@ -58,14 +58,11 @@ class MotionSegments(Result, rows="segments"):
     ----------
     segments : tuple of MotionSegment
         One after the other, without gaps.
-    threshold_rad_s : float
-        Speed below which the shaft is taken to stand.
     starts_at_once : bool
         Whether the shaft stands at the first sample and moves from it on: a start without a rest ahead of it.
     """
 
     segments: tuple[MotionSegment, ...]
-    threshold_rad_s: float
     starts_at_once: bool = False
 
     @property
@@ -157,7 +154,7 @@ def motion_segments(
         if abs(segment.turned_rad) < min_turned_rad:
             directions[segment.first : segment.last] = 0
     final = _cut(directions, angle_rad, speed_rad_s, sampling_rate_hz)
-    return MotionSegments(final, threshold, _starts_at_once(final[0], angle_rad, sampling_rate_hz))
+    return MotionSegments(final, _starts_at_once(final[0], angle_rad, sampling_rate_hz))
 
 
 def is_start_stop(segments: MotionSegments) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from math import cos, gcd, lcm, pi, radians, sqrt
+from math import cos, gcd, pi, radians
 
 import numpy as np
 
@@ -29,28 +29,6 @@ MIN_TURNS = 2.0
 
 
 @dataclass(frozen=True)
-class AngleSource:
-    """Where the angle of one gear comes from, and how finely it is known.
-
-    Parameters
-    ----------
-    channel : str
-        Empty: pulse times that belong to no channel.
-    kind : str
-        "encoder" or "pulses".
-    per_revolution : float
-        Counts or pulses; nan for an angle without steps.
-    noise_rad : float
-        Standard deviation of one angle that was read: of its step or of the clock that times it, or as it scatters.
-    """
-
-    channel: str
-    kind: str
-    per_revolution: float
-    noise_rad: float
-
-
-@dataclass(frozen=True)
 class TransmissionError(Result):
     """δ = r_b1 θ1 − r_b2 θ2 over the driver's tooth pitches, and what either gear repeats of it.
 
@@ -63,8 +41,6 @@ class TransmissionError(Result):
         δ; row n is the driver's pitch `first_pitch` + n from its angle 0.
     first_pitch, first_driven_pitch : int
         Pitches of either gear from its angle 0 on which the first row lies: modulo its teeth, which tooth it is.
-    pitch_offset : float
-        By how many pitches the driven gear's angle is ahead of the driver's; its whole part is in the pitches above.
     mesh_um : array, (n_steps,)
         What each tooth pair repeats, mean 0.
     driver_um, driven_um : arrays, (z, n_steps)
@@ -75,16 +51,12 @@ class TransmissionError(Result):
     shafts : (str, str)
     time_s : array, (n_cycles,)
         Middle of each row.
-    sources : (AngleSource, AngleSource)
-    floor_um : float
-        Standard deviation of one value of `cycles_um` by the resolution of both sources.
     notes : tuple of str
     """
 
     cycles_um: FloatArray
     first_pitch: int
     first_driven_pitch: int
-    pitch_offset: float
     mesh_um: FloatArray
     driver_um: FloatArray
     driven_um: FloatArray
@@ -93,8 +65,6 @@ class TransmissionError(Result):
     base_radii_m: tuple[float, float]
     shafts: tuple[str, str]
     time_s: FloatArray
-    sources: tuple[AngleSource, AngleSource]
-    floor_um: float
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
@@ -139,10 +109,6 @@ class TransmissionError(Result):
         first = (self.first_pitch, self.first_driven_pitch)[side]
         return np.asarray((first + np.arange(len(self.cycles_um))) % self.teeth[side])
 
-    def in_urad(self, values_um: FloatArray) -> FloatArray:
-        """Return a transmission error as angle of the driven gear, δ/r_b2."""
-        return np.asarray(values_um / self.base_radii_m[1])
-
     def average(self, side: int) -> SynchronousAverage:
         """Return one revolution of the driver (0) or the driven gear (1): what that gear adds, without the mesh."""
         values, error = ((self.driver_um, self.driver_error_um), (self.driven_um, self.driven_error_um))[side]
@@ -151,23 +117,6 @@ class TransmissionError(Result):
         return SynchronousAverage(
             values.reshape(-1), error.reshape(-1), n_revolutions, self.shafts[side], NAME, UNIT, "residual", highest
         )
-
-    def hunting_um(self) -> FloatArray:
-        """Return the mean over whole hunting periods, lcm(z1, z2) mesh cycles, (n_cycles of one period, n_steps).
-
-        Raises
-        ------
-        RefusalError
-            If there is less than one.
-        """
-        period = lcm(*self.teeth)
-        n = len(self.cycles_um) // period
-        if n == 0:
-            raise RefusalError(
-                f"the recording holds {len(self.cycles_um)} mesh cycles, the hunting period has {period}",
-                remedy=f"record {60.0 * period / self.teeth[0] / self.speed_rpm:.3g} s at this speed",
-            )
-        return np.asarray(self.cycles_um[: n * period].reshape(n, period, self.n_steps).mean(axis=0))
 
     def signal(self) -> AngleSignal:
         """Return δ over the driver's angle, for order spectra, maps and averages."""
@@ -234,7 +183,7 @@ def transmission_error(
         raise RefusalError("no rig is known", remedy="give a rig file with teeth and module of the pair")
     gears = _pair_of(known, pair)
     teeth, radii_m = _geometry(gears)
-    (t1, angle_1, first), (t2, angle_2, second), notes = _both_angles(recording, known, gears, use or {})
+    (t1, angle_1), (t2, angle_2), notes = _both_angles(recording, known, gears, use or {})
 
     # Both angles at the recording's own samples, wherever both are known.
     rate = recording.sampling_rate_hz
@@ -258,20 +207,14 @@ def transmission_error(
     rows = rows - rows.mean()
     driven_row = first_row + round(offset)
     parts = _parts(rows, first_row, driven_row, teeth)
-    noise_m = [
-        r * s.noise_rad * sqrt(n_steps * per) for r, s, per in zip(radii_m, (first, second), readings[1:], strict=True)
-    ]
     return TransmissionError(
         rows,
         first_row,
         driven_row,
-        offset,
         *parts,
         radii_m,
         (gears.driver, gears.driven),
         row_time_s,
-        (first, second),
-        1e6 * sqrt(sum(v * v for v in noise_m)),
         tuple(notes),
     )
 
@@ -297,10 +240,10 @@ def _geometry(pair: GearPair) -> tuple[tuple[int, int], tuple[float, float]]:
 
 
 # --------------------
-# From channels to the angle of either gear: times, angles running on, and how finely they are known.
+# From channels to the angle of either gear: times and angles running on.
 # --------------------
 
-Angle = tuple[FloatArray, FloatArray, AngleSource]
+Angle = tuple[FloatArray, FloatArray]
 
 
 def _both_angles(
@@ -330,9 +273,9 @@ def _both_angles(
         )
     if not pair.pressure_angle_deg:
         notes.append(f"the pressure angle is not stated: {USUAL_PRESSURE_ANGLE_DEG:g}° is assumed")
-    for side, (time_s, angle, source) in list(angles.items()):
+    for side, (time_s, angle) in list(angles.items()):
         if angle[-1] < angle[0]:
-            angles[side] = time_s, -angle, source
+            angles[side] = time_s, -angle
             notes.append(f"the {side} angle counts down; it is counted up")
     return angles["driver"], angles["driven"], notes
 
@@ -350,15 +293,8 @@ def _from_encoder(angle_rad: FloatArray, recording: Recording, name: str) -> Ang
         raise RefusalError(f"the angle in channel {name!r} stands still", remedy="record while it turns")
     if np.mean(moved) < 0.5:  # what is known is when a count was passed, to within a sample
         at = np.flatnonzero(moved)
-        turned = float(np.mean(steps))
-        source = AngleSource(name, "encoder", 2.0 * pi / count_rad, abs(turned) / sqrt(12.0))
-        return (at + 0.5) * step_s, 0.5 * (angle[at] + angle[at + 1]), source
-    whole = np.abs(steps / count_rad - np.round(steps / count_rad)).max() < 0.02
-    # A third difference of independent errors has 20 times their variance; the motion has almost none.
-    scatter = float(np.sqrt(np.mean(np.square(np.diff(angle, 3))) / 20.0)) if len(angle) > 8 else 0.0
-    per_revolution = 2.0 * pi / count_rad if whole else float("nan")
-    source = AngleSource(name, "encoder", per_revolution, max(scatter, count_rad / sqrt(12.0) if whole else 0.0))
-    return np.arange(len(angle)) * step_s, angle, source
+        return (at + 0.5) * step_s, 0.5 * (angle[at] + angle[at + 1])
+    return np.arange(len(angle)) * step_s, angle
 
 
 def _stated_pulses(recording: Recording, rig: Rig, shaft: str) -> Angle | None:
@@ -366,10 +302,10 @@ def _stated_pulses(recording: Recording, rig: Rig, shaft: str) -> Angle | None:
     source = recording.speed_source if recording.speed_source is not None else rig.speed
     if isinstance(source, PulseTimes | TachometerChannel) and (source.shaft or rig.reference_shaft) == shaft:
         if isinstance(source, PulseTimes):
-            return _from_pulses(source.times_s, source.pulses_per_revolution, "", 0.0)
+            return _from_pulses(source.times_s, source.pulses_per_revolution, 0.0)
         edges = tachometer_edges(recording, source)
         if len(edges.times_s) > 1:
-            return _from_pulses(edges.times_s, source.pulses_per_revolution, source.channel, edges.tick_s)
+            return _from_pulses(edges.times_s, source.pulses_per_revolution, edges.tick_s)
     return None
 
 
@@ -385,15 +321,12 @@ def _counted(recording: Recording, channel: Channel, counterpart: Angle, ratio: 
             "whole number",
             remedy="check teeth and pulses, and record longer",
         )
-    return _from_pulses(edges.times_s, round(pulses), channel.name, edges.tick_s)
+    return _from_pulses(edges.times_s, round(pulses), edges.tick_s)
 
 
-def _from_pulses(times_s: FloatArray, per_revolution: int, name: str, tick_s: float) -> Angle:
+def _from_pulses(times_s: FloatArray, per_revolution: int, tick_s: float) -> Angle:
     angle = pulse_train_angle(times_s, per_revolution, tick_s=tick_s)
-    speed = 2.0 * pi * angle.mean_speed_rpm / 60.0
-    jitter_s = float(np.sqrt(np.mean(np.square(np.diff(times_s, 3))) / 20.0)) if len(times_s) > 8 else 0.0
-    noise = speed * max(jitter_s, tick_s / sqrt(12.0))
-    return angle.time_s, 2.0 * pi * angle.revolutions, AngleSource(name, "pulses", float(per_revolution), noise)
+    return angle.time_s, 2.0 * pi * angle.revolutions
 
 
 # --------------------

@@ -8,11 +8,10 @@ from typing import Literal
 
 import numpy as np
 
-from gearsig.checks import FloatArray, count, freeze, positive, within
-from gearsig.compiled import njit
+from gearsig.checks import FloatArray, count, freeze, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import percent, seconds_text
-from gearsig.phase._neighbours import nearest_apart, spaced
+from gearsig.phase._neighbours import IndexArray, nearest_apart, spaced
 from gearsig.phase._plane import PhasePortrait, checked_series, mean_period_samples
 from gearsig.recording import Recording
 from gearsig.results import Result
@@ -243,17 +242,16 @@ def average_mutual_information(
     step = max(1, ceil(longest / MAX_DELAYS))
     delays = np.arange(0, longest + 1, step)
     bins, n_bins = equally_filled_bins(x)
-    information = np.empty(len(delays))
-    mutual_information(bins, n_bins, delays, information)
+    information = np.array([mutual_information(bins, n_bins, int(delay)) for delay in delays])
     delay, rule = _choose(information, _scatter(len(x) - longest, n_bins), step, x)
     return MutualInformation(information, step, rate, delay, rule, n_bins, source)
 
 
-def equally_filled_bins(x: FloatArray) -> tuple[np.ndarray, int]:
+def equally_filled_bins(x: FloatArray) -> tuple[IndexArray, int]:
     """Return each sample's bin, bounded by quantiles; equal samples always share one (quantised signals)."""
     n_bins = int(np.clip(np.sqrt(len(x) / SAMPLES_PER_CELL), 4, MAX_BINS))
     inner = np.quantile(x, np.arange(1, n_bins) / n_bins)
-    return np.searchsorted(inner, x, side="right").astype(np.int64), n_bins
+    return np.searchsorted(inner, x, side="right"), n_bins
 
 
 def _longest_delay(x: FloatArray, max_delay: int | None) -> int:
@@ -301,35 +299,27 @@ def first_minimum(information: FloatArray, scatter: float) -> int:
     return 0
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
-def mutual_information(bins, n_bins, delays, out):  # type: ignore[no-untyped-def]
-    """out[k] = Σ p(i, j) ln(p(i, j) / (p(i) p(j))) of bins[t], bins[t + delays[k]], less its bias.
+def mutual_information(bins: IndexArray, n_bins: int, delay: int) -> float:
+    """Return Σ p(i, j) ln(p(i, j) / (p(i) p(j))) of bins[t], bins[t + delay], less its bias.
 
     Counting alone makes the estimate too large by (filled cells - filled rows - filled columns + 1) / 2N.
 
     Source of the correction: M. S. Roulston, *Estimating the errors on measured entropy and mutual information*,
     Physica D 125 (1999).
     """
-    joint = np.empty((n_bins, n_bins), dtype=np.int64)
-    for k in range(delays.shape[0]):
-        n = bins.shape[0] - delays[k]
-        joint[:] = 0
-        for t in range(n):
-            joint[bins[t], bins[t + delays[k]]] += 1
-        rows, columns = joint.sum(axis=1), joint.sum(axis=0)
-        total, filled = 0.0, 0
-        for i in range(n_bins):
-            for j in range(n_bins):
-                c = joint[i, j]
-                if c > 0:
-                    filled += 1
-                    total += c * np.log(c * float(n) / (float(rows[i]) * float(columns[j])))
-        bias = (filled - np.count_nonzero(rows) - np.count_nonzero(columns) + 1) / (2.0 * n)
-        out[k] = max(total / n - bias, 0.0)
+    n = len(bins) - delay
+    cells = np.bincount(bins[:n] * n_bins + bins[delay:], minlength=n_bins**2).reshape(n_bins, n_bins)
+    rows, columns = cells.sum(axis=1), cells.sum(axis=0)
+    filled = cells > 0
+    counts = cells[filled]
+    total = float(np.sum(counts * np.log(counts * float(n) / np.multiply.outer(rows, columns)[filled])))
+    bias = (np.count_nonzero(filled) - np.count_nonzero(rows) - np.count_nonzero(columns) + 1) / (2.0 * n)
+    return max(total / n - bias, 0.0)
 
 
 N_LIBRARY, N_REFERENCES = 20_000, 2_000
 DISTANCE_RATIO, SIZE_RATIO = 15.0, 2.0  # Kennel's R_tol and A_tol
+FALSE_SHARE = 0.02
 
 
 def embedding_dimension(
@@ -338,15 +328,14 @@ def embedding_dimension(
     *,
     delay_samples: int | None = None,
     largest: int = 10,
-    threshold: float = 0.02,
-    theiler_samples: int | None = None,
     source: str = "",
 ) -> EmbeddingDimension:
-    """Return the smallest dimension at which (nearly) no nearest neighbour is a false one.
+    """Return the smallest dimension at which at most 2 % of the nearest neighbours are false ones.
 
     Kennel: with R_d the distance to the nearest neighbour in d dimensions and Δ that of the next coordinate, the
     neighbour is false if Δ / R_d > 15 or √(R_d² + Δ²) > 2 σ. Cao: E(d) = mean of ‖·‖_{d+1} / ‖·‖_d (largest
-    coordinate), E1 = E(d+1)/E(d); E*(d) = mean of Δ, E2 = E*(d+1)/E*(d).
+    coordinate), E1 = E(d+1)/E(d); E*(d) = mean of Δ, E2 = E*(d+1)/E*(d). Points nearer in time than one mean period are
+    no neighbours. Noise leaves some false: 2 % allow for noise of about 3 % of the signal's standard deviation.
 
     Parameters
     ----------
@@ -357,17 +346,12 @@ def embedding_dimension(
         None: first minimum of the mutual information.
     largest : int
         Largest dimension tried, 2 to 15.
-    threshold : float
-        Share of false neighbours that counts as none. Noise leaves some: 0.02 allows for noise of about 3 % of the
-        signal's standard deviation.
-    theiler_samples : int or None
-        Points nearer in time are no neighbours; None: one mean period.
     source : str
 
     Returns
     -------
     EmbeddingDimension
-        Dimension 0 and verdict "stochastic" where no dimension reaches the threshold. Cao's E2 is for reading: near 1
+        Dimension 0 and verdict "stochastic" where no dimension leaves so few. Cao's E2 is for reading: near 1
         at every dimension says random too.
 
     Notes
@@ -388,8 +372,7 @@ def embedding_dimension(
     x = checked_series(values, minimum=200)
     tau = chosen_delay(x, rate) if delay_samples is None else count(delay_samples, "delay_samples")
     count(largest, "largest", minimum=2, maximum=15)
-    within(threshold, "threshold", 0.0, 0.5)
-    window = round(mean_period_samples(x)) if theiler_samples is None else count(theiler_samples, "theiler_samples")
+    window = round(mean_period_samples(x))
     n = len(x) - largest * tau
     if n < 100 + 2 * window:
         raise RefusalError(
@@ -402,7 +385,7 @@ def embedding_dimension(
     steps = [_step(x, tau, d, library, references, window, finest) for d in range(1, largest + 1)]
     false_fraction = np.array([step[0] for step in steps])
     growth, determinism = _ratios([step[1] for step in steps]), _ratios([step[2] for step in steps])
-    below = np.flatnonzero(false_fraction <= threshold)
+    below = np.flatnonzero(false_fraction <= FALSE_SHARE)
     dimension = int(below[0]) + 1 if len(below) else 0
     return EmbeddingDimension(
         dimensions=tuple(range(1, largest + 1)),
@@ -411,7 +394,7 @@ def embedding_dimension(
         determinism=determinism,
         dimension=dimension,
         verdict="deterministic" if dimension else "stochastic",
-        threshold=threshold,
+        threshold=FALSE_SHARE,
         delay_samples=tau,
         source=source,
     )

@@ -95,7 +95,6 @@ def recurrence_plot(
     portrait: PhasePortrait,
     *,
     recurrence_rate: float = 0.05,
-    radius: float | None = None,
     n_points: int = 1_000,
     stride: int | None = None,
 ) -> RecurrencePlot:
@@ -106,8 +105,6 @@ def recurrence_plot(
     portrait : PhasePortrait
     recurrence_rate : float
         Share of pairs that the radius is chosen for, 0.001 to 0.5.
-    radius : float or None
-        In standard deviations of the axes; wins over `recurrence_rate`.
     n_points : int
         At most so many points from the start of the path (2 to 3000): the matrix never grows with the signal. For
         another segment see `PhasePortrait.between`.
@@ -117,18 +114,19 @@ def recurrence_plot(
     Raises
     ------
     InputError
-        On a radius, rate or number of points out of range.
+        On a rate or number of points out of range.
     RefusalError
         If the path does not move.
 
     Source: J.-P. Eckmann, S. Oliffson Kamphorst, D. Ruelle, *Recurrence plots of dynamical systems*, Europhysics
     Letters 4 (1987).
     """
+    from scipy.spatial.distance import cdist
+
     count(n_points, "n_points", minimum=2, maximum=MAX_PLOT_POINTS)
     points, step = _thinned_points(portrait, n_points, stride)
-    limit = _radius(points, recurrence_rate, radius, 0)
-    matrix = np.empty((len(points), len(points)), dtype=np.bool_)
-    recurrence_matrix(points, limit, matrix)
+    limit = _radius(points, recurrence_rate, None, 0)
+    matrix = cdist(points, points) < limit
     times = portrait.start_s + np.arange(len(points)) * (step / portrait.sampling_rate_hz)
     return RecurrencePlot(matrix, times, limit, step, portrait.source)
 
@@ -267,21 +265,6 @@ def _radius(points: FloatArray, rate: float, radius: float | None, theiler: int)
     distance = np.linalg.norm(points[starts + lag] - points[starts], axis=1)
     quantile = float(np.quantile(distance, rate))
     return quantile if quantile > 0.0 else float(np.nextafter(0.0, 1.0))
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
-def recurrence_matrix(points, radius, out):  # type: ignore[no-untyped-def]
-    """out[i, j] = |x(i) - x(j)| < radius, Euclidean."""
-    n, d = points.shape
-    limit = radius * radius
-    for i in range(n):
-        out[i, i] = True
-        for j in range(i):
-            square = 0.0
-            for a in range(d):
-                difference = points[i, a] - points[j, a]
-                square += difference * difference
-            out[i, j] = out[j, i] = square < limit
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.fft import ifft, next_fast_len
 from scipy.optimize import minimize_scalar
 
-from gearsig.checks import FloatArray, read_only
+from gearsig.checks import FloatArray
 from gearsig.compiled import njit
 from gearsig.peaks import parabola_vertex
 from gearsig.spectra import ComplexArray, Spectrum, noise_floor
@@ -74,9 +74,10 @@ class LinesOverFloor:
         reach = max(half_width, FOOT_LINES * self.spectrum.resolution)
         if fundamental < 4 * reach:
             return self
-        masked = self.masked.copy()
-        _mask_multiples(self.spectrum.positions, fundamental, start, reach, skirt, masked)
-        return replace(self, masked=masked)
+        positions = self.spectrum.positions
+        offset = (positions - start) / fundamental
+        near = np.abs(offset - np.rint(offset)) * fundamental <= np.maximum(reach, skirt * positions)
+        return replace(self, masked=self.masked | near)
 
     def line_numbers(self, places: FloatArray) -> NDArray[np.int64]:
         """Return the numbers of the lines nearest to some places of the axis, which may lie beyond its ends."""
@@ -116,8 +117,7 @@ class LinesOverFloor:
     def _densities(self) -> list[FloatArray]:
         """Distributions of sums of 1, 2, … draws: searches over many ranges ask for the same ones."""
         n_cells = int(np.ceil(LOG_RATIO_LIMIT / _STEP)) + 1
-        cells = np.zeros(n_cells)
-        _count(self.log_ratio, self.masked, cells)
+        cells = np.bincount((self.log_ratio[~self.masked] / _STEP).astype(np.intp), minlength=n_cells)
         return [(cells + 1e-9) / (cells.sum() + 1e-9 * n_cells)]
 
     def sum_density(self, n_terms: int) -> FloatArray:
@@ -125,21 +125,6 @@ class LinesOverFloor:
         while len(self._densities) < n_terms:
             self._densities.append(np.convolve(self._densities[-1], self._densities[0]))
         return self._densities[max(n_terms, 1) - 1]
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _count(log_ratio, masked, cells):  # type: ignore[no-untyped-def]
-    for i in range(log_ratio.shape[0]):
-        if not masked[i]:
-            cells[int(log_ratio[i] / _STEP)] += 1.0
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _mask_multiples(positions, fundamental, start, reach, skirt, masked):  # type: ignore[no-untyped-def]
-    for i in range(positions.shape[0]):
-        offset = (positions[i] - start) / fundamental
-        if abs(offset - np.rint(offset)) * fundamental <= max(reach, skirt * positions[i]):
-            masked[i] = True
 
 
 @dataclass(frozen=True)
@@ -376,25 +361,13 @@ def _comb_totals(scores, candidates, origins, factors, first, resolution, inside
 
 def _sharpest(excess: LinesOverFloor, origins: FloatArray, factors: NDArray[np.int_], candidates: FloatArray) -> int:
     """Return the candidate whose harmonics meet the peaks best: ln(A/A₀) of each by itself, not cut at any limit."""
-    spectrum = excess.spectrum
-    sums = np.zeros(len(candidates))
-    _sum_heights(
-        spectrum.values, excess.floor, excess.masked, candidates, origins, factors, float(spectrum.positions[0]),
-        spectrum.resolution, sums,
-    )  # fmt: skip
+    values, sums = excess.spectrum.values, np.zeros(len(candidates))
+    for origin, factor in zip(origins, factors, strict=True):
+        lines = np.clip(excess.line_numbers(origin + factor * candidates), 0, len(values) - 1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            heights = np.minimum(np.log(values[lines] / excess.floor[lines]), 40.0)  # over a floor of nothing
+        sums += np.where(excess.masked[lines] | ~(values[lines] > 0.0), 0.0, heights)
     return int(np.argmax(sums))
-
-
-@njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
-def _sum_heights(values, floor, masked, candidates, origins, factors, first, resolution, sums):  # type: ignore[no-untyped-def]
-    last = len(values) - 1
-    for i in range(len(factors)):
-        for j in range(len(candidates)):
-            place = int(np.rint((origins[i] + factors[i] * candidates[j] - first) / resolution))
-            k = min(max(place, 0), last)
-            ratio = values[k] / floor[k]
-            if not masked[k] and ratio > 0.0:
-                sums[j] += min(np.log(ratio), 40.0)  # over a floor of nothing
 
 
 def tail_probability(excess: LinesOverFloor, n_terms: int, score: float) -> float:
@@ -601,21 +574,9 @@ def sliding_mean(values: FloatArray, width: int) -> FloatArray:
     >>> sliding_mean(np.array([0.0, 2.0, 4.0, 6.0]), 2).tolist()
     [1.0, 3.0, 5.0, 3.0]
     """
-    rows = np.ascontiguousarray(values, dtype=np.float64).reshape(-1, values.shape[-1])
-    mean = np.empty_like(rows)
-    _sliding_means(read_only(rows), width, mean)
-    return mean.reshape(values.shape)
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
-def _sliding_means(rows, width, mean):  # type: ignore[no-untyped-def]
-    n = rows.shape[1]
-    sums = np.zeros(n + width + 1)
-    for r in range(rows.shape[0]):
-        for i in range(n + width):
-            sums[i + 1] = sums[i] + rows[r, i % n]
-        for i in range(n):
-            mean[r, i] = (sums[i + width] - sums[i]) / width
+    before = np.zeros((*values.shape[:-1], 1))
+    sums = np.cumsum(np.concatenate([before, values, values[..., :width]], axis=-1), axis=-1)
+    return np.asarray((sums[..., width : width + values.shape[-1]] - sums[..., : values.shape[-1]]) / width)
 
 
 def strongest_window(energies: FloatArray) -> tuple[int, float]:

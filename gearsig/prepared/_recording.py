@@ -238,11 +238,11 @@ class PreparedRecording:
     def _is_followed(self, followed: bool) -> bool:
         return followed and self.followed_angle is not self.shaft_angle
 
-    def average(self, shaft: str, channel: str, *, followed: bool = False) -> SynchronousAverage:
+    def average(self, shaft: str, channel: str) -> SynchronousAverage:
         """Return the synchronous average of a channel over a shaft's whole revolutions, with its standard error."""
         return self.keep(
-            ("average", shaft, channel, self._is_followed(followed)),
-            lambda: synchronous_average(self.over_angle(shaft, [channel], followed=followed), channel),
+            ("average", shaft, channel),
+            lambda: synchronous_average(self.over_angle(shaft, [channel]), channel),
         )
 
     def average_lines(

@@ -23,6 +23,7 @@ from gearsig.orders import (
     track_vold_kalman,
 )
 from gearsig.orders.vold_kalman import (
+    solve_band,
     solve_envelopes,
     solve_waveforms,
     waveform_weight,
@@ -32,7 +33,6 @@ from tests.orders.test_vold_kalman_exact import (
     differences,
     exact_envelope,
     modulated_order,
-    solve_by_rotations,
     textbook_matrix,
     weight_of,
 )
@@ -111,7 +111,7 @@ def _two_orders(n: int, bandwidth_hz: float, p: int, *, exact: bool) -> None:
     )
     if exact:
         weights = np.full((2, n - p), r)
-        x = solve_by_rotations(phasors, y + 0j, weights, differences(p, weights.shape))
+        x = solve_band(phasors, y + 0j, weights, differences(p, weights.shape))
         print(f"    error against rotations sample by sample: {np.abs(ours / 2 - x).max():.1e}")
 
 
@@ -133,7 +133,7 @@ def _first_generation(y: Any, cycles: Any, bandwidth_hz: float) -> None:
     )
     stencils = np.ones((1, n - 2, 3))
     stencils[0, :, 1] = -2 * np.cos(2 * np.pi * frequency)
-    exact = solve_by_rotations(np.ones((1, n)), y, r[None], stencils)[0]
+    exact = solve_band(np.ones((1, n)), y, r[None], stencils)[0]
     print(
         f"first generation, one order, {bandwidth_hz:5.1f} Hz: {scipy_s / ours_s:6.0f} times faster than spsolve; "
         f"error {np.abs(ours - exact).max():.1e}, spsolve {np.abs(theirs - exact).max():.1e}; {1e3 * ours_s:.1f} ms"

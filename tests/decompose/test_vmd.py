@@ -369,13 +369,6 @@ def test_blocks_that_do_not_do(wrong):
 # A long signal's modes as one answer.
 
 
-def test_a_short_signal_is_taken_whole():
-    x = TONES.sum(axis=0)[:3000]
-    found, whole = vmd(x, 1.0, VmdSettings(2)), vmd(x, 1.0, VmdSettings(2))
-    np.testing.assert_array_equal(found.waveforms, whole.waveforms)
-    assert found.n_iterations == whole.n_iterations
-
-
 def test_blocks_find_what_the_whole_signal_shows():
     x = TONES.sum(axis=0)
     found = vmd(UniformSignal(x, 1.0, unit="g", source="a"), None, VmdSettings(2), n_per_block=3000)

@@ -12,7 +12,6 @@ from gearsig.decompose import (
     DenoiseSettings,
     apply,
     bayes,
-    deepest_level,
     denoise,
     noise_level,
     sure,
@@ -221,10 +220,6 @@ def test_signals_that_do_not_do(values, told, message):
 def test_settings_that_do_not_do(wrong):
     with pytest.raises(InputError):
         DenoiseSettings(**wrong)
-
-
-def test_deepest_level_is_pywts():
-    assert deepest_level(1000, "sym8") == pywt.dwt_max_level(1000, pywt.Wavelet("sym8").dec_len)
 
 
 def test_lines_that_fill_the_finest_level_are_no_noise() -> None:

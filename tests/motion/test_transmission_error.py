@@ -67,15 +67,6 @@ def test_orders_of_the_spectrum_are_the_drivers() -> None:
     assert spectrum.unit == "um"
 
 
-def test_the_mean_over_hunting_periods_holds_everything_that_repeats() -> None:
-    found = transmission_error(recording())
-    period = found.hunting_um()
-    assert period.shape == (Z1 * Z2, found.n_steps)
-    np.testing.assert_allclose(period, found.cycles_um[: Z1 * Z2], atol=0.02)
-    with pytest.raises(RefusalError):
-        transmission_error(recording(duration_s=5.0)).hunting_um()
-
-
 def test_steps_of_hardly_one_reading_lose_no_pitches() -> None:
     found = transmission_error(recording(duration_s=1.0, rpm=60.0 * RATE_HZ / (9.02 * Z1)))
     assert found.n_steps == 9
@@ -83,25 +74,17 @@ def test_steps_of_hardly_one_reading_lose_no_pitches() -> None:
     assert found.driver_um[5].mean() == pytest.approx(4.0 * (1.0 - 1.0 / Z1), rel=0.03)
 
 
-def test_the_error_as_an_angle() -> None:
-    found = transmission_error(recording())
-    assert found.in_urad(np.array([RADII_M[1] * 1e6]))[0] == pytest.approx(1e6)
-
-
-@pytest.mark.parametrize("counts", [2048, 65536, 2**20])
-def test_counts_cost_what_the_floor_says(counts: int) -> None:
-    """Slow counts are timed, fast ones averaged: either way the scatter is near the floor that is told."""
+@pytest.mark.parametrize(("counts", "scatter_um"), [(2048, 3.0), (65536, 0.15), (2**20, 0.03)])
+def test_counts_cost_little(counts: int, scatter_um: float) -> None:
+    """Slow counts are timed, fast ones averaged: a count of the first is 27 um (standard deviation of its step)."""
     found = transmission_error(recording(counts))
-    scatter = float(np.std(found.residual_um))
-    assert scatter < 3.0 * found.floor_um + 0.02
-    assert found.sources[0].per_revolution == pytest.approx(counts, rel=1e-6)
+    assert np.std(found.residual_um) < scatter_um
     assert abs(found.average(1).lines()[1]) == pytest.approx(5.0, abs=0.3)
     assert int(np.argmax(found.driver_um.mean(axis=1))) == 5
 
 
 def test_more_counts_are_surer() -> None:
     coarse, fine = (transmission_error(recording(n)) for n in (4096, 2**18))
-    assert fine.floor_um < coarse.floor_um
     assert fine.driver_error_um.mean() < coarse.driver_error_um.mean()
 
 
@@ -123,7 +106,6 @@ def test_fine_tachometers_do_as_well() -> None:
     channels = (Channel("t1", "tachometer", "V", "in"), Channel("t2", "tachometer", "V", "out"))
     made = Recording(np.array(rows), RATE_HZ, channels, TachometerChannel("t1", 90, shaft="in"), rig=RIG)
     found = transmission_error(made)
-    assert [s.per_revolution for s in found.sources] == [90.0, 128.0]
     assert np.ptp(found.mesh_um) == pytest.approx(6.6, abs=1.5)
     assert abs(found.average(1).lines()[1]) == pytest.approx(5.0, abs=0.5)
 

@@ -5,9 +5,7 @@
 
 from gearsig.orders.vold_kalman._joint import (
     accuracy_of,
-    eliminate,
     expected_error,
-    rotate,
     rounding_growth,
     samples_per_cell,
     single_order_error,
@@ -22,12 +20,10 @@ from gearsig.orders.vold_kalman._tracks import cosine_and_sine, envelope_weight,
 __all__ = [
     "accuracy_of",
     "cosine_and_sine",
-    "eliminate",
     "envelope_alone",
     "envelope_weight",
     "expected_error",
     "oscillator",
-    "rotate",
     "rounding_growth",
     "samples_per_cell",
     "settling_time",

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, combinations_with_replacement
 from math import comb, factorial
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,12 +30,9 @@ Array = NDArray[Any]
 ComplexArray = NDArray[np.complex128]
 BoolArray = NDArray[np.bool_]
 Group = NDArray[np.intp]
-Solver = Literal["splines", "elimination", "rotations"]
 
-MAX_ELIMINATED_STRENGTH = 1.5e5
-"""r·|D| up to which the normal equations are solved: their rounding error is below 5e-7 there."""
 ENOUGH = 5e-7
-"""Expected error up to which the fastest solver is taken."""
+"""Expected error up to which splines are taken, which are faster."""
 
 
 @dataclass(frozen=True)
@@ -63,14 +60,15 @@ class Problem:
         narrowest = np.pi * float(self.bandwidths.min())
         sine = min(np.sin(2 * np.pi * float(frequency.min())), np.sin(2 * np.pi * float(frequency.max())))
         strength = 4.0 * float(HALF_POWER) / (2.0 * narrowest * max(sine, narrowest))
-        return _sample_by_sample(strength, rounding_growth(self.cycles, self.valid, self.bandwidths, 2))[1]
+        return rotations_error(strength, rounding_growth(self.cycles, self.valid, self.bandwidths, 2))
 
     @property
     def cheap_together(self) -> bool:
         """Whether one solution for all orders takes less time than several for groups (trials)."""
         if self.generation == "first" or not 1 < len(self.bandwidths) <= 8:
             return False
-        return cell_of(self.bandwidths, self.p) >= 16 and self.expected_error <= 1e-7
+        lowest, highest = float(self.bandwidths.min()), float(self.bandwidths.max())
+        return samples_per_cell(lowest, highest, self.p) >= 16 and self.expected_error <= 1e-7
 
 
 def solve_groups(
@@ -188,9 +186,9 @@ def solve_envelopes(
     weights = envelope_weight(_of_rows(bandwidths, n, p), p)
     if len(cycles) == 1:
         return envelope_alone(y, cycles[0], None if active is None else active[0], weights[0], p, mirror=mirror)[None]
-    solver, _ = chosen_solver(bandwidths, p, rounding_growth(cycles, active, bandwidths, p))
-    if solver == "splines":
-        return solve_by_splines(y, cycles, active, weights, p, cell_of(bandwidths, p), mirror=mirror)
+    cell, _ = chosen_cell(bandwidths, p, rounding_growth(cycles, active, bandwidths, p))
+    if cell:
+        return solve_by_splines(y, cycles, active, weights, p, cell, mirror=mirror)
     # As by splines: the complex x, or with mirror images the real coefficients of cos and -sin.
     data: Array = np.empty(cycles.shape, np.complex128)
     for row, angle in zip(data, cycles, strict=True):
@@ -203,7 +201,7 @@ def solve_envelopes(
         weights = np.repeat(weights, 2, axis=0) / 2**0.5
     stencil = [(-1.0) ** (p - i) * comb(p, i) for i in range(p + 1)]
     stencils = np.broadcast_to(stencil, (*weights.shape, p + 1))
-    x = solve_band(data, y.astype(data.dtype), weights, stencils, forward=FORWARD[solver])
+    x = solve_band(data, y.astype(data.dtype), weights, stencils)
     return np.asarray(x[::2] + 1j * x[1::2] if mirror else 2.0 * x, dtype=np.complex128)
 
 
@@ -235,10 +233,7 @@ def solve_waveforms(y: FloatArray, cycles: FloatArray, active: BoolArray | None,
     stencils = np.ones((*frequency.shape, 3))
     stencils[:, :, 1] = -2.0 * np.cos(2.0 * np.pi * frequency)
     data = np.ones(cycles.shape) if active is None else active.astype(np.float64)
-    weights = waveform_weight(width, inside)
-    # |D|, the largest gain of the stencil, is 2^p for differences and for the first generation at most that.
-    solver = _sample_by_sample(4.0 * float(weights.max()), rounding_growth(cycles, active, bandwidths, 2))[0]
-    return solve_band(data, y.astype(np.float64), weights, stencils, forward=FORWARD[solver])
+    return solve_band(data, y.astype(np.float64), waveform_weight(width, inside), stencils)
 
 
 def _of_rows(bandwidths: FloatArray, n: int, p: int) -> FloatArray:
@@ -249,40 +244,29 @@ def _of_rows(bandwidths: FloatArray, n: int, p: int) -> FloatArray:
     return bandwidths[:, middle : n - p + middle]
 
 
-def cell_of(bandwidths: FloatArray, p: int) -> int:
-    """Return the samples per cell of the coarse grid; 0 where the problem is solved sample by sample.
+def chosen_cell(bandwidths: FloatArray, p: int, close: float) -> tuple[int, float]:
+    """Return the cell of the grid on which orders of the second generation are solved for, and the expected error.
 
-    With less than three, the band is so wide that the grid saves nothing, and elimination loses no digits.
+    0 samples: sample by sample. The error is relative to the largest component of the signal; `close` is the factor of
+    `rounding_growth`.
     """
-    d = samples_per_cell(float(bandwidths.min()), float(bandwidths.max()), p)
-    return d if d >= 3 else 0
+    lowest, highest = float(bandwidths.min()), float(bandwidths.max())
+    d = samples_per_cell(lowest, highest, p)
+    by_splines = close * expected_error(lowest, highest, d, p) if d else np.inf
+    by_rotations = rotations_error(2.0**p * float(envelope_weight(bandwidths.min()[None], p)[0]), close)
+    return (d, by_splines) if by_splines <= max(ENOUGH, by_rotations) else (0, by_rotations)
 
 
-def chosen_solver(bandwidths: FloatArray, p: int, close: float) -> tuple[Solver, float]:
-    """Return how several orders of the second generation are solved for, and the expected error.
-
-    Relative to the largest component of the signal; `close` is the factor of `rounding_growth`.
-    """
-    d = cell_of(bandwidths, p)
-    solvers = [_sample_by_sample(2.0**p * float(envelope_weight(bandwidths.min()[None], p)[0]), close)]
-    if d:
-        solvers.insert(0, ("splines", close * expected_error(float(bandwidths.min()), float(bandwidths.max()), d, p)))
-    return next((option for option in solvers if option[1] <= ENOUGH), min(solvers, key=lambda option: option[1]))
-
-
-def _sample_by_sample(strength: float, close: float) -> tuple[Solver, float]:
-    """Return elimination or rotations and their error for r·|D|, the former's growing with its square (trials)."""
-    elimination, rotations = 2e-17 * strength**2 * close, 1e-15 * strength * close**0.5
-    if strength <= MAX_ELIMINATED_STRENGTH and elimination <= max(ENOUGH, rotations):
-        return "elimination", elimination
-    return "rotations", rotations
+def rotations_error(strength: float, close: float) -> float:
+    """Return the error sample by sample for r·|D| (trials), D's largest gain being 2^p, or less of waveforms."""
+    return float(1e-15 * strength * np.sqrt(close))
 
 
 def accuracy_of(cycles: FloatArray, active: BoolArray | None, bandwidths: FloatArray, p: int) -> float:
     """Return the expected error of `solve_envelopes`, relative to the largest component of the signal."""
     if len(bandwidths) == 1:
         return single_order_error(bandwidths)
-    return chosen_solver(bandwidths, p, rounding_growth(cycles, active, bandwidths, p))[1]
+    return chosen_cell(bandwidths, p, rounding_growth(cycles, active, bandwidths, p))[1]
 
 
 def single_order_error(bandwidths: FloatArray) -> float:
@@ -353,13 +337,12 @@ MAX_INT64_CELL = 2600
 
 
 def samples_per_cell(lowest_bandwidth: float, highest_bandwidth: float, p: int) -> int:
-    """Return d, 0 for one pole; bandwidths in cycles per sample.
+    """Return d, 0 for one pole, and for bands so wide that the grid saves nothing; bandwidths in cycles per sample.
 
     The geometric mean of both bandwidths shares the loss evenly between truncation and rounding.
     """
-    if p not in CELL_ANGLE:
-        return 0
-    return min(2**16, int(CELL_ANGLE[p] / (np.pi * np.sqrt(lowest_bandwidth * highest_bandwidth))))
+    d = int(CELL_ANGLE.get(p, 0.0) / (np.pi * np.sqrt(lowest_bandwidth * highest_bandwidth)))
+    return min(2**16, d) if d >= 3 else 0
 
 
 def expected_error(lowest_bandwidth: float, highest_bandwidth: float, d: int, p: int) -> float:
@@ -470,16 +453,17 @@ def _data_terms(
         whole = np.tile(products.sum(axis=0), (last - first, 1)) if active is None and last * d <= n else None
         # e_k* y on the right, e_k* e_m in the matrix; e is a phasor, or cos and -sin of each order in turn.
         for k, e_k in enumerate(regressors):
-            add_projections(right, k, first, _summed(values * e_k.conj(), basis))
+            for s, projected in enumerate(_summed(values * e_k.conj(), basis).T):
+                right[first + s : first + s + len(projected), k] += projected
             for m, e_m in enumerate(regressors[:k]):
-                add_products(matrix, k, m, first, pairs, _summed(e_k.conj() * e_m, products))
+                _add_products(matrix, k, m, first, pairs, _summed(e_k.conj() * e_m, products))
             if whole is not None and np.iscomplexobj(e_k):
                 square = whole
             elif whole is not None and k % 2:
                 square = whole - square
             else:
                 square = _summed(e_k.real**2 + e_k.imag**2 if np.iscomplexobj(e_k) else e_k * e_k, products)
-            add_products(matrix, k, k, first, pairs, square)
+            _add_products(matrix, k, k, first, pairs, square)
     return matrix, right
 
 
@@ -524,30 +508,19 @@ def _add_structure(matrix: Array, weights: FloatArray, differences: FloatArray, 
                 squares = np.zeros((last - first) * d)
                 squares[: rows.stop - rows.start] = (r if len(r) == 1 else r[rows]) ** 2
                 grams = squares.reshape(-1, d) @ products
-            add_products(matrix, k, k, first, pairs, grams)
+            _add_products(matrix, k, k, first, pairs, grams)
 
 
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
-def add_products(matrix: Array, k: int, m: int, first: int, pairs: NDArray[np.int64], grams: Array) -> None:
+def _add_products(matrix: Array, k: int, m: int, first: int, pairs: NDArray[np.int64], grams: Array) -> None:
     """Add each cell's products of pieces s <= t, (n_cells, n_pairs), to the splines that the pieces belong to.
 
     matrix[t - s, cell + s] at unknowns k and m and, conjugate, m and k; the first cell is `first`.
     """
-    for cell in range(grams.shape[0]):
-        for i in range(grams.shape[1]):
-            s, t = pairs[i, 0], pairs[i, 1]
-            value = grams[cell, i]
-            matrix[t - s, first + cell + s, k, m] += value
-            if m != k:
-                matrix[t - s, first + cell + s, m, k] += np.conj(value)
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
-def add_projections(right: Array, k: int, first: int, projected: Array) -> None:
-    """Add each cell's projections on its pieces, (n_cells, n_pieces), to the splines that the pieces belong to."""
-    for cell in range(projected.shape[0]):
-        for s in range(projected.shape[1]):
-            right[first + cell + s, k] += projected[cell, s]
+    for (s, t), products in zip(pairs, grams.T, strict=True):
+        cells = slice(first + s, first + s + len(products))
+        matrix[t - s, cells, k, m] += products
+        if m != k:
+            matrix[t - s, cells, m, k] += products.conj()
 
 
 def _solve_spline_system(matrix: Array, right: Array) -> Array:
@@ -595,7 +568,6 @@ def solve_band(
     weights: FloatArray,
     stencils: FloatArray,
     *,
-    forward: Forward,
     triangle_bytes: int = 256 * 2**20,
 ) -> Array:
     """Minimise Σ_n |b_n - Σ_k d_kn x_kn|² + Σ_k Σ_n w_kn² |Σ_i s_kni x_k(n+i)|².
@@ -610,8 +582,6 @@ def solve_band(
         w.
     stencils : array, (n_orders, n - p, p + 1)
         s.
-    forward : `rotate` or `eliminate`
-        Turns the rows of a part into its triangle.
     triangle_bytes : int
         Memory for the triangle. Longer problems keep it in parts and compute each part a second time, backwards.
 
@@ -633,15 +603,13 @@ def solve_band(
     triangle, right = np.empty((rows, width), data.dtype), np.empty(rows, observed.dtype)
     heads = np.zeros((len(starts) + 1, p * n_orders, width), data.dtype)
     head_rights = np.zeros((len(starts) + 1, p * n_orders), observed.dtype)
-    alike = RefusalError("the orders cannot be told apart in this recording", remedy="leave one of them out")
 
     def forwards(i: int) -> Any:
         """Begin part i with the rows that the part before left over; return how many rows are its own."""
         start, stop = starts[i], min(starts[i] + per_part, n)
         triangle[:], right[:] = 0, 0
         triangle[: p * n_orders], right[: p * n_orders] = heads[i], head_rights[i]
-        if not forward(triangle, right, start, stop, data, observed, weights, stencils):
-            raise alike
+        rotate(triangle, right, start, stop, data, observed, weights, stencils)
         return (stop - start) * n_orders
 
     for i in range(len(starts)):
@@ -651,7 +619,7 @@ def solve_band(
     for i in range(len(starts) - 1, -1, -1):
         used = used if i == len(starts) - 1 else forwards(i)
         if not _substitute(triangle, right, x.reshape(-1)[starts[i] * n_orders :], used):
-            raise alike
+            raise RefusalError("the orders cannot be told apart in this recording", remedy="leave one of them out")
     return np.ascontiguousarray(x[:n].T)
 
 
@@ -670,54 +638,6 @@ def _substitute(triangle: Array, right: Array, x: Array, n: int) -> bool:
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
-def eliminate(
-    triangle: Array,
-    right: Array,
-    start: int,
-    stop: int,
-    data: Array,
-    observed: Array,
-    weights: FloatArray,
-    stencils: FloatArray,
-) -> bool:
-    """Add the rows of each sample from start to stop, and eliminate its unknowns; False at a pivot not above zero.
-
-    Gauss's elimination without pivots (L D L*) of the normal equations, formed on the way. Several times faster than
-    rotations; the error grows with r², so it is for weak weights only.
-    """
-    n_orders, n = data.shape
-    p = stencils.shape[2] - 1
-    width = triangle.shape[1]
-    for t in range(start, stop):
-        first = (t - start) * n_orders
-        for k in range(n_orders):
-            conjugate = np.conj(data[k, t])
-            right[first + k] += conjugate * observed[t]
-            for m in range(k, n_orders):
-                triangle[first + k, m - k] += conjugate * data[m, t]
-        if t + p < n:
-            for k in range(n_orders):
-                square = weights[k, t] * weights[k, t]
-                for i in range(p + 1):
-                    of_i = square * stencils[k, t, i]
-                    for j in range(i, p + 1):
-                        triangle[first + i * n_orders + k, (j - i) * n_orders] += of_i * stencils[k, t, j]
-        for c in range(n_orders):
-            row = first + c
-            pivot = triangle[row, 0].real
-            if not pivot > 0.0:
-                return False
-            inverse = 1.0 / pivot
-            value = right[row]
-            for i in range(1, width - c):
-                factor = np.conj(triangle[row, i]) * inverse
-                for m in range(i, width - c):
-                    triangle[row + i, m - i] -= factor * triangle[row, m]
-                right[row + i] -= factor * value
-    return True
-
-
-@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def rotate(
     triangle: Array,
     right: Array,
@@ -727,7 +647,7 @@ def rotate(
     observed: Array,
     weights: FloatArray,
     stencils: FloatArray,
-) -> bool:
+) -> None:
     """Rotate the data row and the structural rows of each sample from start to stop into the triangle.
 
     Rows are rotated one after the other into a banded triangle (the square-root information filter). The normal
@@ -753,7 +673,6 @@ def rotate(
             for i in range(p + 1):
                 row[i * n_orders + k] = weights[k, t] * stencils[k, t, i]
             _insert(triangle, right, first, row, nothing)
-    return True
 
 
 @njit(cache=True, nogil=True, inline="always")  # type: ignore[untyped-decorator,unused-ignore]
@@ -784,7 +703,3 @@ def _insert(triangle: Array, right: Array, first: int, row: Array, value: Any) -
         value = cosine * value - sine * old_right
         if diagonal == 0.0:
             return
-
-
-Forward = Callable[[Array, Array, int, int, Array, Array, FloatArray, FloatArray], bool]
-FORWARD: dict[Solver, Forward] = {"elimination": eliminate, "rotations": rotate}
