@@ -50,7 +50,8 @@ def na4(residual: SynchronousAverage, history: Sequence[SynchronousAverage] = ()
     residual : SynchronousAverage
         The present record's, of kind "residual".
     history : sequence of SynchronousAverage
-        Residuals of earlier records, same gear, speed and load, in any order; for NA4* those in good condition.
+        Residuals of earlier records, same gear, speed and load, in any order; for NA4* those in good condition, which
+        `healthy_records` finds.
     star : bool
         Whether to return NA4*, which counts the history alone.
 
@@ -116,6 +117,43 @@ def _trend_value(x: FloatArray, history: Sequence[FloatArray], *, star: bool) ->
     return float(np.mean(((x - x.mean()) / np.sqrt(variance)) ** 4)) if variance > 0.0 else float("nan")
 
 
+def healthy_records(variances: Sequence[float], *, z: float = 2.33, n_first: int = 5) -> tuple[bool, ...]:
+    """Which records count as healthy for NA4* and NB4*: those before the variance leaves its own scatter.
+
+    The first `n_first` records are taken as healthy. From then on, the first record whose variance exceeds mean + z s
+    of those before it ends the healthy ones: later records never change the reference again.
+
+    Parameters
+    ----------
+    variances : sequence of float
+        Of the residuals (or envelopes), oldest first.
+    z : float
+        Standard deviations; 2.33 is exceeded by 1 % of normal records.
+    n_first : int
+        At least 2.
+
+    Returns
+    -------
+    tuple of bool
+
+    Raises
+    ------
+    InputError
+        If `n_first` is below 2: one record has no scatter.
+
+    Notes
+    -----
+    The test is on the single record; Decker et al. (1994) fix the reference by a test of the same kind.
+    """
+    if n_first < 2:
+        raise InputError(f"n_first is {n_first}", allowed="at least 2")
+    v = np.asarray(variances, dtype=np.float64)
+    for k in range(n_first, len(v)):
+        if v[k] > v[:k].mean() + z * v[:k].std(ddof=1):
+            return (True,) * k + (False,) * (len(v) - k)
+    return (True,) * len(v)
+
+
 def envelope(values: FloatArray) -> FloatArray:
     """|x + i H[x]| of a periodic signal, by its Fourier lines."""
     from scipy.signal import hilbert
@@ -138,11 +176,10 @@ def _check(present: SynchronousAverage, history: Sequence[SynchronousAverage], *
             )
 
 
-def fm0(average: SynchronousAverage, teeth: int) -> float:
+def fm0(average: SynchronousAverage, teeth: int, *, n_harmonics: int | None = None) -> float:
     """Zero-order figure of merit: peak-to-peak over the sum of the mesh harmonics' amplitudes.
 
-    FM0 = (max x - min x) / Σ_h A(h z), all h z up to the average's highest order. Rises with heavy wear (mesh harmonics
-    fall) and with breakage (peaks rise).
+    FM0 = (max x - min x) / Σ_h A(h z). Rises with heavy wear (mesh harmonics fall) and with breakage (peaks rise).
 
     Parameters
     ----------
@@ -150,6 +187,8 @@ def fm0(average: SynchronousAverage, teeth: int) -> float:
         Of kind "average".
     teeth : int
         z.
+    n_harmonics : int or None
+        None: all below the average's highest order.
 
     Returns
     -------
@@ -161,7 +200,7 @@ def fm0(average: SynchronousAverage, teeth: int) -> float:
     R. M. Stewart, "Some useful data analysis techniques for gearbox diagnostics", ISVR, Southampton, 1977.
     """
     _check(average, (), "average")
-    amplitudes = mesh_amplitudes(average, teeth)
+    amplitudes = mesh_amplitudes(average, teeth, n_harmonics)
     total = float(np.sum(amplitudes))
     span = float(average.values.max() - average.values.min())
     return span / total if total > 1e-12 * span and total > 0 else float("nan")
@@ -281,6 +320,7 @@ def gear_indicators(
     gear: str = "",
     history: Sequence[SynchronousAverage] = (),
     band_history: Sequence[SynchronousAverage] = (),
+    healthy: Sequence[bool] | None = None,
 ) -> tuple[Indicator, ...]:
     """Return all indicators of one gear in one record.
 
@@ -292,9 +332,11 @@ def gear_indicators(
     gear : str
         "pair/shaft".
     history : sequence of SynchronousAverage
-        Residuals of earlier records in good condition, for NA4 and NA4*.
+        Residuals of earlier records, oldest first, for NA4 and NA4*.
     band_history : sequence of SynchronousAverage
         Their mesh bands, for NB4 and NB4*.
+    healthy : sequence of bool or None
+        Which records of `history` (and `band_history`) were in good condition; None: all, see `healthy_records`.
 
     Returns
     -------
@@ -329,11 +371,11 @@ def gear_indicators(
         ("energy operator", energy_operator(average), "", _AVERAGE, no_modulation),
         ("sideband index", sideband_index(average, teeth), average.unit, _AVERAGE, beyond),
         ("sideband level factor", sideband_level_factor(average, teeth), "", _AVERAGE, beyond),
-        *_trend(na4, residual, history, "NA4", "the residual", size),
+        *_trend(na4, residual, history, healthy, "NA4", "the residual", size),
     ]
     if band_passed_mesh is not None:
         rows.append(("energy operator", energy_operator(band_passed_mesh), "", band_passed_mesh.kind, no_modulation))
-        rows += _trend(nb4, band_passed_mesh, band_history, "NB4", "the mesh band's envelope", size)
+        rows += _trend(nb4, band_passed_mesh, band_history, healthy, "NB4", "the mesh band's envelope", size)
     return tuple(
         Indicator(name, value, unit, average.channel, on, average.shaft, gear, note=_note(value, note))
         for name, value, unit, on, note in rows
@@ -348,6 +390,7 @@ def _trend(
     function: Callable[..., float],
     signal: SynchronousAverage,
     history: Sequence[SynchronousAverage],
+    healthy: Sequence[bool] | None,
     name: str,
     of: str,
     size: float,
@@ -355,13 +398,15 @@ def _trend(
     if is_constant(signal.values, size):
         empty = f"undefined: {signal.kind} holds nothing but rounding"
         return [(n, float("nan"), "", signal.kind, empty) for n in (name, f"{name}*")]
+    good = list(history) if healthy is None else [h for h, ok in zip(history, healthy, strict=True) if ok]
     alone = f"trend indicator without earlier records: the kurtosis of {of}"
     note = f"trend indicator over {counted(len(history), 'earlier record')}" if history else alone
-    healthy = f"over the variance of {counted(len(history), 'healthy record')}"
-    star = healthy if history else "undefined: needs healthy records"
+    star = (
+        f"over the variance of {counted(len(good), 'healthy record')}" if good else "undefined: needs healthy records"
+    )
     return [
         (name, function(signal, history), "", signal.kind, note),
-        (f"{name}*", function(signal, history, star=True), "", signal.kind, star),
+        (f"{name}*", function(signal, good, star=True), "", signal.kind, star),
     ]
 
 
@@ -381,9 +426,10 @@ def line_amplitude(average: SynchronousAverage, order: int) -> float:
     return float(abs(line)) * (1.0 if order == 0 or 2 * order == n else 2.0) / n
 
 
-def mesh_amplitudes(average: SynchronousAverage, teeth: int) -> FloatArray:
+def mesh_amplitudes(average: SynchronousAverage, teeth: int, n_harmonics: int | None = None) -> FloatArray:
     """Peak amplitudes of the mesh harmonics that the average holds, (n_harmonics,)."""
     check_average(average)
     z = count(teeth, "teeth", minimum=3)
     highest = min(average.highest_order, len(average.values) / 2)
-    return np.array([line_amplitude(average, h * z) for h in range(1, int(highest // z) + 1)])
+    n = int(highest // z) if n_harmonics is None else min(count(n_harmonics, "n_harmonics"), int(highest // z))
+    return np.array([line_amplitude(average, h * z) for h in range(1, n + 1)])

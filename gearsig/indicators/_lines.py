@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from math import ceil, isnan, log, log10, sqrt
+from math import ceil, exp, isnan, log, log10, sqrt
 
 import numpy as np
 
-from gearsig.checks import positive
+from gearsig.checks import count, positive, within
 from gearsig.errors import InputError, RefusalError
 from gearsig.indicators._gear import line_amplitude
 from gearsig.indicators._signal import Indicator
@@ -18,10 +18,6 @@ from gearsig.spectra import Spectrum
 
 LineSource = Spectrum | SynchronousAverage
 """Where an order's amplitude can be read: an order spectrum, or the lines of an average."""
-
-N_HARMONICS, N_SIDEBANDS = 3, 2
-SLIP = 0.015
-"""Half width of the search for a bearing's order, over the order: rolling elements slip by one or two per cent."""
 
 _PEAK_PER = {"amplitude peak": 1.0, "amplitude rms": sqrt(2.0)}
 
@@ -132,13 +128,13 @@ def floor_near(source: Spectrum, order: float, half_width_orders: float, *, leav
     return float(np.median(source.values[near])) * _to_peak(source) if np.count_nonzero(near) >= 8 else float("nan")
 
 
-def noise_reaches(n_lines: int) -> float:
-    """Ratio to the median that the largest of `n_lines` lines of noise exceeds with a probability of 5 %.
+def noise_reaches(n_lines: int, probability: float = 0.05) -> float:
+    """Ratio to the median that the largest of `n_lines` lines of noise exceeds with `probability`.
 
     Lines of noise have Rayleigh amplitudes: P(a > x m) = 2^(-x²), m the median. Neighbouring lines of a window share
     noise and averaged spectra scatter less, so that the true probability is lower.
     """
-    each = 1 - 0.95 ** (1 / max(n_lines, 1))
+    each = 1 - exp(log(1 - probability) / max(n_lines, 1))
     return sqrt(-log(each) / log(2))
 
 
@@ -169,8 +165,17 @@ def _origin(source: LineSource, channel: str) -> tuple[str, str]:
     return channel, f"{source.axis} spectrum"
 
 
-def mesh_indicators(source: LineSource, rig: Rig, pair: GearPair, *, channel: str = "") -> tuple[Indicator, ...]:
-    """Return levels of a pair's first mesh harmonics, two sidebands per side and shaft, and sideband-to-carrier ratios.
+def mesh_indicators(
+    source: LineSource,
+    rig: Rig,
+    pair: GearPair,
+    *,
+    shaft: str = "",
+    channel: str = "",
+    n_harmonics: int = 3,
+    n_sidebands: int = 2,
+) -> tuple[Indicator, ...]:
+    """Return levels of a pair's mesh harmonics, sidebands per shaft, and sideband-to-carrier ratios.
 
     A carrier A with amplitude modulation m cos and phase modulation b sin (small b) has first-order sidebands
     A |m - h b|/2 (lower) and A |m + h b|/2 (upper): equal for either alone, unequal for both. The ratio is that of
@@ -179,12 +184,14 @@ def mesh_indicators(source: LineSource, rig: Rig, pair: GearPair, *, channel: st
     Parameters
     ----------
     source : Spectrum or SynchronousAverage
-        Its orders are counted on its own shaft, or the rig's reference shaft where it has none. An average holds only
-        sidebands of its own shaft; those of the other shaft are left out.
+        An average holds only sidebands of its own shaft; those of the other shaft are left out.
     rig : Rig
     pair : GearPair
+    shaft : str
+        Shaft that the source's orders are counted on; default: the source's own, else the rig's reference shaft.
     channel : str
         Default: the average's.
+    n_harmonics, n_sidebands : int
 
     Returns
     -------
@@ -197,7 +204,7 @@ def mesh_indicators(source: LineSource, rig: Rig, pair: GearPair, *, channel: st
     RefusalError
         If the mesh order does not follow from the rig.
     """
-    shaft = source.shaft or rig.reference_shaft
+    shaft = shaft or source.shaft or rig.reference_shaft
     mesh_order = rig.mesh_order(pair, shaft)
     if mesh_order is None:
         raise RefusalError(
@@ -207,7 +214,7 @@ def mesh_indicators(source: LineSource, rig: Rig, pair: GearPair, *, channel: st
     spacings = {s: rig.ratio(s, to=shaft) for s in (pair.driver, pair.driven) if s in in_source}
     channel, on = _origin(source, channel)
     indicators: list[Indicator] = []
-    for h in range(1, N_HARMONICS + 1):
+    for h in range(1, count(n_harmonics, "n_harmonics") + 1):
         carrier = find_line(source, h * mesh_order)
         name, note, band = f"mesh level {h}×", carrier.note, order_text(h * mesh_order)
         indicators.append(
@@ -218,19 +225,21 @@ def mesh_indicators(source: LineSource, rig: Rig, pair: GearPair, *, channel: st
                 gear = f"{pair.name}/{modulating}"
                 indicators += [
                     Indicator(name, value, unit, channel, on, modulating, gear, band, note)
-                    for name, value, unit, band, note in _sidebands(source, h, carrier, mesh_order, spacing)
+                    for name, value, unit, band, note in _sidebands(
+                        source, h, carrier, mesh_order, spacing, n_sidebands
+                    )
                 ]
     return tuple(indicators)
 
 
 def _sidebands(
-    source: LineSource, harmonic: int, carrier: MeasuredLine, mesh_order: float, spacing: float
+    source: LineSource, harmonic: int, carrier: MeasuredLine, mesh_order: float, spacing: float, n_sidebands: int
 ) -> Iterator[tuple[str, float, str, str, str]]:
     blurred = ""
     if isinstance(source, Spectrum) and spacing < (needed := (2 * lobe_lines(source) + 1) * source.resolution):
         blurred = f"not resolved: sidebands {spacing:.4g} apart need a resolution below {needed:.4g}"
     first: list[float] = []
-    for k in range(1, N_SIDEBANDS + 1):
+    for k in range(1, n_sidebands + 1):
         for sign, side in ((-1, "−"), (1, "+")):
             order = harmonic * mesh_order + sign * k * spacing
             line = find_line(source, order)
@@ -243,9 +252,9 @@ def _sidebands(
 
 
 def shaft_indicators(
-    source: LineSource, shaft: str, *, shaft_ratio: float = 1.0, channel: str = ""
+    source: LineSource, shaft: str, *, shaft_ratio: float = 1.0, channel: str = "", n_harmonics: int = 3
 ) -> tuple[Indicator, ...]:
-    """Return the amplitudes at 1×, 2×, 3× of a shaft: unbalance (1×), misalignment (2×), looseness and others (3×).
+    """Return the amplitudes at 1×, 2×, … of a shaft: unbalance (1×), misalignment (2×), looseness and others (3×).
 
     Parameters
     ----------
@@ -255,6 +264,7 @@ def shaft_indicators(
         Revolutions of the shaft per revolution of the source's shaft; 1 for an average of its own shaft.
     channel : str
         Default: the average's.
+    n_harmonics : int
 
     Returns
     -------
@@ -265,7 +275,8 @@ def shaft_indicators(
     channel, on = _origin(source, channel)
     low = isinstance(source, Spectrum) and shaft_ratio / source.resolution < 2 * lobe_lines(source)
     leak = "so close to zero that the signal's mean leaks in" if low else ""
-    lines = [(h, find_line(source, h * shaft_ratio), leak if h == 1 else "") for h in range(1, N_HARMONICS + 1)]
+    harmonics = range(1, count(n_harmonics, "n_harmonics") + 1)
+    lines = [(h, find_line(source, h * shaft_ratio), leak if h == 1 else "") for h in harmonics]
     return tuple(
         Indicator(
             f"shaft order {h}×",
@@ -297,6 +308,8 @@ def bearing_indicators(
     *,
     shaft_ratio: float = 1.0,
     channel: str = "",
+    n_harmonics: int = 3,
+    slip_fraction: float = 0.015,
     band: str = "",
 ) -> tuple[Indicator, ...]:
     """Return the envelope levels at a bearing's orders and their harmonics, and how far they stand above the floor.
@@ -312,6 +325,9 @@ def bearing_indicators(
     shaft_ratio : float
         Revolutions of the bearing's shaft per revolution of the shaft that the spectrum counts on.
     channel : str
+    n_harmonics : int
+    slip_fraction : float
+        Half width of the search over the order, 0 to 0.1: rolling elements slip by one or two per cent.
     band : str
         The demodulated band, for the record.
 
@@ -330,16 +346,18 @@ def bearing_indicators(
     ----------
     R. B. Randall and J. Antoni, "Rolling element bearing diagnostics – a tutorial", 2011.
     """
+    slip = within(slip_fraction, "slip_fraction", 0.0, 0.1)
     orders = defect_orders(bearing)
     if not orders:
         raise RefusalError(
             f"no order of bearing {bearing.name!r} is known", remedy="give its geometry or orders in the rig file"
         )
+    harmonics = range(1, count(n_harmonics, "n_harmonics") + 1)
     rows = (
         row
         for name, order in orders.items()
-        for h in range(1, N_HARMONICS + 1)
-        for row in _envelope_levels(envelope_spectrum, name, h, order * shaft_ratio * h)
+        for h in harmonics
+        for row in _envelope_levels(envelope_spectrum, name, h, order * shaft_ratio * h, slip)
     )
     return tuple(
         Indicator(name, value, unit, channel, "envelope", bearing.shaft, "", band, note, bearing.name)
@@ -348,13 +366,13 @@ def bearing_indicators(
 
 
 def _envelope_levels(
-    spectrum: Spectrum, name: str, harmonic: int, order: float
+    spectrum: Spectrum, name: str, harmonic: int, order: float, slip: float
 ) -> Iterator[tuple[str, float, str, str]]:
-    line = find_line(spectrum, order, search_orders=SLIP * order)
+    line = find_line(spectrum, order, search_orders=slip * order)
     where = line.note or f"{line.place}, expected {order:.5g}"
     yield f"{name} envelope level {harmonic}×", line.amplitude, spectrum.unit, where
     # Half the order to either side keeps the neighbouring harmonic out; harmonics of high orders need not see as far.
-    over = _ratio_db(line.largest, floor_near(spectrum, order, 0.5 * min(order, 4.0), leave_out_orders=SLIP * order))
+    over = _ratio_db(line.largest, floor_near(spectrum, order, 0.5 * min(order, 4.0), leave_out_orders=slip * order))
     chance = f"noise alone reaches {_ratio_db(noise_reaches(line.n_lines), 1.0):.1f} dB in 1 of 20"
     if isnan(over):
         chance = "undefined: too few lines around it for a floor, or nothing there"

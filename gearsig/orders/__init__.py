@@ -14,7 +14,7 @@ from gearsig.orders._average import (
 )
 from gearsig.orders._separate import SeparatedAverage, band_passed_mesh, check_average, mesh_modulation, separate
 from gearsig.orders._spectrum import OrderMap, frequency_map, order_map, order_spectrum
-from gearsig.orders._track import TrackedOrder, track_order_bands, track_orders
+from gearsig.orders._track import TrackedOrder, amplitude_at_speeds, track_order_bands, track_orders
 from gearsig.orders.vold_kalman._filter import track_vold_kalman
 from gearsig.orders.vold_kalman._tracks import FrequencyTrack, Generation, OrderSeparation, SeparatedOrder
 
@@ -29,6 +29,7 @@ __all__ = [
     "SeparatedShafts",
     "SynchronousAverage",
     "TrackedOrder",
+    "amplitude_at_speeds",
     "average_lines",
     "band_passed_mesh",
     "check_average",

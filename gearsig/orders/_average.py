@@ -260,6 +260,7 @@ def synchronous_average(
     shaft: str = "",
     shaft_angle: ShaftAngle | None = None,
     speed_rpm: float | FloatArray | None = None,
+    n_jackknife_blocks: int = 32,
 ) -> SynchronousAverage:
     """Return the mean over whole revolutions of a shaft, with its standard error.
 
@@ -278,6 +279,9 @@ def synchronous_average(
         Of a recording or an array; default: what `gearsig.angle.find_shaft_angle` finds in the recording.
     speed_rpm : float, array, (n_samples,), or None
         Instead of the angle: the speed, constant or at each sample.
+    n_jackknife_blocks : int
+        At least 2. Revolutions are grouped in so many blocks (or as many as there are revolutions) before their
+        scatter is taken, so that a correlation between neighbouring revolutions does not make the error too small.
 
     Returns
     -------
@@ -298,9 +302,10 @@ def synchronous_average(
     S. Braun, "The synchronous (time domain) average revisited", 2011.
     M. H. Quenouille, "Notes on bias in estimation", 1956 (jackknife).
     """
+    count(n_jackknife_blocks, "n_jackknife_blocks", minimum=2)
     signal, channel = over_angle(signal, channel, shaft, shaft_angle, speed_rpm)
     revolutions = whole_revolutions(signal, channel, minimum=2)
-    mean, standard_error = mean_and_error(revolutions)
+    mean, standard_error = mean_and_error(revolutions, n_jackknife_blocks)
     return SynchronousAverage(
         values=mean,
         standard_error=standard_error,
@@ -313,19 +318,14 @@ def synchronous_average(
     )
 
 
-N_JACKKNIFE_BLOCKS = 32
-
-
-def mean_and_error(revolutions: FloatArray) -> tuple[FloatArray, FloatArray]:
+def mean_and_error(revolutions: FloatArray, n_blocks: int) -> tuple[FloatArray, FloatArray]:
     """Return mean over rows and its standard error by the delete-one-block jackknife.
 
-    Rows are grouped in 32 blocks, fewer of fewer rows, before their scatter is taken, so that a correlation between
-    neighbouring revolutions does not make the error too small. With B blocks, block sums s_b of n_b rows out of N:
-    m_(b) = (Σs - s_b)/(N - n_b),
+    With B blocks, block sums s_b of n_b rows out of N: m_(b) = (Σs - s_b)/(N - n_b),
     SE² = (B - 1)/B Σ_b (m_(b) - mean of m_(b))².
     """
     n = len(revolutions)
-    blocks = _blocks(n, min(n, N_JACKKNIFE_BLOCKS))
+    blocks = _blocks(n, min(n, n_blocks))
     # Row blocks are summed one by one: no copy of the whole signal in double precision is made.
     sums = np.stack([revolutions[block].sum(axis=0, dtype=np.float64) for block in blocks])
     total = sums.sum(axis=0)

@@ -27,27 +27,21 @@ class SeparatedAverage(Result):
     regular: SynchronousAverage
 
 
-SHAFT_ORDERS = (0, 1, 2)
-
-
 def separate(
     average: SynchronousAverage,
     teeth: int | Iterable[int],
     *,
     n_sidebands: int = 1,
+    shaft_orders: tuple[int, ...] = (0, 1, 2),
+    n_harmonics: int | None = None,
 ) -> SeparatedAverage:
     """Split a synchronous average into its regular part and what local tooth faults leave.
 
     Convention, all by whole lines of the average's Fourier transform (exact, for the average is periodic):
 
-    - residual: average without mesh harmonics k·z of the shaft's gears and without the shaft orders 0, 1 and 2;
+    - residual: average without mesh harmonics k·z of the shaft's gears and without `shaft_orders`;
     - difference: the residual without the first `n_sidebands` sidebands k·z ± 1 … of each mesh harmonic as well;
     - regular: what was taken out for the difference.
-
-    The shaft orders are the mean (0), unbalance and misalignment (1, 2). Sources differ here: Večeř et al. take out
-    "shaft components along with their harmonics"; taking out all of them would leave nothing, since every line of the
-    average is a shaft harmonic. Mesh harmonics are taken out as far as the average holds them, also above its highest
-    order.
 
     Parameters
     ----------
@@ -57,6 +51,12 @@ def separate(
         Teeth of each gear on the shaft. Mesh orders of other shafts' gears are not whole and are not in the average.
     n_sidebands : int
         Sidebands on each side that count as regular.
+    shaft_orders : ints
+        Shaft orders taken out of both: the mean (0), unbalance and misalignment (1, 2). Sources differ here: Večeř et
+        al. take out "shaft components along with their harmonics"; taking out all of them would leave nothing, since
+        every line of the average is a shaft harmonic. Pass () to keep them.
+    n_harmonics : int or None
+        Mesh harmonics per gear; None takes all that the average holds, also above its highest order.
 
     Returns
     -------
@@ -88,15 +88,15 @@ def separate(
     highest = average.highest_line
     # Beyond the highest order the filter's flank still lets strong mesh harmonics through: they go as well.
     last = (len(average.values) - 1) // 2
-    mesh = [k * z for z in gears for k in range(1, last // z + 1)]
-    bare = _line_mask(len(average.values), [*SHAFT_ORDERS, *mesh])
+    mesh = [k * z for z in gears for k in range(1, (n_harmonics or last) + 1) if k * z <= last]
+    bare = _line_mask(len(average.values), [*shaft_orders, *mesh])
     sidebands = [m + s for m in mesh for s in range(-n_sidebands, n_sidebands + 1)]
-    full = _line_mask(len(average.values), [*SHAFT_ORDERS, *sidebands])
+    full = _line_mask(len(average.values), [*shaft_orders, *sidebands])
     if full[: highest + 1].all():
         raise RefusalError(
             f"mesh harmonics of {gears} teeth with {counted(n_sidebands, 'sideband')} cover all {highest} orders of "
             "the average",
-            remedy="take fewer sidebands, or a higher sampling rate",
+            remedy="take fewer sidebands or harmonics, or a higher sampling rate",
         )
     lines = np.fft.rfft(average.values)
     regular = np.fft.irfft(np.where(full, lines, 0), len(average.values))
@@ -109,13 +109,20 @@ def separate(
     )
 
 
-def band_passed_mesh(average: SynchronousAverage, teeth: int) -> SynchronousAverage:
-    """Return the average's content around the mesh order z: the lines z ± h, h the largest below z/2.
+def band_passed_mesh(
+    average: SynchronousAverage, teeth: int, *, harmonic: int = 1, half_width_orders: int | None = None
+) -> SynchronousAverage:
+    """Return the average's content around one mesh harmonic.
+
+    The lines from harmonic·z - h to harmonic·z + h; h is the largest below half the mesh order by default.
 
     Parameters
     ----------
     average : SynchronousAverage
     teeth : int
+    harmonic : int
+    half_width_orders : int or None
+        1 to teeth - 1.
 
     Returns
     -------
@@ -128,7 +135,7 @@ def band_passed_mesh(average: SynchronousAverage, teeth: int) -> SynchronousAver
         As `separate`.
     """
     _check_kind(average)
-    low, high = mesh_band(average, teeth)
+    low, high = mesh_band(average, teeth, harmonic, half_width_orders)
     lines = np.fft.rfft(average.values)
     lines[:low] = 0
     lines[high + 1 :] = 0
@@ -136,9 +143,7 @@ def band_passed_mesh(average: SynchronousAverage, teeth: int) -> SynchronousAver
     return _part(average, values, "band-passed mesh", (high - low + 1) / (average.highest_line + 1))
 
 
-def mesh_band(
-    average: SynchronousAverage, teeth: int, harmonic: int = 1, half_width_orders: int | None = None
-) -> tuple[int, int]:
+def mesh_band(average: SynchronousAverage, teeth: int, harmonic: int, half_width_orders: int | None) -> tuple[int, int]:
     """Return the first and last whole order of the band around a mesh harmonic."""
     z = checked_teeth(average, teeth)[0]
     centre = z * count(harmonic, "harmonic")

@@ -73,8 +73,6 @@ class OrderMap(Result, matrix=("values", "time_s", "positions")):
 MANY_REVOLUTIONS = 500
 """From there on, some at the end are left out for a fast transform."""
 
-N_BLOCKS_MAX = 1000
-
 ORDER_SCALINGS = ("amplitude peak", "amplitude rms", "power", "power density")
 
 
@@ -176,7 +174,7 @@ def order_map(
     window: str = "hann",
     scaling: Scaling = "amplitude peak",
     highest_order: float | None = None,
-    n_blocks_max: int = N_BLOCKS_MAX,
+    n_blocks_max: int = 1000,
 ) -> OrderMap:
     """Return the order spectra of consecutive blocks of whole revolutions, with time and speed of each.
 
@@ -244,11 +242,15 @@ def frequency_map(
     shaft_angle: ShaftAngle,
     *,
     n_per_block: int = 4096,
+    overlap: float = 0.5,
+    window: str = "hann",
     scaling: Scaling = "amplitude peak",
+    highest_hz: float | None = None,
+    n_blocks_max: int = 1000,
     unit: str = "",
     source: str = "",
 ) -> OrderMap:
-    """Return the spectra over frequency of half overlapping blocks in time (Hann), with the shaft's speed in each.
+    """Return the spectra over frequency of consecutive blocks in time, with the shaft's speed in each.
 
     Parameters
     ----------
@@ -257,29 +259,36 @@ def frequency_map(
     sampling_rate_hz : float
     shaft_angle : ShaftAngle
     n_per_block : int
-    scaling : str
+    overlap : float
+        0 to 0.95.
+    window, scaling : str
         As in `amplitude_spectrum`; also "power density".
+    highest_hz : float or None
+        Lines above it are left out.
+    n_blocks_max : int
+        Bounds the memory: where the overlap would give more blocks, they are spread evenly instead.
     unit, source : str
 
     Returns
     -------
     OrderMap
-        Over frequency. Of more than 1000 blocks as many are taken, spread evenly.
+        Over frequency.
 
     Raises
     ------
     RefusalError
         If the signal is shorter than one block.
     InputError
-        On a wrong shape, rate or scaling.
+        On a wrong shape, rate, window or scaling.
     """
     one_of(scaling, "scaling", ORDER_SCALINGS)
     check_shaft_angle(shaft_angle)
     x = checked_signal(values)
     fs = positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
-    plan = _plan(len(x), n_per_block, 0.5, "hann", N_BLOCKS_MAX, "n_per_block")
+    plan = _plan(len(x), n_per_block, overlap, window, n_blocks_max, "n_per_block")
     resolution = fs / plan.n_per_block
-    lines = _block_spectra(x, plan, scaling, resolution, fs / 2)
+    highest = fs / 2 if highest_hz is None else positive(highest_hz, "highest_hz", "Hz")
+    lines = _block_spectra(x, plan, scaling, resolution, highest)
     begin = np.arange(plan.n_blocks) * plan.step / fs
     length = plan.n_per_block / fs
     turned = shaft_angle.revolutions_at(begin + length) - shaft_angle.revolutions_at(begin)

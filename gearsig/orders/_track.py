@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gearsig.angle import AngleSignal, ShaftAngle
-from gearsig.checks import FloatArray, freeze, listed_numbers, not_negative, positive
+from gearsig.checks import FloatArray, freeze, frozen_array, instance_of, listed_numbers, not_negative, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.orders._average import block_times, over_angle, unit_of
 from gearsig.recording import Recording
@@ -171,6 +171,39 @@ def order_amplitudes(
     c: ComplexArray = (parts[:, :k] + 1j * parts[:, k:]) * np.exp(-2j * np.pi * at_start)
     c *= np.where(cycles_per_sample == 0.0, 1.0, 2.0) / w.sum()
     return c
+
+
+def amplitude_at_speeds(tracked: TrackedOrder, speeds_rpm: FloatArray) -> FloatArray:
+    """Return a tracked order's peak amplitude at given speeds: linear in power between the blocks.
+
+    Parameters
+    ----------
+    tracked : TrackedOrder
+        Of a run-up or a run-down: the speed must rise or fall all along.
+    speeds_rpm : array, (n,)
+
+    Returns
+    -------
+    array, (n,)
+        nan outside the speeds that were tracked.
+
+    Raises
+    ------
+    RefusalError
+        If the speed rises and falls: an amplitude then belongs to a time, not to a speed.
+    """
+    instance_of(tracked, TrackedOrder, "tracked", remedy="gearsig.track_orders(recording, channel, orders) makes them")
+    grid = frozen_array(speeds_rpm, "speeds_rpm", ndim=1)
+    rising = np.diff(tracked.speed_rpm)
+    if not (np.all(rising > 0) or np.all(rising < 0)):
+        raise RefusalError(
+            "the speed does not rise or fall all along",
+            remedy="cut the recording into run-up and run-down, or read the level over time",
+        )
+    along = np.argsort(tracked.speed_rpm)
+    power = np.interp(grid, tracked.speed_rpm[along], tracked.amplitude[along] ** 2, left=np.nan, right=np.nan)
+    amplitude: FloatArray = np.sqrt(power)
+    return amplitude
 
 
 def _checked_orders(signal: AngleSignal, orders: Sequence[float], margin: float) -> FloatArray:

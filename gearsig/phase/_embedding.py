@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from gearsig.checks import FloatArray, count, freeze, positive
+from gearsig.checks import FloatArray, count, freeze, positive, within
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import percent, seconds_text
 from gearsig.phase._neighbours import IndexArray, nearest_apart, spaced
@@ -319,7 +319,6 @@ def mutual_information(bins: IndexArray, n_bins: int, delay: int) -> float:
 
 N_LIBRARY, N_REFERENCES = 20_000, 2_000
 DISTANCE_RATIO, SIZE_RATIO = 15.0, 2.0  # Kennel's R_tol and A_tol
-FALSE_SHARE = 0.02
 
 
 def embedding_dimension(
@@ -328,14 +327,15 @@ def embedding_dimension(
     *,
     delay_samples: int | None = None,
     largest: int = 10,
+    threshold: float = 0.02,
+    theiler_samples: int | None = None,
     source: str = "",
 ) -> EmbeddingDimension:
-    """Return the smallest dimension at which at most 2 % of the nearest neighbours are false ones.
+    """Return the smallest dimension at which (nearly) no nearest neighbour is a false one.
 
     Kennel: with R_d the distance to the nearest neighbour in d dimensions and Δ that of the next coordinate, the
     neighbour is false if Δ / R_d > 15 or √(R_d² + Δ²) > 2 σ. Cao: E(d) = mean of ‖·‖_{d+1} / ‖·‖_d (largest
-    coordinate), E1 = E(d+1)/E(d); E*(d) = mean of Δ, E2 = E*(d+1)/E*(d). Points nearer in time than one mean period are
-    no neighbours. Noise leaves some false: 2 % allow for noise of about 3 % of the signal's standard deviation.
+    coordinate), E1 = E(d+1)/E(d); E*(d) = mean of Δ, E2 = E*(d+1)/E*(d).
 
     Parameters
     ----------
@@ -346,12 +346,17 @@ def embedding_dimension(
         None: first minimum of the mutual information.
     largest : int
         Largest dimension tried, 2 to 15.
+    threshold : float
+        Share of false neighbours that counts as none. Noise leaves some: 0.02 allows for noise of about 3 % of the
+        signal's standard deviation.
+    theiler_samples : int or None
+        Points nearer in time are no neighbours; None: one mean period.
     source : str
 
     Returns
     -------
     EmbeddingDimension
-        Dimension 0 and verdict "stochastic" where no dimension leaves so few. Cao's E2 is for reading: near 1
+        Dimension 0 and verdict "stochastic" where no dimension reaches the threshold. Cao's E2 is for reading: near 1
         at every dimension says random too.
 
     Notes
@@ -372,7 +377,8 @@ def embedding_dimension(
     x = checked_series(values, minimum=200)
     tau = chosen_delay(x, rate) if delay_samples is None else count(delay_samples, "delay_samples")
     count(largest, "largest", minimum=2, maximum=15)
-    window = round(mean_period_samples(x))
+    within(threshold, "threshold", 0.0, 0.5)
+    window = round(mean_period_samples(x)) if theiler_samples is None else count(theiler_samples, "theiler_samples")
     n = len(x) - largest * tau
     if n < 100 + 2 * window:
         raise RefusalError(
@@ -385,7 +391,7 @@ def embedding_dimension(
     steps = [_step(x, tau, d, library, references, window, finest) for d in range(1, largest + 1)]
     false_fraction = np.array([step[0] for step in steps])
     growth, determinism = _ratios([step[1] for step in steps]), _ratios([step[2] for step in steps])
-    below = np.flatnonzero(false_fraction <= FALSE_SHARE)
+    below = np.flatnonzero(false_fraction <= threshold)
     dimension = int(below[0]) + 1 if len(below) else 0
     return EmbeddingDimension(
         dimensions=tuple(range(1, largest + 1)),
@@ -394,7 +400,7 @@ def embedding_dimension(
         determinism=determinism,
         dimension=dimension,
         verdict="deterministic" if dimension else "stochastic",
-        threshold=FALSE_SHARE,
+        threshold=threshold,
         delay_samples=tau,
         source=source,
     )

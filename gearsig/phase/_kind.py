@@ -14,7 +14,7 @@ from gearsig.phase._embedding import EmbeddingDimension, chosen_delay, delay_emb
 from gearsig.phase._lyapunov import LyapunovExponent, largest_lyapunov_exponent
 from gearsig.phase._neighbours import GOLDEN
 from gearsig.phase._plane import PhasePortrait, checked_series, mean_period_samples
-from gearsig.phase._section import TOLERANCE, CycleLock, PoincareSection, check_lock, poincare_section, section_period
+from gearsig.phase._section import CycleLock, PoincareSection, check_lock, poincare_section, section_period
 from gearsig.results import Result
 
 ChaosVerdict = Literal["regular", "irregular", "undecided"]
@@ -59,17 +59,18 @@ class ChaosTest(Result, columns=("c_rad", "k_of_c")):
 
 
 MIN_VALUES, MAX_VALUES = 200, 20_000
-LOWEST_C, HIGHEST_C, N_FREQUENCIES = np.pi / 5.0, 4.0 * np.pi / 5.0, 100
+LOWEST_C, HIGHEST_C = np.pi / 5.0, 4.0 * np.pi / 5.0
 REGULAR, IRREGULAR = 0.2, 0.8
 
 
-def zero_one_test(values: FloatArray, *, damping: float = 0.0, every: int | None = None, source: str = "") -> ChaosTest:
+def zero_one_test(
+    values: FloatArray, *, damping: float = 0.0, n_frequencies: int = 100, every: int | None = None, source: str = ""
+) -> ChaosTest:
     """Return the 0–1 test of a series: K near 0 for regular motion, near 1 for chaos.
 
     z(n) = Σ_{j≤n} φ(j) e^{icj}; M(n) = mean over j ≤ N - n_cut of |z(j + n) - z(j)|², n = 1 … n_cut = N/10;
     D(n) = M(n) - ⟨φ⟩² (1 - cos nc)/(1 - cos c) (modified); D*(n) = D(n) + α σ² sin(√2 n) (damped);
-    K(c) = correlation of D* with n; K = median over 100 c in π/5 … 4π/5, spread by the golden ratio so that few of them
-    resonate with the motion.
+    K(c) = correlation of D* with n; K = median over c in π/5 … 4π/5.
 
     Parameters
     ----------
@@ -78,6 +79,8 @@ def zero_one_test(values: FloatArray, *, damping: float = 0.0, every: int | None
     damping : float
         α, 0 and more. The term keeps a weakly growing M, from measurement noise on regular motion, from being read as
         chaos; weak chaos is then missed as well. About 1 to 2.5 for noise of some percent.
+    n_frequencies : int
+        Values of c, spread by the golden ratio so that few of them resonate with the motion.
     every : int or None
         Every so-many-th value is used; None: the first minimum of the mutual information, 1 for a map, less where
         fewer than 200 values would be left. Where the values used still lie too close to each other, the verdict is
@@ -103,6 +106,7 @@ def zero_one_test(values: FloatArray, *, damping: float = 0.0, every: int | None
     nonchaotic attractors* (2008).
     """
     alpha = not_negative(damping, "damping")
+    count(n_frequencies, "n_frequencies", minimum=10)
     x = checked_series(values, minimum=MIN_VALUES)
     step = min(chosen_delay(x, 1.0), len(x) // MIN_VALUES) if every is None else count(every, "every")
     phi = x[::step][:MAX_VALUES]
@@ -112,7 +116,7 @@ def zero_one_test(values: FloatArray, *, damping: float = 0.0, every: int | None
             allowed=f"at least {MIN_VALUES}",
             remedy="record longer",
         )
-    c = LOWEST_C + (HIGHEST_C - LOWEST_C) * ((np.arange(N_FREQUENCIES) + 0.5) * GOLDEN % 1.0)  # the golden ratio
+    c = LOWEST_C + (HIGHEST_C - LOWEST_C) * ((np.arange(n_frequencies) + 0.5) * GOLDEN % 1.0)  # the golden ratio
     scale = float(phi.std())
     k_of_c = np.array([_k(phi / scale, float(frequency), alpha) for frequency in c])
     k = float(np.median(k_of_c))
@@ -131,14 +135,14 @@ def zero_one_test(values: FloatArray, *, damping: float = 0.0, every: int | None
     )
 
 
-def zero_one_test_of_section(section: PoincareSection, *, damping: float = 0.0) -> ChaosTest:
-    """Return the 0–1 test of a Poincaré section's first coordinate; a section of few points is regular by itself.
+def zero_one_test_of_section(section: PoincareSection, *, axis: int = 0, damping: float = 0.0) -> ChaosTest:
+    """Return the 0–1 test of one coordinate of a Poincaré section; a section of one or few points is regular by itself.
 
     Points that scatter by less than 1e-6 of the path's size are one point: K = 0.
     """
-    values = section.points[:, 0]
+    values = section.points[:, axis]
     source = f"{section.source}, section {section.section}"
-    if section.n_points >= 2 and float(np.std(values)) < 1e-6 * float(section.extent[0]):
+    if section.n_points >= 2 and float(np.std(values)) < 1e-6 * float(section.extent[axis]):
         return ChaosTest(0.0, np.zeros(1), np.array([LOWEST_C]), damping, section.n_points, "regular", False, source)
     every = None if _oversampled(values) else 1  # a section is a map already, unless it drifts slowly
     return zero_one_test(values, damping=damping, every=every, source=source)
@@ -245,7 +249,9 @@ class MotionKind(Result):
     chaos_test: ChaosTest | None = None
 
 
-def kind_of_motion(portrait: PhasePortrait, lock: CycleLock, *, noise_free: bool = False) -> MotionKind:
+def kind_of_motion(
+    portrait: PhasePortrait, lock: CycleLock, *, tolerance: float = 0.05, noise_free: bool = False
+) -> MotionKind:
     """Return what kind of motion a path is, from its Poincaré section, its Lyapunov exponent and the 0–1 test.
 
     A section that repeats decides alone. Otherwise: no dimension unfolds the first axis → stochastic; neighbours part
@@ -255,6 +261,8 @@ def kind_of_motion(portrait: PhasePortrait, lock: CycleLock, *, noise_free: bool
     ----------
     portrait : PhasePortrait
     lock : CycleLock
+    tolerance : float
+        Of the section, in standard deviations of the path; above its scatter from noise.
     noise_free : bool
         Whether the path is known to be deterministic, as a model's: the 0–1 test then needs no damping, and a regular
         one decides alone where the exponent cannot answer.
@@ -273,10 +281,10 @@ def kind_of_motion(portrait: PhasePortrait, lock: CycleLock, *, noise_free: bool
     """
     check_lock(lock, needed=True)
     section = poincare_section(portrait, lock)
-    period = section_period(section)
+    period = section_period(section, tolerance=tolerance)
     if period:
         after = f"the section repeats after {counted(period, 'cycle')} of the {lock.name}"
-        shown_by = f"{after}, within {TOLERANCE:g} of the path's size"
+        shown_by = f"{after}, within {tolerance:g} of the path's size"
         return MotionKind("periodic" if period == 1 else "subharmonic", period, (shown_by,), section)
     evidence = [f"the section of {section.n_points} points does not repeat within 16 cycles of the {lock.name}"]
     test = answer_or_none(

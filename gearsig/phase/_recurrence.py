@@ -95,6 +95,7 @@ def recurrence_plot(
     portrait: PhasePortrait,
     *,
     recurrence_rate: float = 0.05,
+    radius: float | None = None,
     n_points: int = 1_000,
     stride: int | None = None,
 ) -> RecurrencePlot:
@@ -105,6 +106,8 @@ def recurrence_plot(
     portrait : PhasePortrait
     recurrence_rate : float
         Share of pairs that the radius is chosen for, 0.001 to 0.5.
+    radius : float or None
+        In standard deviations of the axes; wins over `recurrence_rate`.
     n_points : int
         At most so many points from the start of the path (2 to 3000): the matrix never grows with the signal. For
         another segment see `PhasePortrait.between`.
@@ -114,7 +117,7 @@ def recurrence_plot(
     Raises
     ------
     InputError
-        On a rate or number of points out of range.
+        On a radius, rate or number of points out of range.
     RefusalError
         If the path does not move.
 
@@ -125,7 +128,7 @@ def recurrence_plot(
 
     count(n_points, "n_points", minimum=2, maximum=MAX_PLOT_POINTS)
     points, step = _thinned_points(portrait, n_points, stride)
-    limit = _radius(points, recurrence_rate, None, 0)
+    limit = _radius(points, recurrence_rate, radius, 0)
     matrix = cdist(points, points) < limit
     times = portrait.start_s + np.arange(len(points)) * (step / portrait.sampling_rate_hz)
     return RecurrencePlot(matrix, times, limit, step, portrait.source)

@@ -276,11 +276,8 @@ def _geometric_section(
     return PoincareSection(points, times, names, units, extent, "geometric", plane, portrait.source)
 
 
-LONGEST_PERIOD, TOLERANCE = 16, 0.05
-
-
-def section_period(section: PoincareSection, *, tolerance: float = TOLERANCE) -> int:
-    """Return after how many crossings the section repeats itself; 0 if it does not within 16.
+def section_period(section: PoincareSection, *, longest: int = 16, tolerance: float = 0.05) -> int:
+    """Return after how many crossings the section repeats itself; 0 if it does not within `longest`.
 
     The smallest p with median |xᵢ₊ₚ - xᵢ| / size ≤ tolerance, distances in standard deviations of the path's axes, that
     holds over half of the section as well: quasi-periodic motion that nearly closes creeps.
@@ -288,14 +285,16 @@ def section_period(section: PoincareSection, *, tolerance: float = TOLERANCE) ->
     Parameters
     ----------
     section : PoincareSection
-        Of a steady operating condition; at least 32 points, or fewer for a shorter search.
+        Of a steady operating condition; at least 2·longest points, or fewer for a shorter search.
+    longest : int
     tolerance : float
         Above the scatter from noise, below the distance of the branches that are to be told apart.
     """
     instance_of(section, PoincareSection, "section", remedy="gearsig.poincare_section(portrait) makes one")
+    count(longest, "longest")
     x = section.points / np.where(section.extent > 0.0, section.extent, 1.0)
     half = section.n_points // 2
-    for p in range(1, min(LONGEST_PERIOD, half) + 1):
+    for p in range(1, min(longest, half) + 1):
         if _return_distance(x, p) <= tolerance and _return_distance(x, half // p * p) <= tolerance:
             return p
     return 0
@@ -405,7 +404,7 @@ def bifurcation_diagram(
     unit: str = "",
     axis: int = 0,
     max_points: int = 400,
-    tolerance: float = TOLERANCE,
+    tolerance: float = 0.05,
 ) -> BifurcationDiagram:
     """Return the diagram of one coordinate of Poincaré sections over the parameter they were taken at.
 
@@ -461,7 +460,7 @@ def bifurcation_diagram(
     )
 
 
-def values_apart(up: BifurcationDiagram, down: BifurcationDiagram) -> FloatArray:
+def values_apart(up: BifurcationDiagram, down: BifurcationDiagram, *, differs: float = DIFFERS) -> FloatArray:
     """Return the values at which two branches hold different motions, (n,): coexisting attractors, hysteresis.
 
     |s_up − s_down| > 0.1 max(s_up, s_down), with s the standard deviation of the path along the drawn axis.
@@ -470,6 +469,8 @@ def values_apart(up: BifurcationDiagram, down: BifurcationDiagram) -> FloatArray
     ----------
     up, down : BifurcationDiagram
         Of the same parameter; values that only one of them has are passed over.
+    differs : float
+        The share.
 
     Raises
     ------
@@ -482,7 +483,7 @@ def values_apart(up: BifurcationDiagram, down: BifurcationDiagram) -> FloatArray
         raise InputError("a diagram without extents", remedy="make it with bifurcation_diagram")
     values, i_up, i_down = np.intersect1d(up.values, down.values, return_indices=True)
     a, b = up.extents[i_up], down.extents[i_down]
-    apart: FloatArray = values[np.abs(a - b) > DIFFERS * np.maximum(a, b)]
+    apart: FloatArray = values[np.abs(a - b) > differs * np.maximum(a, b)]
     return apart
 
 
@@ -508,7 +509,9 @@ class TwoMotions:
     ends_with_sweep: bool
 
 
-def coexistence_ranges(up: BifurcationDiagram, down: BifurcationDiagram) -> tuple[TwoMotions, ...]:
+def coexistence_ranges(
+    up: BifurcationDiagram, down: BifurcationDiagram, *, differs: float = DIFFERS
+) -> tuple[TwoMotions, ...]:
     """Return the ranges in which two motions coexist, ascending; see `values_apart` for when they do.
 
     Where a range begins and ends is known to half a step only, and how wide it is depends on the sweep: a jump back
@@ -520,7 +523,7 @@ def coexistence_ranges(up: BifurcationDiagram, down: BifurcationDiagram) -> tupl
         As `values_apart`.
     """
     values = np.intersect1d(up.values, down.values)
-    apart = np.isin(values, values_apart(up, down))
+    apart = np.isin(values, values_apart(up, down, differs=differs))
     steps = np.diff(np.concatenate([[False], apart, [False]]).astype(int))
     half = 0.5 * step_of(up, down)
     ranges = []

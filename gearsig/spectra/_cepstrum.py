@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from gearsig.checks import FloatArray, one_of, positive
+from gearsig.checks import FloatArray, count, one_of, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Recording
 from gearsig.spectra._types import ComplexArray, Spectrum, checked_signal, named_signal
@@ -16,7 +16,11 @@ LOWEST_RELATIVE_MAGNITUDE = 1e-12
 
 
 def cepstrum(
-    signal: FloatArray | Recording, channel_or_rate_hz: str | float, *, kind: Literal["real", "power"] = "real"
+    signal: FloatArray | Recording,
+    channel_or_rate_hz: str | float,
+    *,
+    kind: Literal["real", "power"] = "real",
+    source: str = "",
 ) -> Spectrum:
     """Return the cepstrum of a signal: the inverse transform of its log spectrum, over quefrency.
 
@@ -30,6 +34,7 @@ def cepstrum(
         The channel of a recording; of an array its sampling rate in Hz.
     kind : str
         "real" (signed) or "power".
+    source : str
 
     Returns
     -------
@@ -61,7 +66,7 @@ def cepstrum(
     >>> round(c.largest_near(0.05, 0.02)[0], 3)
     0.05
     """
-    x, fs, _, source = named_signal(signal, channel_or_rate_hz, "", "", minimum=4)
+    x, fs, _, source = named_signal(signal, channel_or_rate_hz, "", source, minimum=4)
     one_of(kind, "kind", ("real", "power"))
     c = real_cepstrum(_transform(x), len(x))[: len(x) // 2 + 1]
     return Spectrum(
@@ -78,12 +83,20 @@ def cepstrum(
     )
 
 
-def lifter_families(values: FloatArray, sampling_rate_hz: float, spacing_hz: float, *, keep: bool) -> FloatArray:
+def lifter_families(
+    values: FloatArray,
+    sampling_rate_hz: float,
+    spacing_hz: float,
+    *,
+    keep: bool,
+    n_rahmonics: int | None = None,
+    half_width_s: float | None = None,
+) -> FloatArray:
     """Return a signal in which families of lines `spacing_hz` apart are all that is kept, or are removed.
 
-    The real cepstrum is set to zero at (or, for `keep`, outside of) all rahmonics k/Δf ± k samples, as the speed's
-    uncertainty grows; the edited log magnitude goes back to time with the original phase. Removal levels the family's
-    lines with their neighbourhood whether or not they are exactly periodic.
+    The real cepstrum is set to zero at (or, for `keep`, outside of) the rahmonics k/Δf ± half width; the edited log
+    magnitude goes back to time with the original phase. Removal levels the family's lines with their neighbourhood
+    whether or not they are exactly periodic.
 
     Parameters
     ----------
@@ -91,6 +104,10 @@ def lifter_families(values: FloatArray, sampling_rate_hz: float, spacing_hz: flo
     sampling_rate_hz, spacing_hz : float
     keep : bool
         True keeps the families (and the mean level, quefrency 0), False removes them.
+    n_rahmonics : int or None
+        None takes all up to half the signal's length.
+    half_width_s : float or None
+        Around each rahmonic; None is one sample at the first, growing in proportion (the speed's uncertainty does).
 
     Returns
     -------
@@ -115,7 +132,7 @@ def lifter_families(values: FloatArray, sampling_rate_hz: float, spacing_hz: flo
         )
     lines = _transform(x)
     c = real_cepstrum(lines, len(x))
-    mask = _rahmonic_mask(len(x), period)
+    mask = _rahmonic_mask(len(x), period, n_rahmonics, None if half_width_s is None else half_width_s * fs)
     if keep:
         mask = ~mask
         mask[0] = False
@@ -141,11 +158,17 @@ def _transform(x: FloatArray) -> ComplexArray:
     return lines
 
 
-def _rahmonic_mask(n: int, period: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def _rahmonic_mask(
+    n: int, period: float, n_rahmonics: int | None, half_width: float | None
+) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     """Mark the rahmonics on both sides of a cepstrum of n samples, symmetric as the cepstrum is."""
+    n_max = int(n / 2 / period)
+    k = np.arange(1, (n_max if n_rahmonics is None else min(n_max, count(n_rahmonics, "n_rahmonics"))) + 1)
+    widths = k.astype(np.float64) if half_width is None else np.full(len(k), max(half_width, 0.5))
+    widths = np.minimum(widths, period / 4)  # neighbours must not merge
     q = np.arange(n // 2 + 1, dtype=np.float64)
-    k = np.clip(np.rint(q / period), 1, int(n / 2 / period))
-    half = np.abs(q - k * period) <= np.minimum(k, period / 4)  # neighbours must not merge
+    nearest = np.clip(np.rint(q / period).astype(np.intp), 1, len(k))
+    half = np.abs(q - nearest * period) <= widths[nearest - 1]
     mask = np.zeros(n, dtype=np.bool_)
     mask[: n // 2 + 1] = half
     mask[n - n // 2 :] |= half[1:][::-1]

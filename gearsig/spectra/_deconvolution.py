@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gearsig.checks import FloatArray, count, freeze, positive
+from gearsig.checks import FloatArray, count, freeze, not_negative, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Recording
 from gearsig.spectra._types import named_signal
@@ -54,6 +54,8 @@ def minimum_entropy_deconvolution(
     *,
     n_taps: int = 100,
     n_iterations: int = 50,
+    unit: str = "",
+    source: str = "",
 ) -> Deconvolved:
     r"""Return the signal after the filter that makes it most impulsive (MED).
 
@@ -72,6 +74,8 @@ def minimum_entropy_deconvolution(
         Length of the filter: as long as an impact rings, 30 to 500.
     n_iterations : int
         At most; it ends when the kurtosis changes by less than 10⁻⁴ of itself.
+    unit, source : str
+        Default: the channel's.
 
     Returns
     -------
@@ -96,7 +100,7 @@ def minimum_entropy_deconvolution(
     model based gear tooth fault detection technique by the use of minimum entropy deconvolution filter", 2007. G. L.
     McDonald and Q. Zhao, "Multipoint optimal minimum entropy deconvolution and convolution fix", 2017 (ends).
     """
-    x, fs, unit, source = _checked(signal, channel_or_rate_hz, n_taps)
+    x, fs, unit, source = _checked(signal, channel_or_rate_hz, unit, source, n_taps)
     solve = _Normal(x, n_taps)
     taps: FloatArray = np.zeros(n_taps)
     taps[n_taps // 2] = 1.0  # a delay: the signal itself
@@ -121,6 +125,9 @@ def multipoint_deconvolution(
     period_s: float,
     *,
     n_taps: int = 100,
+    width_s: float = 0.0,
+    unit: str = "",
+    source: str = "",
 ) -> Deconvolved:
     r"""Return the signal after the filter that brings it nearest to a train of impacts of a known period (MOMEDA).
 
@@ -131,10 +138,12 @@ def multipoint_deconvolution(
 
     Parameters
     ----------
-    signal, channel_or_rate_hz, n_taps
+    signal, channel_or_rate_hz, n_taps, unit, source
         As in `minimum_entropy_deconvolution`.
     period_s : float
         Between two impacts; it need not be a whole number of samples.
+    width_s : float
+        Each impact of t is that wide: the drift of the impacts' phase over the record that is borne. 0 is one sample.
 
     Returns
     -------
@@ -149,7 +158,7 @@ def multipoint_deconvolution(
     Notes
     -----
     Any signal shows some of any period: compare the score with those of other periods, see `multipoint_norms`. Over
-    long records a bearing's slip takes the train out of step: resample to the angle, or take a segment.
+    long records a bearing's slip takes the train out of step: resample to the angle, take a segment, or a width.
 
     References
     ----------
@@ -166,8 +175,8 @@ def multipoint_deconvolution(
     >>> y.score > 2 * multipoint_deconvolution(x, 1000.0, 0.1037).score
     True
     """
-    x, fs, unit, source = _checked(signal, channel_or_rate_hz, n_taps)
-    train = _train(len(x) - n_taps + 1, period_s, fs)
+    x, fs, unit, source = _checked(signal, channel_or_rate_hz, unit, source, n_taps)
+    train = _train(len(x) - n_taps + 1, period_s, fs, not_negative(width_s, "width_s", "s"))
     taps = _Normal(x, n_taps)(_correlated(x, train))
     taps /= np.linalg.norm(taps)
     y = _filtered(x, taps)
@@ -182,6 +191,7 @@ def multipoint_norms(
     periods_s: FloatArray,
     *,
     n_taps: int = 100,
+    width_s: float = 0.0,
 ) -> FloatArray:
     r"""Return how near `multipoint_deconvolution` brings a signal to a train of impacts, for each of several periods.
 
@@ -189,7 +199,7 @@ def multipoint_norms(
 
     Parameters
     ----------
-    signal, channel_or_rate_hz, n_taps
+    signal, channel_or_rate_hz, n_taps, width_s
         As there.
     periods_s : array, (n_periods,)
 
@@ -198,20 +208,20 @@ def multipoint_norms(
     array, (n_periods,)
         Cosines, 0 to 1. They fall on multiples of the true period, too; the shortest that stands out is it.
     """
-    x, fs, _, _ = _checked(signal, channel_or_rate_hz, n_taps)
+    x, fs, _, _ = _checked(signal, channel_or_rate_hz, "", "", n_taps)
     solve = _Normal(x, n_taps)
     norms = []
     for period_s in np.asarray(periods_s, dtype=np.float64):
-        train = _train(len(x) - n_taps + 1, float(period_s), fs)
+        train = _train(len(x) - n_taps + 1, float(period_s), fs, width_s)
         b = _correlated(x, train)
         norms.append(np.sqrt(max(float(b @ solve(b)), 0.0)) / np.linalg.norm(train))
     return np.array(norms)
 
 
 def _checked(
-    signal: FloatArray | Recording, channel_or_rate_hz: str | float, n_taps: int
+    signal: FloatArray | Recording, channel_or_rate_hz: str | float, unit: str, source: str, n_taps: int
 ) -> tuple[FloatArray, float, str, str]:
-    x, fs, unit, source = named_signal(signal, channel_or_rate_hz, "", "", minimum=64)
+    x, fs, unit, source = named_signal(signal, channel_or_rate_hz, unit, source, minimum=64)
     count(n_taps, "n_taps", minimum=2, maximum=len(x) // 10, remedy="a tenth of the signal at most")
     x = x.astype(np.float64) - float(np.mean(x))
     if float(np.abs(x).max()) <= 1e-12 * float(np.abs(signal if isinstance(signal, np.ndarray) else x).max()):
@@ -261,8 +271,8 @@ def _correlated(x: FloatArray, y: FloatArray) -> FloatArray:
     return b
 
 
-def _train(n: int, period_s: float, fs: float) -> FloatArray:
-    """Return impacts of height 1 every period, each spread over the two samples it lies between."""
+def _train(n: int, period_s: float, fs: float, width_s: float) -> FloatArray:
+    """Return impacts of height 1 every period, each spread over the two samples it lies between, or over the width."""
     period = positive(period_s, "period_s", "s") * fs
     if not 2.0 <= period <= n / 3:
         raise InputError(f"period_s is {period_s:g}", allowed=f"{2 / fs:g} to {n / 3 / fs:g} s for this signal")
@@ -271,4 +281,5 @@ def _train(n: int, period_s: float, fs: float) -> FloatArray:
     train = np.zeros(n)
     train[below] += 1.0 - (places - below)
     train[below + 1] += places - below
-    return train
+    width = round(width_s * fs)
+    return np.convolve(train, np.ones(width), mode="same") if width > 1 else train

@@ -502,6 +502,8 @@ def component(
     half_width: float | None = None,
     squeezed: bool = True,
     wavelet: Wavelet = DEFAULT,
+    n_per_octave: int = 32,
+    edges: Edges = "reflect",
 ) -> Component:
     """Return the waveform of the component that runs along a ridge, at every sample.
 
@@ -518,8 +520,8 @@ def component(
         at most 0.5.
     squeezed : bool
         Squeezed: keeps more noise out, and fast modulation too. Not squeezed: smoother.
-    wavelet : Wavelet
-        Best that which the ridge was found with.
+    wavelet, n_per_octave, edges
+        As in `squeezed_cwt`; best those that the ridge was found with.
 
     Returns
     -------
@@ -540,6 +542,7 @@ def component(
     Source: I. Daubechies, J. Lu, H.-T. Wu (2011), see `squeezed_cwt`, theorem 3.3.
     """
     x = uniform(signal, channel)
+    one_of(edges, "edges", get_args(Edges))
     if ridge.axis != x.axis:
         raise InputError(
             f"the ridge is over {ridge.axis}, the signal is not",
@@ -556,12 +559,12 @@ def component(
     # Where the signal is just long enough for the ridge, the band's lower half is cut rather than refused.
     bottom = max(float(low.min()), min(float(path.min()), lowest_possible(x, wavelet)))
     top = min(float(high.max()), x.highest_valid)
-    plan = analysis(x, wavelet, bottom, top, 32)
+    plan = analysis(x, wavelet, bottom, top, n_per_octave)
     borders = 2 * np.pi / x.rate * low, 2 * np.pi / x.rate * high
     omegas = 2 * np.pi / x.rate * plan.analysed
     z = np.zeros(x.n_samples, dtype=np.complex128)
     for group in plan_groups(plan.analysed / x.rate, wavelet, x.n_samples):
-        for piece in pieces(x.values, group, "reflect", derivatives=squeezed):
+        for piece in pieces(x.values, group, edges, derivatives=squeezed):
             columns = slice(piece.start, piece.start + piece.values.shape[1])
             limits = borders[0][columns], borders[1][columns]
             if squeezed:

@@ -15,6 +15,7 @@ from gearsig.indicators import (
     fm0,
     fm4,
     gear_indicators,
+    healthy_records,
     line_amplitude,
     m6a,
     m8a,
@@ -89,6 +90,7 @@ def test_fm0_of_pure_mesh():
     two = average(5 * np.cos(32 * THETA) + 2 * np.cos(64 * THETA))
     span = two.values.max() - two.values.min()
     assert fm0(two, 32) == pytest.approx(span / 7)
+    assert fm0(two, 32, n_harmonics=1) == pytest.approx(span / 5)
     assert math.isnan(fm0(average(np.cos(3 * THETA)), 500))
 
 
@@ -179,6 +181,15 @@ def test_envelope_agrees_with_scipy_for_even_and_odd_lengths(n):
     from scipy.signal import hilbert
 
     np.testing.assert_allclose(envelope(noise(5, n)), np.abs(hilbert(noise(5, n))), atol=1e-12)
+
+
+def test_healthy_records_end_at_the_first_jump():
+    steady = [1.0, 1.1, 0.9, 1.05, 0.95, 1.02]
+    assert healthy_records(steady) == (True,) * 6
+    assert healthy_records([*steady, 5.0, 1.0]) == (True,) * 6 + (False, False)
+    assert healthy_records([1.0, 9.0]) == (True, True)
+    with pytest.raises(InputError):
+        healthy_records(steady, n_first=1)
 
 
 def test_collected_indicators_say_what_they_rest_on():

@@ -66,7 +66,7 @@ def test_another_shafts_order_falls_as_the_comb_filter_says(angle_signal):
 
 def test_jackknife_of_single_revolutions_is_the_textbook_standard_error():
     x = np.random.default_rng(1).normal(size=(20, 8))
-    mean, error = mean_and_error(x)
+    mean, error = mean_and_error(x, 20)
     assert mean == pytest.approx(x.mean(axis=0))
     assert error == pytest.approx(x.std(axis=0, ddof=1) / np.sqrt(20))
 

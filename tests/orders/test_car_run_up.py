@@ -12,7 +12,7 @@ import pytest
 from scipy.signal import get_window, oaconvolve
 
 from gearsig.angle import resample_to_angle
-from gearsig.orders import track_order_bands, track_vold_kalman
+from gearsig.orders import amplitude_at_speeds, track_order_bands, track_vold_kalman
 from tests.measured import car_run_up, needs_data
 
 REFERENCE_PA = 20e-6
@@ -26,7 +26,7 @@ def tracked_db():
     recording, angle, table = car_run_up()
     signal = resample_to_angle(recording, angle, samples_per_revolution=128)
     tracked = track_order_bands(signal, "p", [2.0, 4.0], overlap=0.95)
-    return [_at_speeds_db(order.amplitude**2, order.speed_rpm, table[:, 0]) for order in tracked]
+    return [20 * np.log10(amplitude_at_speeds(o, table[:, 0]) / 2**0.5 / REFERENCE_PA) for o in tracked]
 
 
 @pytest.fixture(scope="module")
@@ -41,13 +41,9 @@ def _levels_db(order, rate, speeds_rpm):
     window = get_window("hann", round(0.4 * rate))
     power = oaconvolve(np.abs(order.envelope) ** 2, window / window.sum(), "valid")[::100]
     speed = oaconvolve(60 * order.frequency_hz / order.order, window / window.sum(), "valid")[::100]
-    return _at_speeds_db(power, speed, speeds_rpm)
-
-
-def _at_speeds_db(squared_peak, speed_rpm, speeds_rpm):
-    along = np.argsort(speed_rpm)
-    at = np.interp(speeds_rpm, speed_rpm[along], squared_peak[along], left=np.nan, right=np.nan)
-    return 10 * np.log10(at / 2 / REFERENCE_PA**2)
+    along = np.argsort(speed)
+    power_at = np.interp(speeds_rpm, speed[along], power[along], left=np.nan, right=np.nan)
+    return 10 * np.log10(power_at / 2 / REFERENCE_PA**2)
 
 
 @pytest.mark.parametrize("i", [0, 1])

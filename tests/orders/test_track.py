@@ -5,7 +5,7 @@ import pytest
 
 from gearsig.angle import ShaftAngle, resample_to_angle
 from gearsig.errors import InputError, RefusalError
-from gearsig.orders import track_order_bands, track_orders
+from gearsig.orders import amplitude_at_speeds, track_order_bands, track_orders
 from gearsig.recording import Channel, Recording
 
 AMPLITUDES = {1: 0.5, 2.5: 0.2, 4: 2.0}
@@ -69,6 +69,19 @@ def test_band_keeps_the_sidebands_that_the_block_filter_takes_out(angle_signal):
     (band,) = track_order_bands(signal, "a", [20.0], bandwidth_orders=0.3, revolutions_per_block=40)
     assert narrow.amplitude == pytest.approx(1.0, abs=1e-6)
     assert band.amplitude == pytest.approx(np.sqrt(1 + 0.8**2 / 2), abs=1e-6)
+
+
+def test_levels_at_given_speeds(run_up):
+    (tracked,) = track_orders(run_up, "a", [4])
+    at = amplitude_at_speeds(tracked, np.array([100.0, 1000.0, 2000.0, 3000.0, 9000.0]))
+    assert np.isnan(at[[0, -1]]).all()
+    assert at[1:-1] == pytest.approx(2.0, rel=0.01)
+
+
+def test_speeds_that_come_twice_have_no_level(angle_signal):
+    (tracked,) = track_orders(angle_signal(np.cos, 100), "a", [1])
+    with pytest.raises(RefusalError, match="rise or fall"):
+        amplitude_at_speeds(tracked, np.array([600.0]))
 
 
 def test_what_cannot_be_tracked_is_refused(angle_signal):
