@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.checks import FloatArray, freeze, limits, one_of, positive, within
+from gearsig.checks import FloatArray, count, freeze, limits, one_of, positive, within
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Channel, Recording
 from gearsig.results import Result
 from gearsig.spectra._amplitude import Preparation, amplitude_spectrum, noise_floor, prepared_signal
 from gearsig.spectra._coherence import SpectralCoherence, enhanced_envelope, spectral_coherence
 from gearsig.spectra._kurtogram import BandCandidate, Kurtogram, kurtogram, kurtosis_error
-from gearsig.spectra._types import BATCH_SAMPLES, ComplexArray, Spectrum, named_signal, squared_unit
+from gearsig.spectra._types import BATCH_SAMPLES, ComplexArray, Scaling, Spectrum, named_signal, squared_unit
 
 EnvelopeKind = Literal["magnitude", "squared"]
 
@@ -145,9 +146,12 @@ def envelope_spectrum(
     channel_or_rate_hz: str | float = "",
     *,
     band_hz: tuple[float, float] | None = None,
+    kind: EnvelopeKind = "squared",
+    window: str = "hann",
+    scaling: Scaling = "amplitude peak",
     highest_hz: float | None = None,
 ) -> Spectrum:
-    """Return the amplitude spectrum (peak, Hann window) of an envelope over frequency, its mean removed.
+    """Return the spectrum of an envelope over frequency, its mean removed.
 
     Parameters
     ----------
@@ -155,8 +159,12 @@ def envelope_spectrum(
     channel_or_rate_hz : str or float
         The channel of a recording; of an array its sampling rate in Hz.
     band_hz : (float, float) or None
-        Of a recording or an array: the band whose squared envelope is taken; None takes the most impulsive one of the
-        signal's kurtogram, at least three times as wide as `highest_hz`.
+        Of a recording or an array: the band whose envelope is taken; None takes the most impulsive one of the signal's
+        kurtogram, at least three times as wide as `highest_hz`.
+    kind : str
+        Of that envelope, see `band_envelope`.
+    window, scaling : str
+        As in `amplitude_spectrum`.
     highest_hz : float or None
         Lines above it are left out.
 
@@ -173,9 +181,15 @@ def envelope_spectrum(
         x, fs, unit, source = named_signal(signal, channel_or_rate_hz, "", "")
         if band_hz is None:
             band_hz = kurtogram(x, fs).best_band(narrowest_hz=3.0 * (highest_hz or 0.0)).band_hz
-        envelope = band_envelope(x, fs, band_hz, unit=unit, source=source)
-    values, rate_hz = envelope.values - envelope.values.mean(), envelope.sampling_rate_hz
-    spectrum = amplitude_spectrum(values, rate_hz, unit=envelope.unit, source=envelope.source)
+        envelope = band_envelope(x, fs, band_hz, kind=kind, unit=unit, source=source)
+    spectrum = amplitude_spectrum(
+        envelope.values - envelope.values.mean(),
+        envelope.sampling_rate_hz,
+        unit=envelope.unit,
+        source=envelope.source,
+        window=window,
+        scaling=scaling,
+    )
     if highest_hz is None:
         return spectrum
     n_lines = np.searchsorted(spectrum.positions, positive(highest_hz, "highest_hz", "Hz"), side="right")
@@ -186,7 +200,9 @@ def envelope_recording(
     recording: Recording,
     band_hz: tuple[float, float],
     *,
+    channels: Iterable[str] | None = None,
     kind: EnvelopeKind = "squared",
+    edge_fraction: float = 0.1,
     transforms: Mapping[str, ComplexArray] | None = None,
     highest_hz: float | None = None,
 ) -> Recording:
@@ -197,9 +213,9 @@ def envelope_recording(
     channel's `joined_ends`, all or none of them continued, where several bands of one recording are wanted;
     `highest_hz` is as of `band_envelope`.
     """
-    names = recording.vibration_names()
+    names = tuple(channels) if channels is not None else recording.vibration_names()
     if not names:
-        raise InputError("there is no vibration channel to take the envelope of")
+        raise InputError("there is no channel to take the envelope of", remedy="name the channels")
     old = [recording.channels[recording.index(name)] for name in names]
     continued = transforms is None and not all(ends_meet(recording.values(name)) for name in names)
     envelopes = [
@@ -208,6 +224,7 @@ def envelope_recording(
             recording.sampling_rate_hz,
             band_hz,
             kind=kind,
+            edge_fraction=edge_fraction,
             unit=c.unit,
             source=c.name,
             transform=None if transforms is None else transforms[c.name],
@@ -485,10 +502,13 @@ def kurtogram_envelope(
     n_levels: int | None = None,
     preparation: Preparation = "none",
     narrowest_hz: float = 0.0,
+    lowest_hz: float = 0.0,
+    highest_hz: float | None = None,
     highest_modulation_hz: float | None = None,
+    kind: EnvelopeKind = "squared",
     band_hz: tuple[float, float] | None = None,
 ) -> ChosenBand:
-    """Return the squared envelope's spectrum in the band that the channel's own kurtogram chooses, or in a given one.
+    """Return the envelope spectrum in the band that the channel's own kurtogram chooses, or in a given one.
 
     Parameters
     ----------
@@ -496,13 +516,15 @@ def kurtogram_envelope(
     channel : str
     n_levels, preparation
         As in `kurtogram`. The envelope is that of the prepared signal.
-    narrowest_hz : float
+    narrowest_hz, lowest_hz, highest_hz : float
         As in `Kurtogram.best_band`.
     highest_modulation_hz : float or None
         Lines of the envelope spectrum above it are left out; the band is at least three times as wide.
+    kind : str
+        Of the envelope, "squared" or "magnitude".
     band_hz : (float, float) or None
-        Overrides the choice, which is the whole spectrum only where no part of it fits; `narrowest_hz` then means
-        nothing.
+        Overrides the choice, which is the whole spectrum only where no part of it fits; `narrowest_hz`, `lowest_hz` and
+        `highest_hz` then mean nothing.
 
     Returns
     -------
@@ -529,15 +551,16 @@ def kurtogram_envelope(
         narrowest_hz = max(narrowest_hz, 3.0 * highest)
     reason = ""
     if band_hz is None:
-        band = grid.best_band(narrowest_hz=narrowest_hz)
+        best = partial(grid.best_band, narrowest_hz=narrowest_hz, lowest_hz=lowest_hz, highest_hz=highest_hz)
+        band = best()
         if band.level == 0:  # the envelope of everything mixes in low lines: the best part, if one fits
             with suppress(RefusalError):
-                band = grid.best_band(narrowest_hz=narrowest_hz, with_whole=False)
+                band = best(with_whole=False)
         reason = _reason(grid, band, narrowest_hz, of_modulation=highest_modulation_hz is not None)
     else:
         band = _given_band(x, fs, band_hz)
     unit = "" if preparation == "whitened" else unit
-    envelope = band_envelope(x, fs, band.band_hz, unit=unit, source=channel)
+    envelope = band_envelope(x, fs, band.band_hz, kind=kind, unit=unit, source=channel)
     spectrum = envelope_spectrum(envelope, highest_hz=highest_modulation_hz)
     return ChosenBand(band, grid, envelope, spectrum, grid.warnings(band), reason)
 
@@ -589,9 +612,6 @@ def _given_band(values: FloatArray, sampling_rate_hz: float, band_hz: tuple[floa
 LARGEST_SLIP = 0.02
 """Relative distance at which a modulation's lines are sought: bearings turn that far from their kinematic orders."""
 
-N_HARMONICS = 3
-"""Of a modulation, by which it is known."""
-
 
 @dataclass(frozen=True)
 class BandChoice:
@@ -627,11 +647,15 @@ def compare_bands(
     signal: FloatArray | Recording,
     channel_or_rate_hz: str | float,
     modulation_hz: float,
+    *,
+    n_harmonics: int = 3,
+    slip: float = LARGEST_SLIP,
+    preparation: Preparation = "tones removed",
 ) -> tuple[BandChoice, ...]:
-    r"""Return the ways to look at a modulation of known frequency in a signal without its tones, the clearest first.
+    r"""Return the ways to look at a modulation of known frequency, the clearest first.
 
-    Clarity is :math:`\frac{1}{K} \sum_k 20 \lg (A(k\alpha)/F(k\alpha))` over the first K = 3 harmonics, A the line and
-    F the floor of the same spectrum; of the squared coherence, a power, 10 lg.
+    Clarity is :math:`\frac{1}{K} \sum_k 20 \lg (A(k\alpha)/F(k\alpha))` over the first K harmonics, A the line and F
+    the floor of the same spectrum; of the squared coherence, a power, 10 lg.
 
     Parameters
     ----------
@@ -639,7 +663,12 @@ def compare_bands(
     channel_or_rate_hz : str or float
         The channel of a recording; of an array its sampling rate in Hz.
     modulation_hz : float
-        The modulation frequency, e.g. how often elements pass a race; it is sought within 2 %.
+        The modulation frequency, e.g. how often elements pass a race.
+    n_harmonics : int
+    slip : float
+        Relative range about it.
+    preparation : str
+        See `prepared_signal`.
 
     Returns
     -------
@@ -662,27 +691,29 @@ def compare_bands(
     (IESFOgram)", 2020 (band by the coherence at the modulation frequency).
     """
     x, fs, _, _ = named_signal(signal, channel_or_rate_hz, "", "", minimum=64)
-    alpha = positive(modulation_hz, "modulation_hz", "Hz")
-    x, highest = prepared_signal(x, fs, "tones removed"), (N_HARMONICS + 0.5) * alpha
+    alpha, n = positive(modulation_hz, "modulation_hz", "Hz"), count(n_harmonics, "n_harmonics")
+    x, highest = prepared_signal(x, fs, preparation), (n + 0.5) * alpha
     coherence = spectral_coherence(x, fs, highest_alpha_hz=highest)
     lowest_hz = float(coherence.frequency_hz[0])
     choices = [
-        _choice("plain", (lowest_hz, 0.49 * fs), x, fs, alpha),
-        _choice("coherence band", coherence_band(coherence, alpha), x, fs, alpha),
+        _choice("plain", (lowest_hz, 0.49 * fs), x, fs, alpha, n, slip),
+        _choice("coherence band", coherence_band(coherence, alpha, n_harmonics=n, slip=slip), x, fs, alpha, n, slip),
     ]
     try:
         band = kurtogram(x, fs).best_band(narrowest_hz=3 * highest)
     except RefusalError:
         pass  # no band is wide enough for the modulation's harmonics
     else:
-        choices.append(_choice("kurtogram", band.band_hz, x, fs, alpha))
+        choices.append(_choice("kurtogram", band.band_hz, x, fs, alpha, n, slip))
     enhanced = enhanced_envelope(coherence)
-    clarity, rates = _clarity(enhanced.spectrum, alpha, power=True)
+    clarity, rates = _clarity(enhanced.spectrum, alpha, n, slip, power=True)
     choices.append(BandChoice("enhanced", enhanced.band_hz, clarity, rates, enhanced.spectrum))
     return tuple(sorted(choices, key=lambda choice: -choice.clarity_db))
 
 
-def coherence_band(coherence: SpectralCoherence, modulation_hz: float) -> tuple[float, float]:
+def coherence_band(
+    coherence: SpectralCoherence, modulation_hz: float, *, n_harmonics: int = 3, slip: float = LARGEST_SLIP
+) -> tuple[float, float]:
     r"""Return the band of carriers in which the coherence at a modulation frequency's harmonics stands out most.
 
     .. math:: \max_{a, b} \; \frac{1}{\sqrt{b - a}} \sum_{i=a}^{b} \Big( \sum_k \gamma^2(k\alpha, f_i) - K/M \Big)
@@ -693,7 +724,10 @@ def coherence_band(coherence: SpectralCoherence, modulation_hz: float) -> tuple[
     ----------
     coherence : SpectralCoherence
     modulation_hz : float
-        In the unit of its cyclic axis, Hz or orders; the clearest within 2 % is taken.
+        In the unit of its cyclic axis: Hz or orders.
+    n_harmonics : int
+    slip : float
+        Relative range about it, from which the clearest is taken.
 
     Returns
     -------
@@ -702,11 +736,10 @@ def coherence_band(coherence: SpectralCoherence, modulation_hz: float) -> tuple[
     """
     alpha, f = coherence.alpha, coherence.frequency_hz
     spacing = coherence.alpha_resolution
-    n_lines = int(2 * LARGEST_SLIP * N_HARMONICS * modulation_hz / spacing)
-    factors = np.linspace(1 - LARGEST_SLIP, 1 + LARGEST_SLIP, max(3, n_lines * 2 + 1))
+    factors = np.linspace(1 - slip, 1 + slip, max(3, int(2 * slip * n_harmonics * modulation_hz / spacing) * 2 + 1))
     best, best_band = -np.inf, (0, len(f))
     for factor in factors:
-        places = modulation_hz * factor * np.arange(1, N_HARMONICS + 1)
+        places = modulation_hz * factor * np.arange(1, n_harmonics + 1)
         rows = np.rint((places - alpha[0]) / spacing).astype(np.int64)
         rows = rows[(rows >= 0) & (rows < len(alpha))]
         if not len(rows):
@@ -725,25 +758,26 @@ def coherence_band(coherence: SpectralCoherence, modulation_hz: float) -> tuple[
     return max(low, 0.0), high
 
 
-def _choice(method: str, band_hz: tuple[float, float], x: FloatArray, fs: float, alpha: float) -> BandChoice:
-    highest = (N_HARMONICS + 0.5) * alpha
-    width = max(band_hz[1] - band_hz[0], 2.5 * highest)  # an envelope moves no faster than its band is wide
+def _choice(
+    method: str, band_hz: tuple[float, float], x: FloatArray, fs: float, alpha: float, n: int, slip: float
+) -> BandChoice:
+    width = max(band_hz[1] - band_hz[0], 2.5 * (n + 0.5) * alpha)  # an envelope moves no faster than its band is wide
     middle = min(max(sum(band_hz) / 2, width / 2), fs / 2 - width / 2)
     band_hz = (max(middle - width / 2, 0.0), min(middle + width / 2, fs / 2))
-    spectrum = envelope_spectrum(x, fs, band_hz=band_hz, highest_hz=highest)
-    clarity, rates = _clarity(spectrum, alpha, power=False)
+    spectrum = envelope_spectrum(x, fs, band_hz=band_hz, highest_hz=(n + 0.5) * alpha)
+    clarity, rates = _clarity(spectrum, alpha, n, slip, power=False)
     return BandChoice(method, band_hz, clarity, rates, spectrum)
 
 
-def _clarity(spectrum: Spectrum, alpha: float, *, power: bool) -> tuple[float, float]:
+def _clarity(spectrum: Spectrum, alpha: float, n: int, slip: float, *, power: bool) -> tuple[float, float]:
     """Return the mean height of the harmonics over the floor in dB, and the frequency at which it is largest."""
     values = np.sqrt(spectrum.values) if power else spectrum.values
     amplitudes = replace(spectrum, values=values, scaling="amplitude peak")
     floor = np.maximum(noise_floor(amplitudes).values, 1e-300)
     db = 20 * np.log10(np.maximum(values, 1e-300) / floor)
-    step = spectrum.resolution / (2 * N_HARMONICS * alpha)
-    factors = np.arange(1 - LARGEST_SLIP, 1 + LARGEST_SLIP + step, step)
-    places = alpha * factors[:, None] * np.arange(1, N_HARMONICS + 1)
+    step = spectrum.resolution / (2 * n * alpha)
+    factors = np.arange(1 - slip, 1 + slip + step, step)
+    places = alpha * factors[:, None] * np.arange(1, n + 1)
     rows = np.rint((places - spectrum.positions[0]) / spectrum.resolution).astype(np.int64)
     heights = db[np.clip(rows, 0, len(db) - 1)].mean(axis=1)
     best = int(np.argmax(heights))
