@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import cos, floor, pi, sin, sqrt
 from typing import Any
@@ -441,8 +441,6 @@ def respond(
     step_s: float | None = None,
     stride: int = 1,
     first: PairState | None = None,
-    on_progress: Callable[[float], None] | None = None,
-    steps_per_call: int = STEPS_PER_CALL,
 ) -> Response:
     """Integrate the sixteen coordinates from the static balance on, or from where another run ended.
 
@@ -464,10 +462,6 @@ def respond(
         Every how many steps a point is kept.
     first : PairState or None
         `Response.last` of another run; None: the static balance at `start_s`.
-    on_progress : callable or None
-        Called now and then with the part that is done, 0 to 1.
-    steps_per_call : int
-        Of compiled code between two of these calls.
 
     Raises
     ------
@@ -482,7 +476,7 @@ def respond(
     for that step.
     """
     step = default_step_s(machine, operation) if step_s is None else step_s
-    plan = RunPlan(start_s, duration_s, step, stride, steps_per_call)
+    plan = RunPlan(start_s, duration_s, step, stride, STEPS_PER_CALL)
     ready = prepare(machine, operation, rng, start_s, first)
     q, v = ready.q.copy(), ready.v.copy()  # the kernel overwrites them
     set_angle = q[:1].copy() if first is None else np.array([first.set_angle_rad])
@@ -515,7 +509,6 @@ def respond(
         signals,
         with_energy=False,
         remedy="look for stiffness, damping and inertia that do not go together, or give a shorter step_s",
-        on_progress=on_progress,
     )
     last = PairState(q, v, float(set_angle[0]))
     return Response(start_s, step * stride, kept, step, energies, last)

@@ -224,6 +224,10 @@ class PairResponse(Result, Generic[State], columns=("time_s", "signals")):
         )
 
 
+MAX_STEPS = 400_000_000
+"""Ten minutes to half an hour of computing or so; more is taken for a mistake."""
+
+
 @dataclass(frozen=True)
 class RunPlan:
     """Steps of a run, and which of them are kept.
@@ -235,8 +239,6 @@ class RunPlan:
         Every how many steps a point is kept.
     steps_per_call : int
         After these many compiled code comes back for a look whether it is to stop.
-    max_steps : int
-        Ten minutes to half an hour of computing or so; more is taken for a mistake.
     """
 
     start_s: float
@@ -244,17 +246,16 @@ class RunPlan:
     step_s: float
     stride: int
     steps_per_call: int
-    max_steps: int = 400_000_000
 
     def __post_init__(self) -> None:
         positive(self.duration_s, "duration_s", "s")
         positive(self.step_s, "step_s", "s")
         count(self.stride, "stride")
-        if self.n_steps > self.max_steps:
+        if self.n_steps > MAX_STEPS:
             raise InputError(
                 f"{self.n_steps:.3g} steps of {self.step_s:.3g} s",
                 where="duration_s",
-                allowed=f"at most {self.max_steps:.0e} steps",
+                allowed=f"at most {MAX_STEPS:.0e} steps",
                 remedy="simulate a shorter time, or in parts",
             )
 
@@ -264,13 +265,7 @@ class RunPlan:
         return ceil(self.duration_s / self.step_s - 1e-9)
 
     def run(
-        self,
-        march: March,
-        signals: Sequence[str],
-        *,
-        with_energy: bool,
-        remedy: str,
-        on_progress: Callable[[float], None] | None,
+        self, march: March, signals: Sequence[str], *, with_energy: bool, remedy: str
     ) -> tuple[dict[str, FloatArray], FloatArray]:
         """Return the signals by name, and the energies where they are asked for.
 
@@ -295,8 +290,6 @@ class RunPlan:
                     f"at a step of {self.step_s:.3g} s",
                     remedy=remedy,
                 )
-            if on_progress is not None:
-                on_progress((begun + n) / n_steps)
         return dict(zip(signals, rows.T, strict=True)), energies
 
 
@@ -416,8 +409,6 @@ class MeasuredRun(Generic[State]):
         Rate of the motion at least that is handed to the measurement chain.
     noise_rng : numpy.random.Generator or None
         For the chain, instead of the stream made of `rng`: the same machine with other noise.
-    on_progress : callable or None
-        Called now and then with the part of the motion that is done, 0 to 1.
     """
 
     rng: np.random.Generator
@@ -431,7 +422,6 @@ class MeasuredRun(Generic[State]):
     before: PairResponse[State] | None = None
     min_motion_hz: float = MIN_MOTION_HZ
     noise_rng: np.random.Generator | None = None
-    on_progress: Callable[[float], None] | None = None
 
     def streams(self) -> tuple[np.random.Generator, np.random.Generator]:
         """Return the generators of the machine and of the chain; to be called once."""
@@ -503,7 +493,6 @@ class Measurement(Generic[State]):
             "step_s": self.step_s,
             "stride": self.stride,
             "first": self.run.first,
-            "on_progress": self.run.on_progress,
         }
 
     @property

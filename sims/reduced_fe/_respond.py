@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import pi
@@ -185,8 +185,6 @@ def respond(
     with_energy: bool = False,
     first: FlexState | None = None,
     ready: FlexiblePairConstants | None = None,
-    on_progress: Callable[[float], None] | None = None,
-    steps_per_call: int = STEPS_PER_CALL,
 ) -> FlexResponse:
     """Integrate from the static balance on, or from where another run ended.
 
@@ -212,10 +210,6 @@ def respond(
         `FlexResponse.last` of another run; None: the static balance at `start_s`.
     ready : FlexiblePairConstants or None
         Of this pair and operation, where they are at hand.
-    on_progress : callable or None
-        Called now and then with the part that is done, 0 to 1.
-    steps_per_call : int
-        Of compiled code between two of these calls.
 
     Raises
     ------
@@ -225,7 +219,7 @@ def respond(
         If the solution grows beyond all bounds.
     """
     step = positive(step_s, "step_s", "s")
-    plan = RunPlan(start_s, duration_s, step, stride, steps_per_call)
+    plan = RunPlan(start_s, duration_s, step, stride, STEPS_PER_CALL)
     pair_constants = constants(pair, operation) if ready is None else ready
     lines = _lines(pair_constants, signals)
     coefficients = np.array(
@@ -258,7 +252,6 @@ def respond(
         signals,
         with_energy=with_energy,
         remedy="lower mesh_damping_ratio, look for inertias that do not go together, or give a shorter step",
-        on_progress=on_progress,
     )
     return FlexResponse(start_s, step * stride, kept, step, energies, FlexState(*state))
 
