@@ -282,15 +282,13 @@ def crack_added_m_per_n(gear: ReducedGear, crack: RootCrack) -> FloatArray:
     Raises
     ------
     InputError
-        If the crack goes past the tooth, its front is not straight, or the mesh cannot follow it.
+        If the crack goes past the tooth, or the mesh cannot follow it.
 
     Notes
     -----
     Cracks of the ready-made gears at 45° come with the product. Others take seconds once and are kept on disk.
     """
     check_crack(gear.blank.geometry, crack)
-    if crack.front != "straight":
-        raise InputError("front of the crack is 'parabolic'", allowed="straight", remedy="give the mean depth")
     added = _at_depth(gear, crack)
     face_mm = gear.blank.geometry.face_width_mm
     if crack.width_mm is None or crack.width_mm >= face_mm:

@@ -13,7 +13,7 @@ from gearsig.compiled import njit
 from gearsig.errors import InputError
 from gearsig.results import Result
 from sims.mesh._geometry import Material, flexibility_per_pa
-from sims.mesh._mesh_stiffness import MeshTable, share_torque
+from sims.mesh._mesh_stiffness import share_torque
 from sims.mesh._stiffness import GearMesh
 
 MAX_FRICTION = 0.3
@@ -310,8 +310,6 @@ def friction_over_mesh(
     viscosity_cp: float,
     roughness_um: float,
     mesh_cycles: FloatArray | None = None,
-    *,
-    table: MeshTable | None = None,
 ) -> MeshFriction:
     """Friction coefficient and force of each pair, with the load it carries in static equilibrium.
 
@@ -324,15 +322,13 @@ def friction_over_mesh(
         As for `friction_coefficient`.
     mesh_cycles : array or None
         c; None: 200 points of one cycle.
-    table : MeshTable or None
-        Of this mesh, if it is at hand.
 
     Notes
     -----
     Friction does not act back on the load sharing here. The pressure is that of smooth flanks of full width. A pair of
     helical teeth counts as in contact where the middle of its face is.
     """
-    shared = share_torque(mesh, torque_nm, mesh_cycles, table=table)
+    shared = share_torque(mesh, torque_nm, mesh_cycles)
     u_1, u_2, radius_m = _speeds_and_radius(mesh, shared.mesh_cycles, positive(speed_rpm, "speed_rpm", "rpm"))
     normal = shared.pair_forces_n
     sliding, entrainment = u_2 - u_1, 0.5 * (u_1 + u_2)

@@ -269,11 +269,7 @@ def one_mesh_cycle(n_points: int = 200) -> FloatArray:
 
 
 def mesh_stiffness(
-    mesh: GearMesh,
-    mesh_cycles: FloatArray | None = None,
-    force_n: float | None = None,
-    *,
-    table: MeshTable | None = None,
+    mesh: GearMesh, mesh_cycles: FloatArray | None = None, force_n: float | None = None
 ) -> MeshStiffness:
     """Stiffness of the mesh along the line of action.
 
@@ -288,8 +284,6 @@ def mesh_stiffness(
         Mesh force, above 0. None: every pair on the path of contact touches (separations do not count, so that a chip
         or a spall over the whole face does not show), for the linear contact law only. Given: the tangent stiffness of
         the pairs that carry at that force.
-    table : MeshTable or None
-        Of this mesh, if it is at hand: making one takes longer than reading it.
 
     Returns
     -------
@@ -301,7 +295,7 @@ def mesh_stiffness(
         Without a force if the contact stiffens with the load.
     """
     cycles = one_mesh_cycle() if mesh_cycles is None else frozen_array(mesh_cycles, "mesh_cycles", ndim=1)
-    table = mesh_table(mesh) if table is None else table
+    table = mesh_table(mesh)
     compliance, separation, weight = pair_states(table, cycles)
     if force_n is None:
         if table.load_dependent:
@@ -410,15 +404,12 @@ def _tangents(table: MeshTable, compliance: FloatArray, weight: FloatArray, forc
 # Compiled: what each pair carries. Imported only where it is used, since it loads the compiler.
 
 
-@njit(cache=True)
-def engagement(progress: float, contact_ratio: float, ramp: float) -> float:
-    """Part of its stiffness a pair has: 0 outside, 1 inside, with a quintic step of width `ramp` at either end."""
-    return float(engagement_and_slope(progress, 0.0, contact_ratio, ramp)[0])
-
-
 @njit(cache=True, nogil=True, error_model="numpy")
 def engagement_and_slope(progress: float, late: float, contact_ratio: float, ramp: float) -> tuple[float, float]:
-    """(w, ∂w/∂ζ) of `engagement`, for a pair that enters `late` base pitches late."""
+    """(w, ∂w/∂ζ): part of its stiffness that a pair has, and its slope; it enters `late` base pitches late.
+
+    0 outside, 1 inside, with a quintic step of width `ramp` at either end.
+    """
     if ramp <= 0.0:
         return (1.0 if late <= progress <= contact_ratio else 0.0), 0.0
     rise, rise_slope = _smooth((progress - late) / ramp + 0.5)
@@ -581,7 +572,7 @@ def fill_pairs(
             k, s = newest - j // n_slices, j % n_slices
             progress = mesh_cycles[row] - k - late[s]
             tooth_1, tooth_2 = k % teeth[0], k % teeth[1]
-            weight[row, j] = engagement(progress, contact_ratio, ramp)
+            weight[row, j] = engagement_and_slope(progress, 0.0, contact_ratio, ramp)[0]
             if weight[row, j] == 0.0 and n_slices > 1:  # far beyond the table, too
                 compliance[row, j], separation[row, j] = n_slices * curves[of[0, tooth_1], 1], 0.0
                 continue

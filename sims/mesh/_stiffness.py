@@ -335,15 +335,9 @@ def cracked_tooth_compliance(
     """
     check_crack(gear, crack)
     width = face_width_m if crack.width_mm is None else min(crack.width_mm * 1e-3, face_width_m)
-    part, weight = np.array([0.0]), np.array([1.0])
-    if crack.front == "parabolic":
-        part, weight = _gauss(12)
-    stiffness = np.zeros(np.shape(np.atleast_1d(roll_rad)))
+    stiffness = width / tooth_compliance(gear, material, roll_rad, (crack.depth_mm, crack.angle_deg)).total
     if width < face_width_m:
         stiffness += (face_width_m - width) / tooth_compliance(gear, material, roll_rad).total
-    for p, w in zip(part, weight, strict=True):
-        depth = crack.depth_mm * float(np.sqrt(1.0 - p))
-        stiffness += width * w / tooth_compliance(gear, material, roll_rad, (depth, crack.angle_deg)).total
     result: FloatArray = 1.0 / stiffness
     return result
 
