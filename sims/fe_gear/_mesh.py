@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import pi
 from typing import Any, NamedTuple
 
@@ -260,16 +260,28 @@ def sector_mesh(blank: GearBlank, size: MeshSize, crack: CrackLine | None = None
     n_layers = len(layers_mm)
     in_plane = np.repeat(plane.points_mm, n_layers, axis=0)
     points = np.column_stack((in_plane, np.tile(layers_mm, len(plane.points_mm)))) * 1e-3
-    every = _extruded(plane.cells, n_layers, range(0, n_layers - 1, 2))
-    cells = every
-    if web != (0, n_layers - 1):
-        web_cells = _extruded(plane.cells[: plane.n_web_cells], n_layers, range(web[0], web[1], 2))
-        cells = np.concatenate(
-            (web_cells, _extruded(plane.cells[plane.n_web_cells :], n_layers, range(0, n_layers - 1, 2)))
+    web_cells = _extruded(plane.cells[: plane.n_web_cells], n_layers, range(web[0], web[1], 2))
+    other_cells = _extruded(plane.cells[plane.n_web_cells :], n_layers, range(0, n_layers - 1, 2))
+    cells = np.concatenate((web_cells, other_cells))
+
+    def place(nodes: IntArray) -> IntArray:
+        spread: IntArray = nodes[..., None] * n_layers + np.arange(n_layers)
+        return spread
+
+    low, high, bore, tooth = (place(nodes) for nodes in (plane.low_side, plane.high_side, plane.bore, plane.tooth))
+    step = 3 - size.order  # eight-node cells stand between the corners of the 27-node ones
+    mesh = _of_used_nodes(
+        SectorMesh(
+            blank,
+            size,
+            points,
+            cells[:, ::step, ::step, ::step],
+            low.ravel(),
+            high.ravel(),
+            bore[::step, ::step],
+            tooth[::step, ::step, ::step],
         )
-    mesh = _without_loose_nodes(blank, size, points, cells, plane, n_layers)
-    if size.order == 1:
-        mesh = _corners_alone(mesh)
+    )
     check_jacobians(mesh)
     return mesh
 
@@ -290,46 +302,19 @@ def _extruded(plane_cells: IntArray, n_layers: int, starts: range) -> IntArray:
     return cells.reshape(-1, 3, 3, 3)
 
 
-def _without_loose_nodes(
-    blank: GearBlank, size: MeshSize, points: FloatArray, cells: IntArray, plane: SectorPlane, n_layers: int
-) -> SectorMesh:
+def _of_used_nodes(mesh: SectorMesh) -> SectorMesh:
     """Renumber so that only nodes that belong to a cell are left: beside a web there are none."""
-    used = np.zeros(len(points), dtype=bool)
-    used[cells] = True
-    number = np.cumsum(used) - 1
-
-    def place(nodes: IntArray) -> IntArray:
-        spread: IntArray = nodes[..., None] * n_layers + np.arange(n_layers)
-        return spread
-
-    low, high = place(plane.low_side).ravel(), place(plane.high_side).ravel()
-    return SectorMesh(
-        blank,
-        size,
-        points[used],
-        number[cells],
-        number[low[used[low]]],
-        number[high[used[high]]],
-        number[place(plane.bore)],
-        number[place(plane.tooth)],
-    )
-
-
-def _corners_alone(mesh: SectorMesh) -> SectorMesh:
-    """Return the mesh of eight-node cells between the corners of the 27-node ones."""
-    corners = mesh.cells[:, ::2, ::2, ::2]
     used = np.zeros(mesh.n_nodes, dtype=bool)
-    used[corners] = True
+    used[mesh.cells] = True
     number = np.cumsum(used) - 1
-    return SectorMesh(
-        mesh.blank,
-        mesh.size,
-        mesh.points_m[used],
-        number[corners],
-        number[mesh.low_side[used[mesh.low_side]]],
-        number[mesh.high_side[used[mesh.high_side]]],
-        number[mesh.bore[::2, ::2]],
-        number[mesh.tooth[::2, ::2, ::2]],
+    return replace(
+        mesh,
+        points_m=mesh.points_m[used],
+        cells=number[mesh.cells],
+        low_side=number[mesh.low_side[used[mesh.low_side]]],
+        high_side=number[mesh.high_side[used[mesh.high_side]]],
+        bore=number[mesh.bore],
+        tooth=number[mesh.tooth],
     )
 
 
@@ -476,16 +461,6 @@ def line_weights(nodes: FloatArray, low: float, high: float, order: int = 2) -> 
         weights[k : k + order + 1] += _shape((at - start) / (end - start), order) @ share
         if low == high:
             break
-    return weights
-
-
-def whole_weights(places: FloatArray, order: int = 2) -> FloatArray:
-    """Weights of the integral over a whole line, divided by its length: they add up to 1. Simpson's or trapezoids."""
-    weights = np.zeros(len(places))
-    share = np.array([1.0, 4.0, 1.0]) / 6.0 if order == 2 else np.array([0.5, 0.5])
-    for k in range(0, len(places) - order, order):
-        weights[k : k + order + 1] += (places[k + order] - places[k]) * share
-    weights /= places[-1] - places[0]
     return weights
 
 

@@ -37,6 +37,7 @@ from sims.fe_gear._cyclic import (
     Held,
     cyclic_modes,
     hub_sum,
+    real_values,
 )
 from sims.fe_gear._mesh import IntArray, SectorMesh, line_weights, mesh_quality, parabolic_weights, sector_mesh
 from sims.mesh import GearGeometry, involute_outline
@@ -609,17 +610,14 @@ def _real_modes(
     gear: CyclicGear, modes: CyclicModes, rows: FloatArray
 ) -> tuple[FloatArray, IntArray, FloatArray, FloatArray]:
     """Cosine and sine modes at the flank points of tooth 0 and at the hub."""
-    frequencies, diameters, at_flanks, at_hub = [], [], [], []
-    for k, n in enumerate(modes.nodal_diameters):
-        flank = rows @ modes.shapes[:, k]
-        hub = hub_sum(int(n), gear.n_sectors) @ (gear.hub @ modes.shapes[:, k])
-        parts = (np.real, np.imag) if 0 < 2 * n < gear.n_sectors else (np.real,)
-        for part in parts:
-            frequencies.append(modes.frequencies_hz[k])
-            diameters.append(n)
-            at_flanks.append(part(flank))
-            at_hub.append(part(hub))
-    return np.array(frequencies), np.array(diameters), np.array(at_flanks), np.array(at_hub)
+    z, shares, multiplicity = gear.n_sectors, gear.hub @ modes.shapes, modes.multiplicity(gear.n_sectors)
+    at_hub = [hub_sum(int(n), z) @ share for n, share in zip(modes.nodal_diameters, shares.T, strict=True)]
+    return (
+        np.repeat(modes.frequencies_hz, multiplicity),
+        np.repeat(modes.nodal_diameters, multiplicity),
+        real_values(rows @ modes.shapes, multiplicity).T,
+        real_values(np.column_stack(at_hub), multiplicity).T,
+    )
 
 
 # Reduced gears on disk, under the key of what made them: arrays without pickles, whole or not at all.
@@ -710,7 +708,7 @@ def read_gear(path: str | Path) -> ReducedGear:
         ) from error
 
 
-def cached_gear(blank: GearBlank, plan: ReductionPlan, folder: str | Path | None = None) -> ReducedGear:
+def cached_gear(blank: GearBlank, plan: ReductionPlan) -> ReducedGear:
     """Return a reduced gear from the cache, or reduce it and keep it there.
 
     A file that is damaged is made again: it holds nothing that cannot be. One that another version of the code made is
@@ -720,28 +718,23 @@ def cached_gear(blank: GearBlank, plan: ReductionPlan, folder: str | Path | None
     ----------
     blank : GearBlank
     plan : ReductionPlan
-    folder : path or None
-        None: `gearsig.cache.cache_folder("gears")`.
 
     Raises
     ------
     OtherVersionError
         If another version of the code kept this gear.
     InputError
-        If the gear cannot be reduced, or the folder not written.
+        If the gear cannot be reduced.
     """
-    path = (cache_folder("gears") if folder is None else Path(folder)) / f"{gear_name(blank, plan)}.npz"
+    path = cache_folder("gears") / f"{gear_name(blank, plan)}.npz"
     try:
         kept = read_gear(path)
     except OtherVersionError:
         raise
     except InputError:  # not there, or damaged
         gear = reduce_gear(blank, plan)
-        if folder is not None:
+        with suppress(InputError):  # the cache folder cannot be written: the next process reduces it again
             write_gear(path, gear)
-        else:
-            with suppress(InputError):  # the cache folder cannot be written: the next process reduces it again
-                write_gear(path, gear)
         return gear
     if kept.key != gear_key(blank, plan):
         raise OtherVersionError(
