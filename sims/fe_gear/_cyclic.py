@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from gearsig.checks import FloatArray, count, frozen_array
 from gearsig.errors import InputError
 from gearsig.results import Result
-from sims.fe_gear._mesh import IntArray, SectorMesh, line_weights, sector_matrices
+from sims.fe_gear._mesh import IntArray, SectorMesh, sector_matrices, whole_weights
 
 # A sector is its own mirror image: in the right coordinates its Hermitian matrices are real.
 
@@ -173,9 +173,9 @@ def hub_sum(n: int, n_sectors: int) -> ComplexArray:
 
 def _surface_weights(mesh: SectorMesh) -> FloatArray:
     """Part of the sector's bore area that belongs to each own node, raveled; they add up to 1."""
-    columns, layers = np.linspace(0.0, 1.0, mesh.bore.shape[0]), mesh.points_m[mesh.bore[0], 2]
-    around, along = (line_weights(line, line[0], line[-1], mesh.size.order) for line in (columns, layers))
+    around = whole_weights(np.linspace(0.0, 1.0, mesh.bore.shape[0]), mesh.size.order)
     around[0] += around[-1]
+    along = whole_weights(mesh.points_m[mesh.bore[0], 2], mesh.size.order)
     weights: FloatArray = np.outer(around[:-1], along).ravel()
     return weights
 

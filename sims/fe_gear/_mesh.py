@@ -464,6 +464,16 @@ def line_weights(nodes: FloatArray, low: float, high: float, order: int = 2) -> 
     return weights
 
 
+def whole_weights(places: FloatArray, order: int = 2) -> FloatArray:
+    """Weights of the integral over a whole line, divided by its length: they add up to 1. Simpson's or trapezoids."""
+    weights = np.zeros(len(places))
+    share = np.array([1.0, 4.0, 1.0]) / 6.0 if order == 2 else np.array([0.5, 0.5])
+    for k in range(0, len(places) - order, order):
+        weights[k : k + order + 1] += (places[k + order] - places[k]) * share
+    weights /= places[-1] - places[0]
+    return weights
+
+
 def parabolic_weights(n_nodes: int, order: int = 2) -> FloatArray:
     """Weights of the mean over equal cells from 0 to 1 with the density 6t(1 − t); they add up to 1."""
     weights = np.zeros(n_nodes)
