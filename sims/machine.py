@@ -9,7 +9,7 @@ from math import cos, isfinite, pi, radians, sin, sqrt
 
 import numpy as np
 
-from gearsig.checks import FloatArray, count, frozen_array, known_name, not_negative, one_of, positive, within
+from gearsig.checks import FloatArray, count, frozen_array, not_negative, one_of, positive, within
 from gearsig.compiled import UNCOUNTED, njit
 from gearsig.errors import InputError, RefusalError
 from gearsig.rig import Bearing, Rig
@@ -402,12 +402,6 @@ class Machine:
     def ratio(self) -> float:
         """Revolutions of the driver per revolution of the driven gear, z2/z1."""
         return self.mesh.pair.driven.teeth / self.mesh.pair.driver.teeth
-
-
-def bearing_index(machine: Machine, name: str) -> int:
-    """Place of a bearing in `machine.bearings` by its name."""
-    names = [support.bearing.name for support in machine.bearings]
-    return names.index(known_name(name, names, f"there is no bearing {name!r}"))
 
 
 # --------------------

@@ -335,12 +335,8 @@ def _frequencies_hz(m: FloatArray, k: FloatArray) -> FloatArray:
     return result
 
 
-def _fastest_rate_per_s(m: FloatArray, k: FloatArray, c: FloatArray) -> float:
-    """Largest magnitude of an eigenvalue of the damped machine: heavy dampers are as stiff as springs to a solver."""
-    return float(np.max(np.abs(_eigenvalues_per_s(m, k, c))))
-
-
 def _eigenvalues_per_s(m: FloatArray, k: FloatArray, c: FloatArray) -> NDArray[np.complex128]:
+    """Of the damped machine: heavy dampers are as stiff as springs to a solver."""
     n, per_mass = N_COORDINATES, 1.0 / np.diag(m)[:, None]
     state = np.zeros((2 * n, 2 * n))
     state[:n, n:] = np.eye(n)
@@ -365,7 +361,7 @@ def default_step_s(machine: Machine, operation: Operation, step_angle_rad: float
     """Step that stiffness, damping and tooth passage allow."""
     m, k, c = matrices(machine, mesh_force_n(machine, operation))
     fastest = 2.0 * pi * float(_frequencies_hz(m, k)[-1])
-    step = min(step_angle_rad / fastest, STABLE / _fastest_rate_per_s(m, k, c))
+    step = min(step_angle_rad / fastest, STABLE / float(np.abs(_eigenvalues_per_s(m, k, c)).max()))
     mesh_hz = operation.speed_rpm.largest / 60.0 * machine.mesh.pair.driver.teeth
     if mesh_hz > 0.0 and machine.mesh.ramp > 0.0:
         step = min(step, machine.mesh.ramp / mesh_hz / STEPS_PER_RAMP)

@@ -541,15 +541,17 @@ def _problem(gear: CyclicGear, n: int, held: Held) -> _Problem:
 
 
 def _lowest(problem: _Problem, n_shapes: int) -> tuple[FloatArray, ComplexArray]:
+    from scipy.linalg import eigh
     from scipy.sparse.linalg import LinearOperator, eigsh
 
     stiffness, mass = problem.stiffness, problem.mass
     inverse = LinearOperator(stiffness.shape, matvec=problem.solve, dtype=stiffness.dtype)
     start = np.random.default_rng(1).standard_normal(len(problem.kept)).astype(stiffness.dtype)
     _, vectors = eigsh(stiffness, n_shapes, M=mass, sigma=problem.shift, OPinv=inverse, v0=start, tol=1e-11)
-    values, shapes = _rayleigh_ritz(stiffness, mass, vectors)
+    small_k, small_m = (vectors.conj().T @ (matrix @ vectors) for matrix in (stiffness, mass))
+    values, turn = eigh(small_k, small_m)
     full = np.zeros((problem.n_own, n_shapes), dtype=np.complex128)
-    full[problem.kept] = shapes * np.sqrt(problem.scale)
+    full[problem.kept] = vectors @ turn * np.sqrt(problem.scale)
     return np.sqrt(np.maximum(values, 0.0)) / (2.0 * pi), _phased(np.asarray(problem.basis @ full))
 
 
@@ -578,17 +580,6 @@ def _limit(modes: list[tuple[float, int, ComplexArray]], n_modes: int, n_sectors
 
 def _multiplicity(n: int, n_sectors: int) -> int:
     return 1 if n == 0 or 2 * n == n_sectors else 2
-
-
-def _rayleigh_ritz(
-    stiffness: sparse.csc_array, mass: sparse.csc_array, vectors: np.ndarray[Any, Any]
-) -> tuple[FloatArray, np.ndarray[Any, Any]]:
-    from scipy.linalg import eigh
-
-    small_k = vectors.conj().T @ (stiffness @ vectors)
-    small_m = vectors.conj().T @ (mass @ vectors)
-    values, turn = eigh(small_k, small_m)
-    return values, vectors @ turn
 
 
 def _phased(shapes: ComplexArray) -> ComplexArray:

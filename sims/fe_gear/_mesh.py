@@ -124,25 +124,13 @@ def _body_grid(blank: GearBlank, size: MeshSize, foot: FloatArray) -> FloatArray
     radii = [g.bore_mm + (blank.hub_radius_mm - g.bore_mm) * _even(hub)[:-1]] if hub else []
     # Cells of a disc grow from the bore with the radius; a web is divided evenly.
     start, end = blank.hub_radius_mm, blank.rim_radius_mm
-    radii.append(_graded(start, end, web))
-    body_angles = _eased(angles, radii, g)
+    radii.append(with_middles(start * (end / start) ** (np.arange(web + 1) / web)))
     radius = np.concatenate(radii)
+    # Columns stand as at the rim there, and evenly at the bore.
+    part = ((radius - g.bore_mm) / (radius[-1] - g.bore_mm))[:, None]
+    body_angles = angles * part + np.linspace(angles[0], angles[-1], len(angles)) * (1.0 - part)
     body = radius[:, None, None] * np.stack((np.cos(body_angles), np.sin(body_angles)), axis=-1)
     return np.concatenate((body, rim))
-
-
-def _graded(start: float, end: float, n_cells: int) -> FloatArray:
-    """2n + 1 radii; corners in geometric progression (cells as square as they can be), middles halfway."""
-    return with_middles(start * (end / start) ** (np.arange(n_cells + 1) / n_cells))
-
-
-def _eased(angles: FloatArray, radii: list[FloatArray], gear: GearGeometry) -> FloatArray:
-    """Angles of columns [row, column]: as at the rim there, even at the bore."""
-    radius = np.concatenate(radii)
-    part = ((radius - gear.bore_mm) / (radius[-1] - gear.bore_mm))[:, None]
-    even = np.linspace(angles[0], angles[-1], len(angles))
-    eased: FloatArray = angles * part + even * (1.0 - part)
-    return eased
 
 
 def _rim_angles(gear: GearGeometry, size: MeshSize) -> FloatArray:

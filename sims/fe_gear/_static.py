@@ -75,7 +75,10 @@ def load_tooth(
     grid = FlankGrid(np.array([roll]), np.array([0.0]))
     row = flank_rows(mesh, grid, spread, gear.own_places, 3 * len(gear.own_nodes))[int(flank)]
     with one_thread():
-        field_of_sectors = _static_field(gear, force * row)
+        waves: ComplexArray = np.array(
+            [gear.solver(n, "bore")(force * row) for n in gear.diameters], dtype=np.complex128
+        )
+        field_of_sectors = np.fft.irfft(waves, n=gear.n_sectors, axis=0)
     return ToothLoad(mesh, force, float(roll), gear.sector_fields(field_of_sectors), float(field_of_sectors[0] @ row))
 
 
@@ -151,16 +154,6 @@ def modal_load(gear: CyclicGear, modes: CyclicModes, load: ToothLoad) -> FloatAr
             share = load.force_n * float(row @ shape) / (2.0 * np.pi * hertz) ** 2
             total += share * mode_field(gear, modes, mode, sine=sine)
     return total
-
-
-def _static_field(gear: CyclicGear, load: FloatArray) -> FloatArray:
-    """Displacement (n_sectors, n_own_dof) for a load on sector 0, the bore held."""
-    z = gear.n_sectors
-    waves: ComplexArray = np.zeros((z // 2 + 1, len(load)), dtype=np.complex128)
-    for n in gear.diameters:
-        waves[n] = gear.solver(n, "bore")(load)
-    moved: FloatArray = np.fft.irfft(waves, n=z, axis=0)
-    return moved
 
 
 # How far a mesh is from a finer one: natural frequencies and the compliance of a tooth.

@@ -691,7 +691,8 @@ def _fill_rows(k, y, t, h, mode, profile, stages, interval, select, counts, outp
 def _change_contact(k, y, t, next_flank, mode, counts, contacts):
     """End the contact there is, begin the next; false where no row is left for it."""
     if mode[0] != 0.0:
-        _close(contacts[counts[1] - 1], t, y)
+        row = contacts[counts[1] - 1]
+        row[5], row[6], row[8] = t, abs(y[3]), y[9] - row[8]
     if next_flank != 0.0:
         if counts[1] == contacts.shape[0]:
             return False
@@ -713,11 +714,6 @@ def open_contact(k, y, t, flank, mode, row):
     row[3], row[4] = floor(y[0] * k.cycles_per_rad - k.phase), y[0]
     row[5], row[6], row[7] = np.nan, np.nan, 0.0
     row[8], row[9] = y[9], 1.0 if speed < k.speed_floor else 0.0
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _close(row, t, y):
-    row[5], row[6], row[8] = t, abs(y[3]), y[9] - row[8]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

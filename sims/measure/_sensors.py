@@ -55,11 +55,6 @@ def low_pass(frequency_hz: float, damping_ratio: float, step_s: float) -> Sectio
     return discrete((w * w,), (1.0, 2 * damping_ratio * w, w * w), step_s)
 
 
-def high_pass(frequency_hz: float, step_s: float) -> Section:
-    """s/(s + ω), discrete."""
-    return discrete((1.0, 0.0), (1.0, 2 * np.pi * frequency_hz), step_s)
-
-
 def apply_bank(sections: list[Section], gains: FloatArray, inputs: FloatArray, direct: FloatArray) -> FloatArray:
     """Sum of filtered inputs, each filter from the steady state that belongs to the first values.
 
@@ -159,7 +154,8 @@ class Accelerometer:
             x = apply(low_pass(self.resonance_hz, self.damping_ratio, step_s), x)
         if self.lower_limit_hz > 0:
             # The coupling has long settled on the mean, not on a first value that may be the middle of a blow.
-            x = apply(high_pass(self.lower_limit_hz, step_s), np.concatenate(([np.mean(x)], x)))[1:]
+            coupling = discrete((1.0, 0.0), (1.0, 2 * np.pi * self.lower_limit_hz), step_s)
+            x = apply(coupling, np.concatenate(([np.mean(x)], x)))[1:]
         return x
 
     def read(self, acceleration_mps2: FloatArray, time_s: FloatArray, rng: np.random.Generator) -> FloatArray:

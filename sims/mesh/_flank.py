@@ -400,7 +400,12 @@ class TimeLockedRoughness:
 
     def height_m(self, time_s: ArrayLike) -> FloatArray:
         """Δb at the given times."""
-        return _cosines(self.surface.amplitudes_m, 2 * np.pi * self.frequencies_hz, self.phases_rad, time_s)
+        t = np.asarray(time_s, dtype=np.float64)
+        total = np.zeros(t.shape)
+        lines = zip(self.surface.amplitudes_m, 2 * np.pi * self.frequencies_hz, self.phases_rad, strict=True)
+        for a, w, phase in lines:  # line by line: no (time × line) matrix
+            total += a * np.cos(w * t + phase)
+        return total
 
     def phasors(self, step_s: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
         """What `roughness_kernel.height_now` and `advance` work on, from time 0.
@@ -470,14 +475,6 @@ class FlankRoughness:
             total += a * np.cos(phase) * np.cos(place)
             total -= a * np.sin(phase) * np.sin(place)
         return total
-
-
-def _cosines(amplitudes: FloatArray, omega: FloatArray, phases: FloatArray, time_s: ArrayLike) -> FloatArray:
-    t = np.asarray(time_s, dtype=np.float64)
-    total = np.zeros(t.shape)
-    for a, w, phase in zip(amplitudes, omega, phases, strict=True):  # line by line: no (time × line) matrix
-        total += a * np.cos(w * t + phase)
-    return total
 
 
 def _phases(phases_rad: FloatArray, ndim: int, n_lines: int) -> FloatArray:

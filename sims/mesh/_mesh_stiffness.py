@@ -493,40 +493,6 @@ def pair_force(
 
 
 @njit(cache=True)
-def share_load(
-    force: float,
-    compliance: FloatArray,
-    separation: FloatArray,
-    weight: FloatArray,
-    contact: float,
-    load_dependent: bool,
-    pair_forces: FloatArray,
-) -> tuple[float, float]:
-    """Approach δ at which the pairs' forces N_i(δ − E_i) sum to `force`; return δ and dF/dδ, fill `pair_forces`.
-
-    The sum is convex in δ, and a pair that carried everything alone gives a δ that is too large: Newton comes down.
-    """
-    delta = 1e300
-    for i in range(compliance.size):
-        if weight[i] > 0.0:
-            n = force / weight[i]
-            approach = compliance[i] * n + (contact * n**0.9 if load_dependent else contact * n)
-            delta = min(delta, separation[i] + approach)
-    slope = 0.0
-    for _ in range(60):
-        total, slope = -force, 0.0
-        for i in range(compliance.size):
-            n, k = pair_force(delta - separation[i], compliance[i], contact, load_dependent, weight[i])
-            pair_forces[i] = n
-            total += n
-            slope += k
-        if abs(total) <= 1e-13 * force or slope <= 0.0:
-            break
-        delta -= total / slope
-    return delta, slope
-
-
-@njit(cache=True)
 def share_loads(
     force: float,
     compliance: FloatArray,
@@ -534,15 +500,34 @@ def share_loads(
     weight: FloatArray,
     contact: float,
     load_dependent: bool,
-    delta: FloatArray,
-    slope: FloatArray,
+    approach: FloatArray,
+    stiffness: FloatArray,
     pair_forces: FloatArray,
 ) -> None:
-    """`share_load` at each row; fills the last three."""
-    for row in range(delta.size):
-        delta[row], slope[row] = share_load(
-            force, compliance[row], separation[row], weight[row], contact, load_dependent, pair_forces[row]
-        )
+    """Approach δ at which the pairs' forces N_i(δ − E_i) sum to `force`, and dF/dδ, row by row; fills the last three.
+
+    The sum is convex in δ, and a pair that carried everything alone gives a δ that is too large: Newton comes down.
+    """
+    for row in range(approach.size):
+        delta = 1e300
+        for i in range(weight.shape[1]):
+            if weight[row, i] > 0.0:
+                n = force / weight[row, i]
+                alone = compliance[row, i] * n + (contact * n**0.9 if load_dependent else contact * n)
+                delta = min(delta, separation[row, i] + alone)
+        slope = 0.0
+        for _ in range(60):
+            total, slope = -force, 0.0
+            for i in range(weight.shape[1]):
+                depth = delta - separation[row, i]
+                n, k = pair_force(depth, compliance[row, i], contact, load_dependent, weight[row, i])
+                pair_forces[row, i] = n
+                total += n
+                slope += k
+            if abs(total) <= 1e-13 * force or slope <= 0.0:
+                break
+            delta -= total / slope
+        approach[row], stiffness[row] = delta, slope
 
 
 @njit(cache=True)

@@ -270,7 +270,8 @@ def _compliances(
             )
             direct += block_direct
         else:
-            direct += _along_diagonal(gear.grid.roll_rad, block, roll[:, 0])
+            heights = np.arange(len(gear.grid.roll_rad))
+            direct += over_height(gear.grid.roll_rad, block[heights, :, heights, :], roll[:, 0])
         for o in range(min(n_offsets, gear.n_offsets - 1)):
             older = rolls_rad(mesh.pair, slices_progress + o + 1.0)[side]
             block = _between(gear, [0, -sign * (o + 1)], compliance)
@@ -284,12 +285,6 @@ def _between(gear: ReducedGear, teeth: list[int], compliance: ToothCompliance) -
     block = compliance(gear, teeth)[:n, -n:]
     result: FloatArray = block.reshape(*shape, *shape)[FLANK, :, :, FLANK]
     return result
-
-
-def _along_diagonal(roll: FloatArray, block: FloatArray, at: FloatArray) -> FloatArray:
-    """Compliance between slices at one height, (n, n_slices, n_slices)."""
-    heights = np.arange(len(roll))
-    return over_height(roll, block[heights, :, heights, :], at)
 
 
 def _compliance_between(roll: FloatArray, block: FloatArray, first: FloatArray, second: FloatArray) -> FloatArray:

@@ -632,13 +632,9 @@ def step_coefficients(
     h = positive(step_s, "step_s", "s")
     made = [
         _exponential(w, c, h) if method == "exponential" else _newmark(w, c, h)
-        for w, c in _pairs(omega_rad_s, damping_rate)
+        for w, c in zip(omega_rad_s.tolist(), damping_rate.tolist(), strict=True)
     ]
     return np.ascontiguousarray(np.array(made).reshape(-1, 8).T)
-
-
-def _pairs(omega: FloatArray, rate: FloatArray) -> list[tuple[float, float]]:
-    return [(float(w), float(c)) for w, c in zip(omega, rate, strict=True)]
 
 
 def _exponential(w: float, c: float, h: float) -> tuple[float, ...]:
