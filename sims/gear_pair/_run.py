@@ -10,13 +10,21 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from gearsig.checks import FloatArray, count, positive
+from gearsig.compiled import UNCOUNTED, njit
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Recording
 from gearsig.results import Result
 from gearsig.rig import Rig
 from sims.machine import RECOVERY_S, Machine, Operation, Profile
 from sims.measure import MeasurementChain, Motion
-from sims.mesh import FlankRoughness, FractalSurface, TimeLockedRoughness, oil_terms, reduced_modulus_pa
+from sims.mesh import (
+    FlankRoughness,
+    FractalSurface,
+    TimeLockedRoughness,
+    contact_friction_n,
+    oil_terms,
+    reduced_modulus_pa,
+)
 
 # --------------------
 # Drive, inertias and friction as plain numbers, which compiled code reads.
@@ -118,7 +126,7 @@ FRICTION_FIELDS: list[Any] = [
         )
     ),
 ]
-"""Of the record: what `sims.mesh.contact_friction_n` needs."""
+"""Of the record: what `friction_of_pair` needs."""
 
 
 def friction_fields(machine: Machine, operation: Operation, force_n: float) -> dict[str, Any]:
@@ -148,6 +156,28 @@ def greatest_sliding_mps(machine: Machine, omega_rad_s: float) -> float:
     pair = machine.mesh.pair
     cycles = np.array([0.0, pair.contact_ratio])
     return float(np.max(np.abs(pair.sliding_speed_m_s(cycles, omega_rad_s * 30.0 / pi))))
+
+
+@njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)  # type: ignore[untyped-decorator,unused-ignore]
+def friction_of_pair(k, force, progress, omega_1, omega_2, slip_x, width):  # type: ignore[no-untyped-def]
+    """(f, fρ1, fρ2) of a pair at ζ; the film knows the speeds, the sign of its friction feels `slip_x` besides."""
+    rho_1 = k.start_radius + progress * k.base_pitch
+    rho_2 = k.action_length - rho_1
+    rubbing = contact_friction_n(
+        force,
+        omega_1 * rho_1,
+        omega_2 * rho_2,
+        slip_x,
+        rho_1 * rho_2 / k.action_length,
+        width,
+        k.reduced_modulus,
+        k.log10_oil,
+        k.oil_constant,
+        k.sign_threshold,
+        k.friction_factor,
+        k.dry_friction,
+    )
+    return rubbing, rubbing * rho_1, rubbing * rho_2
 
 
 # Roughness of a pair's flanks, drawn.

@@ -475,11 +475,17 @@ def hertz_energy(force, hertz, small):
 
 
 @njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
+def place_of(pair, n):
+    """Remainder of a pair's number by n, as of the teeth of a gear; of floats, a fraction of the time of integers'."""
+    return int(pair - n * np.floor(pair / n))
+
+
+@njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
 def near_pairs(cycles, start, step, corner, separation, rows, pitch, teeth, reach, pairs, columns, parts, apart, slope):
     """Find the pairs whose flanks are less than `reach` apart; return their number.
 
     corner, separation, rows, pitch : see `ContactTable.arrays`.
-    teeth : (z1, z2), as floats: their remainder takes a fraction of that of whole numbers.
+    teeth : (z1, z2), as floats.
     pairs : (n_slots,) filled with the pairs' numbers k, the newest first.
     start, step : see `ContactTable`.
     columns, parts : column i of the table and part t of a step beyond it.
@@ -496,10 +502,7 @@ def near_pairs(cycles, start, step, corner, separation, rows, pitch, teeth, reac
         if i > last:
             break
         t = place - int(place)
-        tooth_1, tooth_2 = (
-            int(pair - teeth[0] * np.floor(pair / teeth[0])),
-            int(pair - teeth[1] * np.floor(pair / teeth[1])),
-        )
+        tooth_1, tooth_2 = place_of(pair, teeth[0]), place_of(pair, teeth[1])
         a, b = rows[2, tooth_1], rows[3, tooth_2]
         nearest = reach
         for s in range(corner.shape[1]):
@@ -525,10 +528,7 @@ def fill_compliance(n, pairs, columns, parts, teeth, direct, cross, extra, rows,
     for p in range(n):
         i, t = columns[p], parts[p]
         pair = pairs[p]
-        tooth_1, tooth_2 = (
-            int(pair - teeth[0] * np.floor(pair / teeth[0])),
-            int(pair - teeth[1] * np.floor(pair / teeth[1])),
-        )
+        tooth_1, tooth_2 = place_of(pair, teeth[0]), place_of(pair, teeth[1])
         a, b = rows[0, tooth_1], rows[1, tooth_2]
         at = p * n_s
         for s in range(n_s):
@@ -557,10 +557,7 @@ def compliance_slope_energy(n, pairs, columns, teeth, direct, cross, extra, rows
     n_s, total = direct.shape[1], 0.0
     for p in range(n):
         i, pair, at = columns[p], pairs[p], p * direct.shape[1]
-        tooth_1, tooth_2 = (
-            int(pair - teeth[0] * np.floor(pair / teeth[0])),
-            int(pair - teeth[1] * np.floor(pair / teeth[1])),
-        )
+        tooth_1, tooth_2 = place_of(pair, teeth[0]), place_of(pair, teeth[1])
         a, b = rows[0, tooth_1], rows[1, tooth_2]
         for s in range(n_s):
             line = 0.0

@@ -26,9 +26,9 @@ import numpy as np
 
 from gearsig.checks import FloatArray, one_of, positive
 from gearsig.compiled import UNCOUNTED, njit
-from sims.gear_pair import foot
+from sims.gear_pair import foot, friction_of_pair
 from sims.machine import profile_value, set_speed, torque_ripple
-from sims.mesh import contact_friction_n, out_of_place
+from sims.mesh import out_of_place
 from sims.reduced_fe._contact import (
     FAST,
     back_substituted,
@@ -36,6 +36,7 @@ from sims.reduced_fe._contact import (
     fill_compliance,
     hertz_energy,
     near_pairs,
+    place_of,
     solve_contacts,
 )
 
@@ -138,28 +139,6 @@ def outer_forces(k, inputs, q, v, angle, omega, rate, load, out):
             _push(k, side, inputs, angle, omega, drive, out)
         if k.rolls:
             _roll(k, side, inputs, angle, load, out)
-
-
-@njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
-def friction_of_pair(k, force, progress, omega, slip_x):
-    """(f, fρ1, fρ2) of a pair at ζ; the film knows the set speed `omega`, its sign feels the vibration `slip_x`."""
-    rho_1 = k.start_radius + min(max(progress, 0.0), k.contact_ratio) * k.base_pitch
-    rho_2 = k.action_length - rho_1
-    rubbing = contact_friction_n(
-        force,
-        omega * rho_1,
-        omega / k.ratio * rho_2,
-        slip_x,
-        rho_1 * rho_2 / k.action_length,
-        k.width,
-        k.reduced_modulus,
-        k.log10_oil,
-        k.oil_constant,
-        k.sign_threshold,
-        k.friction_factor,
-        k.dry_friction,
-    )
-    return rubbing, rubbing * rho_1, rubbing * rho_2
 
 
 @njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
@@ -439,7 +418,7 @@ def _taken_up(k, n, pairs, held, held_root, held_pair, force, root):
     """Forces of the pairs at the step before, where the solution starts; none of pairs that are new."""
     n_slots, n_s = held.shape
     for p in range(n):
-        ring = int(pairs[p] - n_slots * np.floor(pairs[p] / n_slots))
+        ring = place_of(pairs[p], n_slots)
         if held_pair[ring] != pairs[p]:
             held_pair[ring] = pairs[p]
             for s in range(n_s):
@@ -459,8 +438,7 @@ def _approaches(
             i = p * n_s + s
             approach[i], viscous[i], along[i] = off - apart[p, s], 0.0, -slope[p, s]
         for side in range(2):
-            z = k.teeth[side]
-            tooth = int(pairs[p] - z * np.floor(pairs[p] / z))
+            tooth = place_of(pairs[p], k.teeth[side])
             to_tooth(q1, side, turn, tooth, k.n_single, k.n_pairs, seen)
             to_tooth(v1, side, turn, tooth, k.n_single, k.n_pairs, moving)
             for s in range(n_s):
@@ -497,8 +475,9 @@ def _rubbing(k, n, n_s, pairs, cycles, force, omega, slip_x):
         for s in range(n_s):
             carried += force[p * n_s + s]
         if carried > 0.0:
-            pair_force, pair_moment_1, pair_moment_2 = friction_of_pair(k, carried, cycles - pairs[p], omega, slip_x)
-            rubbing, moment_1, moment_2 = rubbing + pair_force, moment_1 + pair_moment_1, moment_2 + pair_moment_2
+            progress = min(max(cycles - pairs[p], 0.0), k.contact_ratio)
+            force_x, on_1, on_2 = friction_of_pair(k, carried, progress, omega, omega / k.ratio, slip_x, k.width)
+            rubbing, moment_1, moment_2 = rubbing + force_x, moment_1 + on_1, moment_2 + on_2
     return rubbing, moment_1, moment_2
 
 
@@ -506,9 +485,8 @@ def _rubbing(k, n, n_s, pairs, cycles, force, omega, slip_x):
 def _contact_on_modes(k, n, n_s, pairs, columns, parts, rows, turn, force, g, f1):
     """Add −N ∂D/∂η of every slice."""
     for side in range(2):
-        z = k.teeth[side]
         for p in range(n):
-            tooth = int(pairs[p] - z * np.floor(pairs[p] / z))
+            tooth = place_of(pairs[p], k.teeth[side])
             g[:] = 0.0
             for s in range(n_s):
                 if force[p * n_s + s] > 0.0:
@@ -529,7 +507,7 @@ def _keep(n, n_slots, pairs, force, root, held, held_root):
     """Keep the pairs' forces for the next step."""
     n_s = held.shape[1]
     for p in range(n):
-        ring = int(pairs[p] - n_slots * np.floor(pairs[p] / n_slots))
+        ring = place_of(pairs[p], n_slots)
         for s in range(n_s):
             held[ring, s], held_root[ring, s] = force[p * n_s + s], root[p * n_s + s]
 
