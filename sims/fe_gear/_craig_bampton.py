@@ -307,8 +307,6 @@ class CraigBamptonGear:
     stiffness, mass : array, (n_dof, n_dof)
         Masters first (six of the hub: m, rad; then contact patches, auxiliary nodes: m), then modal coordinates.
     masters : Masters
-    fixed_frequencies_hz : array
-        Of the fixed-interface modes.
     accuracy : ReductionAccuracy
         Against the full model.
     """
@@ -316,7 +314,6 @@ class CraigBamptonGear:
     stiffness: FloatArray = field(repr=False)
     mass: FloatArray = field(repr=False)
     masters: Masters = field(repr=False)
-    fixed_frequencies_hz: FloatArray
     accuracy: ReductionAccuracy
 
 
@@ -466,7 +463,7 @@ def _reduced(space: _Space, masters: Masters, springs: FloatArray, targets: _Tar
     products = np.hstack((on_masters, (space.with_modes - on_masters @ c) @ turn)) @ vectors
     frequencies = np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi)
     accuracy = matched(targets.frequencies_hz, frequencies[N_HUB:], products[:, N_HUB:], rigid_hz=frequencies[:N_HUB])
-    return CraigBamptonGear(stiffness, mass, masters, np.sqrt(values) / (2.0 * np.pi), accuracy)
+    return CraigBamptonGear(stiffness, mass, masters, accuracy)
 
 
 def _needed(squares: FloatArray, coupled: FloatArray, targets: _Targets, n_modes: int) -> IntArray:

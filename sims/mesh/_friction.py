@@ -41,14 +41,11 @@ class FrictionResult:
     ----------
     coefficient : array
         From 0 to `MAX_FRICTION`, in the common shape of what was given.
-    capped : array of bool
-        Where the regression gave more than the cap.
     notes : tuple of str
         One per quantity that leaves the regression's range, with value and limit; empty inside.
     """
 
     coefficient: FloatArray
-    capped: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
     notes: tuple[str, ...] = ()
 
 
@@ -115,7 +112,7 @@ def friction_coefficient(
         inputs["entrainment_mps"],
         inputs["radius_m"],
     )
-    return FrictionResult(np.minimum(raw, MAX_FRICTION), raw > MAX_FRICTION, _range_notes(inputs))
+    return FrictionResult(np.minimum(raw, MAX_FRICTION), _range_notes(inputs))
 
 
 def line_contact_pressure_gpa(
