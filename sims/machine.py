@@ -461,8 +461,7 @@ class Profile:
 
     def at(self, time_s: FloatArray | float) -> FloatArray:
         """Value at the given times."""
-        result: FloatArray = np.asarray(np.interp(time_s, self.times_s, self.values))
-        return result
+        return np.asarray(np.interp(time_s, self.times_s, self.values))
 
 
 @dataclass(frozen=True)

@@ -331,8 +331,7 @@ def _frequencies_hz(m: FloatArray, k: FloatArray) -> FloatArray:
     from scipy.linalg import eigh
 
     squares = eigh(k, m, eigvals_only=True)
-    result: FloatArray = np.sqrt(np.maximum(squares, 0.0)) / (2.0 * pi)
-    return result
+    return np.sqrt(np.maximum(squares, 0.0)) / (2.0 * pi)
 
 
 def _eigenvalues_per_s(m: FloatArray, k: FloatArray, c: FloatArray) -> NDArray[np.complex128]:

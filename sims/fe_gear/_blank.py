@@ -201,8 +201,7 @@ def flank_place(gear: GearGeometry, roll_rad: FloatArray) -> FloatArray:
     """Arc length over total length of `side_curve` at roll angles of the involute, 0 to 1."""
     total = side_curve(gear)[1]
     length_to_tip = gear.base_radius_mm * (gear.tip_roll_rad**2 - np.asarray(roll_rad) ** 2) / 2.0
-    place: FloatArray = 1.0 - length_to_tip / total
-    return place
+    return 1.0 - length_to_tip / total
 
 
 @lru_cache(maxsize=64)

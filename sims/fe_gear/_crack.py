@@ -164,8 +164,7 @@ def tooth_compliance_with(mesh: SectorMesh, chain: FloatArray, grid: FlankGrid, 
     """
     stiffness, kept = _ring(mesh, chain)
     rows = flank_rows(mesh, grid, spread, np.arange(mesh.n_nodes), 3 * mesh.n_nodes)[:, kept]
-    compliance: FloatArray = rows @ factorised(stiffness)(rows.T)
-    return compliance
+    return rows @ factorised(stiffness)(rows.T)
 
 
 def _ring(mesh: SectorMesh, chain: FloatArray) -> tuple[sparse.csc_array, IntArray]:
@@ -247,8 +246,7 @@ def _free_dof(mesh: SectorMesh) -> IntArray:
 
 def _free_side(mesh: SectorMesh, side: IntArray) -> IntArray:
     free = side[~np.isin(side, mesh.bore)]
-    dof: IntArray = (3 * free[:, None] + np.arange(3)).ravel()
-    return dof
+    return (3 * free[:, None] + np.arange(3)).ravel()
 
 
 # What cracks add to the compliance of a reduced gear's tooth, from finite elements, kept over depth and width.

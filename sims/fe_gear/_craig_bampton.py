@@ -204,8 +204,7 @@ class ReductionAccuracy:
     @property
     def errors(self) -> FloatArray:
         """Relative errors of the frequencies."""
-        relative: FloatArray = self.reduced_hz / self.full_hz - 1.0
-        return relative
+        return self.reduced_hz / self.full_hz - 1.0
 
     @property
     def worst_error(self) -> float:
@@ -351,8 +350,7 @@ class _Targets(NamedTuple):
     @property
     def squares(self) -> FloatArray:
         """ω², (r,)."""
-        squares: FloatArray = (2.0 * np.pi * self.frequencies_hz) ** 2
-        return squares
+        return (2.0 * np.pi * self.frequencies_hz) ** 2
 
 
 def craig_bampton(

@@ -176,8 +176,7 @@ def _surface_weights(mesh: SectorMesh) -> FloatArray:
     around = whole_weights(np.linspace(0.0, 1.0, mesh.bore.shape[0]), mesh.size.order)
     around[0] += around[-1]
     along = whole_weights(mesh.points_m[mesh.bore[0], 2], mesh.size.order)
-    weights: FloatArray = np.outer(around[:-1], along).ravel()
-    return weights
+    return np.outer(around[:-1], along).ravel()
 
 
 Held = Literal["free", "bore"]
@@ -260,8 +259,7 @@ class CyclicGear:
     @cached_property
     def own_nodes(self) -> IntArray:
         """Nodes of the sector without its high side."""
-        nodes: IntArray = np.setdiff1d(np.arange(self.mesh.n_nodes), self.mesh.high_side)
-        return nodes
+        return np.setdiff1d(np.arange(self.mesh.n_nodes), self.mesh.high_side)
 
     @cached_property
     def _fold(self) -> tuple[sparse.csr_array, sparse.csr_array]:
@@ -295,8 +293,7 @@ class CyclicGear:
     @cached_property
     def hub(self) -> FloatArray:
         """Rows (6, n_own) that give a sector's share of the bore's mean motion, in the axes of that sector."""
-        rows: FloatArray = hub_rows(self.mesh, 3 * len(self.own_nodes), self.own_places)
-        return rows
+        return hub_rows(self.mesh, 3 * len(self.own_nodes), self.own_places)
 
     @cached_property
     def own_places(self) -> IntArray:
@@ -447,8 +444,7 @@ class CyclicModes(Result):
 def real_values(values: ComplexArray, multiplicity: IntArray) -> FloatArray:
     """Values of the real modes, from those of the shapes along the last axis: real parts, of pairs Im as well."""
     parts = np.stack((values.real, values.imag), axis=-1)
-    kept: FloatArray = parts[..., np.arange(2) < multiplicity[:, None]]
-    return kept
+    return parts[..., np.arange(2) < multiplicity[:, None]]
 
 
 def cyclic_modes(gear: CyclicGear, n_modes: int = 20, held: Held = "free", *, elastic: bool = False) -> CyclicModes:
@@ -521,8 +517,7 @@ class _Problem(NamedTuple):
 
     def static(self, loads: ComplexArray) -> ComplexArray:
         """K⁻¹ loads; without a shift and with nothing held only."""
-        solved: ComplexArray = self.basis @ self.solve(np.asarray(self.basis.conj().T @ loads))
-        return solved
+        return self.basis @ self.solve(np.asarray(self.basis.conj().T @ loads))
 
 
 def _problem(gear: CyclicGear, n: int, held: Held) -> _Problem:

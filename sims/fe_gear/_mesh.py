@@ -230,8 +230,7 @@ class SectorMesh:
     @property
     def angles_rad(self) -> FloatArray:
         """Polar angle of each node."""
-        angle: FloatArray = np.arctan2(self.points_m[:, 1], self.points_m[:, 0])
-        return angle
+        return np.arctan2(self.points_m[:, 1], self.points_m[:, 0])
 
 
 def sector_mesh(blank: GearBlank, size: MeshSize, crack: CrackLine | None = None) -> SectorMesh:
@@ -253,8 +252,7 @@ def sector_mesh(blank: GearBlank, size: MeshSize, crack: CrackLine | None = None
     cells = np.concatenate((web_cells, other_cells))
 
     def place(nodes: IntArray) -> IntArray:
-        spread: IntArray = nodes[..., None] * n_layers + np.arange(n_layers)
-        return spread
+        return nodes[..., None] * n_layers + np.arange(n_layers)
 
     low, high, bore, tooth = (place(nodes) for nodes in (plane.low_side, plane.high_side, plane.bore, plane.tooth))
     step = 3 - size.order  # eight-node cells stand between the corners of the 27-node ones
@@ -342,8 +340,7 @@ class FaceView:
 
     def values(self, at_nodes: FloatArray) -> FloatArray:
         """Values at the points, from values at the nodes of as many sectors, (n_sectors, n_nodes)."""
-        flat: FloatArray = at_nodes[:, self.nodes].ravel()
-        return flat
+        return at_nodes[:, self.nodes].ravel()
 
 
 def face_view(mesh: SectorMesh, sectors: tuple[int, ...] | None = None) -> FaceView:
@@ -397,8 +394,7 @@ def _foremost(mesh: SectorMesh) -> IntArray:
     _, column = np.unique(np.round(middle[:, :2], 9), axis=0, return_inverse=True)
     order = np.lexsort((middle[:, 2], column.ravel()))
     last = np.append(np.diff(column.ravel()[order]) != 0, True)
-    foremost: IntArray = np.sort(order[last])
-    return foremost
+    return np.sort(order[last])
 
 
 def _walls(points_mm: FloatArray, local: IntArray) -> IntArray:
@@ -410,10 +406,9 @@ def _walls(points_mm: FloatArray, local: IntArray) -> IntArray:
     behind[order[equal]], behind[order[equal + 1]] = order[equal + 1], order[equal]
     ends = np.concatenate([np.column_stack((local[:, r, :-1].ravel(), local[:, r, 1:].ravel())) for r in (0, -1)])
     a, b = ends[np.all(behind[ends] >= 0, axis=1)].T
-    walls: IntArray = np.concatenate(
+    return np.concatenate(
         (np.column_stack((a, b, behind[b])), np.column_stack((a, behind[b], behind[a]))), dtype=np.int64
     )
-    return walls
 
 
 def _triangles(local: IntArray) -> IntArray:
@@ -599,8 +594,7 @@ def _incompatible_stiffness(mesh: SectorMesh, fields: CellFields, material: Mate
     modes = modes * (np.linalg.det(jacobian)[:, None] / fields.determinants)[:, :, None, None]
     whole = _cell_stiffness(np.concatenate((fields.gradients, modes), axis=3), fields.volumes, material)
     inner = whole[:, 24:, 24:]
-    condensed: FloatArray = whole[:, :24, :24] - whole[:, :24, 24:] @ np.linalg.solve(inner, whole[:, 24:, :24])
-    return condensed
+    return whole[:, :24, :24] - whole[:, :24, 24:] @ np.linalg.solve(inner, whole[:, 24:, :24])
 
 
 def _cell_mass(fields: CellFields, density: float) -> FloatArray:

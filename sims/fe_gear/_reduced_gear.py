@@ -190,8 +190,7 @@ class ReducedGear:
     @property
     def radius_m(self) -> FloatArray:
         """Distance of the heights from the axis, (n_heights,)."""
-        radius: FloatArray = self.blank.geometry.base_radius_mm * 1e-3 * np.hypot(1.0, self.grid.roll_rad)
-        return radius
+        return self.blank.geometry.base_radius_mm * 1e-3 * np.hypot(1.0, self.grid.roll_rad)
 
     def modes_at(self, tooth: int) -> FloatArray:
         """Push displacement of a tooth's points in each elastic mode, (n_modes, n_points), 1/√kg.
@@ -241,8 +240,7 @@ class ReducedGear:
         # Holding the hub: reactions −Φᵀ on the hub, and the rigid motion that brings the hub back.
         rigid = np.hstack([self.rigid_at(t) for t in teeth])
         hub = np.hstack([self.hub_flank_at(t) for t in teeth])
-        held: FloatArray = blocks - hub.T @ rigid - rigid.T @ hub + rigid.T @ self.hub_compliance @ rigid
-        return held
+        return blocks - hub.T @ rigid - rigid.T @ hub + rigid.T @ self.hub_compliance @ rigid
 
     def _block(self, stored: FloatArray, offset: int) -> FloatArray:
         z = self.blank.n_teeth
@@ -416,8 +414,7 @@ def turning_weights(mesh: SectorMesh, nodes: SectionNodes) -> FloatArray:
     square = float(w @ np.sum(offset**2, axis=1))
     if square <= 1e-12:
         return np.zeros_like(offset)
-    weights: FloatArray = w[:, None] * np.column_stack((-offset[:, 1], offset[:, 0])) / square
-    return weights
+    return w[:, None] * np.column_stack((-offset[:, 1], offset[:, 0])) / square
 
 
 def _turn(lever: FloatArray, push: FloatArray) -> float:

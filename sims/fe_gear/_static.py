@@ -105,8 +105,7 @@ def stress_pa(mesh: SectorMesh, displacement_m: FloatArray) -> FloatArray:
     total, shared = np.zeros((mesh.n_nodes, 3, 3)), np.zeros(mesh.n_nodes)
     np.add.at(total, nodes, stress)
     np.add.at(shared, nodes, 1.0)
-    mean: FloatArray = total / shared[:, None, None]
-    return mean
+    return total / shared[:, None, None]
 
 
 def von_mises_pa(mesh: SectorMesh, displacement_m: FloatArray) -> FloatArray:

@@ -148,8 +148,7 @@ class DriveResponse(Result, columns=("time_s", "signals")):
 
     def contact(self, column: str) -> FloatArray:
         """Return a column of the contacts by its name."""
-        values: FloatArray = self.contacts[:, CONTACT_COLUMNS.index(column)]
-        return values
+        return self.contacts[:, CONTACT_COLUMNS.index(column)]
 
 
 def respond(

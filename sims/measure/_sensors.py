@@ -283,8 +283,7 @@ class ModalPath:
         for mode in self.modes:
             r = f / mode.frequency_hz
             total += mode.gains.get(position, 0.0) / (1 - r**2 + 2j * mode.damping_ratio * r)
-        result: FloatArray = total
-        return result
+        return total
 
 
 def _weights(gains: Mapping[str, float], positions: tuple[str, ...]) -> FloatArray:

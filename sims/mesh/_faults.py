@@ -126,8 +126,7 @@ def effective_flank_mm(
         return np.where(x_mm >= x_end, np.minimum(y_mm, limit), y_mm)
     before = y_mouth + (y_tip - y_mouth) * (x_mm - x_mouth) / (x_tip - x_mouth)
     lost = np.where(x_mm >= x_mouth, np.maximum(before - behind, 0.0), np.maximum(y_mm - behind, 0.0))
-    result: FloatArray = np.where(x_mm >= x_end, y_mm - lost, y_mm)
-    return result
+    return np.where(x_mm >= x_end, y_mm - lost, y_mm)
 
 
 @lru_cache(maxsize=256)
@@ -280,8 +279,7 @@ def spall_share(
     depth = min(1.0, spall.depth_um * 1e-3 / flattening)
     low, high = _ends_mm(pair, side, spall)
     inside = part_inside(arc_length_mm(gear, roll_length_mm), low, high, half_width)
-    result: FloatArray = spall.width_mm / pair.face_width_mm * depth * inside
-    return result
+    return spall.width_mm / pair.face_width_mm * depth * inside
 
 
 def spall_separation_m(pair: PairGeometry, side: int, spall: ToothSpall, roll_length_mm: FloatArray) -> FloatArray:
@@ -409,5 +407,4 @@ def _is_whole(pair: PairGeometry, chip: ToothChip) -> bool:
 def _edge_separation_m(pair: PairGeometry, side: int, chip: ToothChip, progress: FloatArray) -> FloatArray:
     """0 up to the chip's edge, and what is more than at the corner of a whole tooth beyond it."""
     lost = (chip.height_mm, 0.0) if side == 1 else (0.0, chip.height_mm)
-    result: FloatArray = corner_separation_m(pair, progress, lost) - corner_separation_m(pair, progress)
-    return result
+    return corner_separation_m(pair, progress, lost) - corner_separation_m(pair, progress)

@@ -69,8 +69,7 @@ def flank_separation_m(gear: GearGeometry, deviation: FlankDeviation, roll_lengt
     rho = np.asarray(roll_length_mm, dtype=np.float64)
     tip = gear.tip_roll_rad * gear.base_radius_mm
     into = np.maximum(rho - (tip - deviation.tip_relief_length_mm), 0.0) / deviation.tip_relief_length_mm
-    result: FloatArray = deviation.tip_relief_um * into * 1e-6
-    return result
+    return deviation.tip_relief_um * into * 1e-6
 
 
 def pitch_separation_m(gear: GearGeometry, deviation: FlankDeviation) -> FloatArray:
@@ -114,15 +113,13 @@ def wear_profile(pair: PairGeometry, side: int, roll_length_mm: FloatArray) -> F
     """
     ends = contact_ends_mm(pair, side)
     largest = float(np.max(_specific_sliding(pair, side, np.array(ends))))
-    result: FloatArray = _specific_sliding(pair, side, np.clip(roll_length_mm, *ends)) / largest
-    return result
+    return _specific_sliding(pair, side, np.clip(roll_length_mm, *ends)) / largest
 
 
 def _specific_sliding(pair: PairGeometry, side: int, roll_length_mm: FloatArray) -> FloatArray:
     gear, mate = (pair.driver, pair.driven) if side == 1 else (pair.driven, pair.driver)
     rho = np.maximum(np.asarray(roll_length_mm, dtype=np.float64), MIN_RADIUS * gear.module_mm)
-    result: FloatArray = np.abs(1.0 - gear.teeth / mate.teeth * (pair.action_length_mm - rho) / rho)
-    return result
+    return np.abs(1.0 - gear.teeth / mate.teeth * (pair.action_length_mm - rho) / rho)
 
 
 # --------------------
@@ -180,8 +177,7 @@ class Lead:
 
     def gap_m(self, places: FloatArray) -> FloatArray:
         """Missing metal by crowning and misalignment at places −½ to ½ of the face; 0 in its middle."""
-        result: FloatArray = 1e-6 * (self.crowning_um * (2.0 * places) ** 2 + self.error_um * places)
-        return result
+        return 1e-6 * (self.crowning_um * (2.0 * places) ** 2 + self.error_um * places)
 
     def late(self, pair: PairGeometry, places: FloatArray) -> FloatArray:
         """Base pitches by which places −½ to ½ of the face enter after the end that enters first, 0 to ε_β.
@@ -189,8 +185,7 @@ class Lead:
         The driver turns counter-clockwise, seen from +z: the far end of a right-handed tooth runs ahead.
         """
         hand = 1.0 if self.helix_angle_deg >= 0.0 else -1.0
-        result: FloatArray = self.overlap_ratio(pair) * (0.5 - hand * places)
-        return result
+        return self.overlap_ratio(pair) * (0.5 - hand * places)
 
     def overlap_ratio(self, pair: PairGeometry) -> float:
         """ε_β = b tan β/(π m_t), how many pitches one end of the face is behind the other."""
@@ -297,8 +292,7 @@ def normal_roll_rad(gear: GearGeometry, virtual: GearGeometry, roll_rad: FloatAr
         return roll_rad
     height = gear.base_radius_mm * np.hypot(1.0, roll_rad) - gear.pitch_radius_mm
     ratio = (virtual.pitch_radius_mm + height) / virtual.base_radius_mm
-    result: FloatArray = np.sqrt(np.maximum(ratio**2 - 1.0, 0.0))
-    return result
+    return np.sqrt(np.maximum(ratio**2 - 1.0, 0.0))
 
 
 # --------------------
@@ -365,8 +359,7 @@ class FractalSurface:
 
     def draw_phases(self, rng: np.random.Generator, n_profiles: int = 1) -> FloatArray:
         """Uniform phases κ, (n_profiles, n_lines)."""
-        phases: FloatArray = rng.uniform(0.0, 2 * np.pi, (n_profiles, len(CYCLES_PER_METRE)))
-        return phases
+        return rng.uniform(0.0, 2 * np.pi, (n_profiles, len(CYCLES_PER_METRE)))
 
 
 @dataclass(frozen=True)

@@ -136,8 +136,7 @@ def line_contact_pressure_gpa(
     positive(reduced_modulus_pa, "reduced_modulus_pa", "Pa")
     radius = _checked(radius_m, "radius_m", above_zero=True)
     force = np.maximum(_checked(normal_force_n, "normal_force_n", signed=True), 0.0)
-    pressure: FloatArray = 1e-9 * np.sqrt(force * reduced_modulus_pa / (np.pi * face_width_m * radius))
-    return pressure
+    return 1e-9 * np.sqrt(force * reduced_modulus_pa / (np.pi * face_width_m * radius))
 
 
 def reduced_modulus_pa(material_1: Material, material_2: Material) -> float:

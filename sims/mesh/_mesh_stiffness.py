@@ -71,8 +71,7 @@ def roughness_heights_m(
 def _ordinary(mesh: GearMesh, number: int, progress: FloatArray) -> FloatArray:
     side, rho = mesh.side(number), mesh.pair.contact_radii_mm(progress)[number - 1]
     worn = side.flank.wear_um * 1e-6 * wear_profile(mesh.pair, number, rho)
-    result: FloatArray = flank_separation_m(side.gear, side.flank, rho) + worn
-    return result
+    return flank_separation_m(side.gear, side.flank, rho) + worn
 
 
 class ToothRows(NamedTuple):

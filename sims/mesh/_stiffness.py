@@ -180,8 +180,7 @@ def _rim_of_harmonic(n: int, radius_ratio: float, poisson_ratio: float) -> Float
         [(ub, vb, k * du + lam * (u + n * v), mu * (dv - v - n * u)) for (ub, vb), (u, v), (du, dv) in solutions]
     ).T
     parts = np.linalg.solve(equations, [[0.0, 0.0], [0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-    result: FloatArray = np.array([rim for _, rim, _ in solutions]).T @ parts
-    return result
+    return np.array([rim for _, rim, _ in solutions]).T @ parts
 
 
 # --------------------
@@ -338,8 +337,7 @@ def cracked_tooth_compliance(
     stiffness = width / tooth_compliance(gear, material, roll_rad, (crack.depth_mm, crack.angle_deg)).total
     if width < face_width_m:
         stiffness += (face_width_m - width) / tooth_compliance(gear, material, roll_rad).total
-    result: FloatArray = 1.0 / stiffness
-    return result
+    return 1.0 / stiffness
 
 
 def _sections(gear: GearGeometry, tau: FloatArray, crack: tuple[float, float] | None, law: str) -> _Sections:

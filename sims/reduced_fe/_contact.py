@@ -60,8 +60,7 @@ def over_height(roll: FloatArray, values: FloatArray, heights: FloatArray) -> Fl
         slices = [over_height(roll, values[:, s], heights[:, s]) for s in range(heights.shape[1])]
         return np.stack(slices, axis=1)
     spline = CubicSpline(roll, values, axis=0)
-    result: FloatArray = spline(np.clip(heights, roll[0], roll[-1]))
-    return result
+    return spline(np.clip(heights, roll[0], roll[-1]))
 
 
 # What faulty teeth add to the compliance between the slices of a tooth pair.
@@ -156,8 +155,7 @@ class ContactTable:
     @property
     def progress(self) -> FloatArray:
         """ζ of the columns."""
-        result: FloatArray = self.start + self.step * np.arange(-1, len(self.direct) - 1)
-        return result
+        return self.start + self.step * np.arange(-1, len(self.direct) - 1)
 
     def column(self, progress: float) -> int:
         """Column nearest to ζ."""
@@ -283,8 +281,7 @@ def _between(gear: ReducedGear, teeth: list[int], compliance: ToothCompliance) -
     """Compliance between the driving flanks of the first and the last of the teeth, (heights, slices) twice."""
     n, shape = gear.grid.n_points, gear.grid.shape
     block = compliance(gear, teeth)[:n, -n:]
-    result: FloatArray = block.reshape(*shape, *shape)[FLANK, :, :, FLANK]
-    return result
+    return block.reshape(*shape, *shape)[FLANK, :, :, FLANK]
 
 
 def _compliance_between(roll: FloatArray, block: FloatArray, first: FloatArray, second: FloatArray) -> FloatArray:

@@ -325,8 +325,7 @@ def kept_modes(gear: ReducedGear, limit_hz: float, groups: FloatArray) -> Retain
 def residual_compliance(gear: ReducedGear, teeth: list[int], kept: NDArray[np.int64]) -> FloatArray:
     """Free compliance less that of the modes at these places, C − Σ φφᵀ/ω²; never one of a pair without the other."""
     modes = np.hstack([gear.modes_at(t)[kept] for t in teeth]) / gear.angular_frequencies_rad_s[kept, None]
-    residual: FloatArray = gear.compliance_m_per_n(teeth) - modes.T @ modes
-    return residual
+    return gear.compliance_m_per_n(teeth) - modes.T @ modes
 
 
 def build_side(
