@@ -501,10 +501,8 @@ class MeshSide(NamedTuple):
 
     def faults_of(self, tooth: int) -> ToothFaults:
         """What is wrong with one tooth."""
-        crack = next((fault for fault in self.cracks if fault.tooth == tooth), None)
-        spall = next((fault for fault in self.spalls if fault.tooth == tooth), None)
-        chip = next((fault for fault in self.chips if fault.tooth == tooth), None)
-        return ToothFaults(crack, spall, chip)
+        kinds = (self.cracks, self.spalls, self.chips)
+        return ToothFaults(*(next((f for f in kind if f.tooth == tooth), None) for kind in kinds))  # type: ignore[arg-type]
 
     @property
     def faulty_teeth(self) -> tuple[int, ...]:
@@ -639,11 +637,8 @@ class GearMesh:
 
     def side(self, number: int) -> MeshSide:
         """Return gear 1, the driver, or gear 2, the driven one, with what is its own."""
-        if number == 1:
-            driver_side = (self.pair.driver, self.material_1, self.flank_1, self.roughness_1)
-            return MeshSide(*driver_side, self.cracks_1, self.spalls_1, self.chips_1)
-        two = (self.pair.driven, self.material_2, self.flank_2, self.roughness_2)
-        return MeshSide(*two, self.cracks_2, self.spalls_2, self.chips_2)
+        gear = (self.pair.driver, self.pair.driven)[number - 1]
+        return MeshSide(gear, *(getattr(self, f"{name}_{number}") for name in MeshSide._fields[1:]))
 
     def roll_length_mm(self, side: int, progress: FloatArray) -> FloatArray:
         """ρ of gear 1 or 2 at ζ, not below 0: a ramp may begin below the base circle, where there is no flank."""

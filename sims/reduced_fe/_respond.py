@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import pi
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -147,8 +148,7 @@ TRANSMISSION_ERROR = "transmission_error_m"
 KINDS = ("", " velocity", " acceleration")
 
 
-@dataclass(frozen=True)
-class FlexState:
+class FlexState(NamedTuple):
     """Where a flexible pair is: what a later run needs to go on from there; see `integrate_kernel.march`."""
 
     q: FloatArray
@@ -159,12 +159,6 @@ class FlexState:
     root: FloatArray
     pair: FloatArray
     rest: FloatArray
-
-    @property
-    def arrays(self) -> tuple[FloatArray, ...]:
-        """Copies, which the kernel overwrites."""
-        fields = (self.q, self.v, self.f, self.f_before, self.force, self.root, self.pair, self.rest)
-        return tuple(np.array(a) for a in fields)
 
 
 FlexResponse = PairResponse[FlexState]
@@ -226,7 +220,8 @@ def respond(
         [step_coefficients(s.omega_rad_s, s.damping_rate, step, method) for s in pair_constants.sides]
     )
     check_step(pair, pair_constants, operation, coefficients, method)
-    state = (start_state(pair, pair_constants, operation, start_s) if first is None else first).arrays
+    begin = start_state(pair, pair_constants, operation, start_s) if first is None else first
+    state = tuple(np.array(a) for a in begin)  # copies, which the kernel overwrites
     fixed = (
         pair_constants.record,
         pair_constants.table.arrays,
@@ -380,7 +375,7 @@ def _closed(pair: FlexiblePair, pair_constants: FlexiblePairConstants, state: Fl
     q = state.q.copy()
     per_unit = float(rigid.rows[column].mean(axis=0)[free])
     q[1, free] += (depth - approach(q)) / per_unit
-    return replace(state, q=q)
+    return state._replace(q=q)
 
 
 # Slow sweeps over speed, up and down: rms of the dynamic transmission error, contact loss, jumps.
