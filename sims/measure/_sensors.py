@@ -411,6 +411,10 @@ class MainsHum:
 # --------------------
 
 
+HIGH_V = 5.0
+"""Of a pulse, from 0 V."""
+
+
 @dataclass(frozen=True)
 class Tachometer:
     """A pulse channel; the middle of each rising edge lies at shaft angle (k + offset)/n.
@@ -421,7 +425,6 @@ class Tachometer:
         Empty: the reference shaft.
     pulses_per_revolution : int
     channel : str
-    low_v, high_v : float
     duty : float
         Pulse width over pulse period, in angle; 0.01 to 0.99.
     edge_s : float
@@ -437,8 +440,6 @@ class Tachometer:
     shaft: str = ""
     pulses_per_revolution: int = 1
     channel: str = "tacho"
-    low_v: float = 0.0
-    high_v: float = 5.0
     duty: float = 0.1
     edge_s: float = 2e-4
     jitter_s: float = 0.0
@@ -468,7 +469,7 @@ def pulse_voltage(tacho: Tachometer, rising_s: FloatArray, falling_s: FloatArray
             knots = (np.sort(edges)[:, None] + np.array([-0.5, 0.5]) * tacho.edge_s).ravel()
             steps = (np.arange(len(edges))[:, None] + np.array([0.0, 1.0])).ravel()
             up += sign * np.interp(time_s, knots, steps)
-    return tacho.low_v + (tacho.high_v - tacho.low_v) * up
+    return HIGH_V * up
 
 
 @dataclass(frozen=True)
