@@ -226,7 +226,7 @@ def room(shape: tuple[int, ...], n_modes: int, n_rows: int) -> tuple[Any, ...]:
     places = np.empty(n_slots), np.empty(n_slots), np.empty(shape), np.empty(shape)
     integers = np.empty(n_slots, dtype=np.int64), np.empty(n_max, dtype=np.int64)
     squares = np.empty((n_max, n_max)), np.empty((n_max, n_max))
-    points = (*(np.empty(n_max) for _ in range(4)), np.empty(n_max), np.zeros(n_max), np.empty(n_max), np.empty(n_max))
+    points = tuple(np.zeros(n_max) for _ in range(8))  # forces of a pair that a later pass finds near start from these
     seen = tuple(np.empty(n_rows) for _ in range(3))
     modes = tuple(np.empty((2, n_modes)) for _ in range(6))
     return places, integers, squares, points, seen, modes, np.zeros(N_EXTRAS + n_slots + n_max)
@@ -315,11 +315,10 @@ def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, and the scra
             for i in range(n * n_s):
                 total += force[i]
                 along_cycles += elastic[i] * along[i]
-            if k.moving_force:
-                along_cycles -= compliance_slope_energy(
-                    n, pairs, columns, k.teeth, direct, cross, extra, table_rows, k.column_step, elastic
-                )
-                along_torque = -k.cycles_per_rad * along_cycles
+            along_cycles -= compliance_slope_energy(
+                n, pairs, columns, k.teeth, direct, cross, extra, table_rows, k.column_step, elastic
+            )
+            along_torque = -k.cycles_per_rad * along_cycles
             off_1, across_1 = k.runout[0] * sin(phi_1), k.runout[0] * cos(phi_1)
             off_2, across_2 = k.runout[1] * sin(phi_2), k.runout[1] * cos(phi_2)
             torque_1 = along_torque - total * across_1
