@@ -131,7 +131,7 @@ meshes = st.builds(
         contact_law=law,
         ramp=ramp,
         flank_1=FlankDeviation(relief, 2.0, pitch_um=tuple(pitch * np.cos(np.arange(55)))),
-        flank_2=FlankDeviation(relief, 1.0, 2.0),
+        flank_2=FlankDeviation(relief, 1.0),
         cracks_1=(RootCrack(depth, tooth=1),),
     ),
     st.sampled_from(["linear", "load-dependent"]),
