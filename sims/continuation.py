@@ -78,8 +78,7 @@ class SteadyRun:
         """Rate of r_b1 θ1 − r_b2 θ2."""
         pair, response = self.machine.mesh.pair, self.response
         driver_mps = pair.driver.base_radius_mm * response["driver angle velocity"]
-        rate: FloatArray = 1e-3 * (driver_mps - pair.driven.base_radius_mm * response["driven angle velocity"])
-        return rate
+        return 1e-3 * (driver_mps - pair.driven.base_radius_mm * response["driven angle velocity"])
 
     @property
     def separated_share(self) -> float:

@@ -68,17 +68,13 @@ def write_set(recording: Recording, names: FileSet) -> None:
     try:
         write_recording(recording, parts.recording)
         write_rig(recording.rig, parts.rig)
-        parts.truth.write_text(truth_json(recording.truth), encoding="utf-8")
+        truth = json.dumps(dict(recording.truth), indent=2, ensure_ascii=False, default=_plain)
+        parts.truth.write_text(truth + "\n", encoding="utf-8")
         _move(parts, names)
     except OSError as error:
         raise InputError(f"cannot be written ({error})", where=str(names.recording), remedy="check the disk") from error
     finally:
         shutil.rmtree(unfinished, ignore_errors=True)
-
-
-def truth_json(truth: Mapping[str, Any]) -> str:
-    """Return a truth as text for people and programs."""
-    return json.dumps(dict(truth), indent=2, ensure_ascii=False, default=_plain) + "\n"
 
 
 def _move(parts: FileSet, names: FileSet) -> None:

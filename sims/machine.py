@@ -9,7 +9,7 @@ from math import cos, isfinite, pi, radians, sin, sqrt
 
 import numpy as np
 
-from gearsig.checks import FloatArray, count, frozen_array, known_name, not_negative, one_of, positive, within
+from gearsig.checks import FloatArray, count, frozen_array, not_negative, one_of, positive, within
 from gearsig.compiled import UNCOUNTED, njit
 from gearsig.errors import InputError, RefusalError
 from gearsig.rig import Bearing, Rig
@@ -404,12 +404,6 @@ class Machine:
         return self.mesh.pair.driven.teeth / self.mesh.pair.driver.teeth
 
 
-def bearing_index(machine: Machine, name: str) -> int:
-    """Place of a bearing in `machine.bearings` by its name."""
-    names = [support.bearing.name for support in machine.bearings]
-    return names.index(known_name(name, names, f"there is no bearing {name!r}"))
-
-
 # --------------------
 # How a machine is run: speed and torque over time.
 # --------------------
@@ -467,8 +461,7 @@ class Profile:
 
     def at(self, time_s: FloatArray | float) -> FloatArray:
         """Value at the given times."""
-        result: FloatArray = np.asarray(np.interp(time_s, self.times_s, self.values))
-        return result
+        return np.asarray(np.interp(time_s, self.times_s, self.values))
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import cos, sin, sqrt
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -10,46 +11,20 @@ from numba import njit
 from sims.blind._rig import REACH
 
 # --------------------
-# Places in the vector of single values that the compiled march takes.
+# The single values that the compiled march takes; those of both gears, or of both shafts' bearings, in pairs.
 # --------------------
 
-
-(
-    RB_1,
-    RB_2,
-    LINE_X,
-    LINE_Y,
-    BASE_PITCH,
-    CONTACT_RATIO,
-    RHO_START,
-    RHO_SUM,
-    SOFT_M,
-    BACKLASH_M,
-    MESH_DAMPING,
-    BACK_STIFFNESS,
-    LOAD_NM,
-    LOAD_SLOPE,
-    MOTOR_NM,
-    MOTOR_GAIN,
-    MOTOR_MEMORY,
-    LINE_INERTIA,
-    WEDGE_M,
-    GRID_S,
-    OMEGA_1,
-    OMEGA_2,
-    CAGE_RATIO_1,
-    CAGE_RATIO_2,
-    N_BALLS_1,
-    N_BALLS_2,
-    BALL_RIPPLE,
-    PHASE_2,
-    SEAT_1,
-    SEAT_2,
-    HEIGHT,
-    END_A,
-    END_E,
-) = range(33)
-N_NUMBERS = 33
+NUMBERS = np.dtype(
+    [
+        (name, np.float64)
+        for name in (
+            *("base_pitch", "contact_ratio", "rho_start", "rho_sum", "end_a", "end_e", "phase_2", "line_x", "line_y"),
+            *("soft_m", "backlash_m", "wedge_m", "mesh_damping", "back_stiffness", "ball_ripple", "height"),
+            *("load_nm", "load_slope", "motor_nm", "motor_gain", "motor_memory", "line_inertia", "grid_s"),
+        )
+    ]
+    + [(name, np.float64, (2,)) for name in ("rb", "omega", "cage_ratio", "n_balls", "seat")]
+)
 
 # --------------------
 # The compiled mesh: pairs in reach, their gaps, and the force by Newton's method.
@@ -82,7 +57,7 @@ def _at(table: np.ndarray, spot: float) -> float:
 @njit(cache=True)
 def pairs_in_reach(
     pairs: np.ndarray,
-    number: np.ndarray,
+    number: Any,
     theta_1: float,
     shift: float,
     opening: float,
@@ -99,9 +74,9 @@ def pairs_in_reach(
     """
     gap_0, pair_k, slip, gap_1, gap_2, weak_1, weak_2 = tables
     z1, z2, n_path = gap_1.shape[0], gap_2.shape[0], gap_0.shape[0]
-    pb, ratio = number[BASE_PITCH], number[CONTACT_RATIO]
+    pb, ratio = number.base_pitch, number.contact_ratio
     per_place = (n_path - 1) / (ratio + 2.0 * REACH)
-    cycle = number[RB_1] * theta_1 / pb
+    cycle = number.rb[0] * theta_1 / pb
     n = 0
     for j in range(int(np.ceil(cycle - ratio - REACH)), int(np.floor(cycle + REACH)) + 1):
         spot = (cycle - j + REACH) * per_place
@@ -111,13 +86,13 @@ def pairs_in_reach(
         b = spot - i
         a = 1.0 - b
         t1, t2 = (j + offsets[0]) % z1, (j + offsets[1]) % z2
-        moved = opening * number[END_A] + shift / pb if cycle - j < 0.5 * ratio else opening * number[END_E]
+        moved = opening * number.end_a + shift / pb if cycle - j < 0.5 * ratio else opening * number.end_e
         base = _at(gap_0, spot - moved * per_place)
         weak = a * (weak_1[t1, i] + weak_2[t2, i]) + b * (weak_1[t1, i + 1] + weak_2[t2, i + 1])
         pairs[n, GAP] = base + a * (gap_1[t1, i] + gap_2[t2, i]) + b * (gap_1[t1, i + 1] + gap_2[t2, i + 1])
         pairs[n, STIFFNESS] = (a * pair_k[i] + b * pair_k[i + 1]) / (1.0 + weak)
         pairs[n, SLIP] = a * slip[i] + b * slip[i + 1]
-        pairs[n, RHO] = number[RHO_START] + (cycle - j) * pb
+        pairs[n, RHO] = number.rho_start + (cycle - j) * pb
         n += 1
     return n
 
@@ -125,14 +100,14 @@ def pairs_in_reach(
 @njit(cache=True)
 def mesh_force(
     force: float, gamma: float, gamma_v: float, x: float, v: float, h: float, n_pairs: int, pairs: np.ndarray,
-    number: np.ndarray,
+    number: Any,
 ) -> float:  # fmt: skip
     """Solve F = Σ F_i(x − γF, v − γ_v F) by Newton's method from `force`; the pairs receive what they carry.
 
     F_i = k_i (s(x − E_i) + c s' v), never a pull; the back flanks carry as one, at mean stiffness. x has the run-out
     taken off, which moves both flanks of a tooth.
     """
-    damping, back = number[MESH_DAMPING], number[BACK_STIFFNESS]
+    damping, back = number.mesh_damping, number.back_stiffness
     for _ in range(8):
         now, speed = x - gamma * force, v - gamma_v * force
         total, slope = 0.0, 0.0
@@ -143,7 +118,7 @@ def mesh_force(
             if carried > 0.0:
                 total += carried
                 slope += pairs[i, STIFFNESS] * rate * (gamma + damping * gamma_v)
-        squeeze, rate = soft(-now - number[BACKLASH_M], h)
+        squeeze, rate = soft(-now - number.backlash_m, h)
         carried = back * (squeeze - damping * rate * speed)
         if carried > 0.0:
             total -= carried
@@ -189,19 +164,19 @@ def centre_opening(runout: np.ndarray, theta_1: float, theta_2: float) -> float:
 
 @njit(cache=True)
 def drive(
-    push: np.ndarray, number: np.ndarray, u: np.ndarray, v: np.ndarray, time: float, behind: float,
+    push: np.ndarray, number: Any, u: np.ndarray, v: np.ndarray, time: float, behind: float,
     speed: np.ndarray, torque: np.ndarray,
 ) -> float:  # fmt: skip
     """Add the motor that follows its reference speed and the load that rises with speed; return the speed error."""
-    at = time / number[GRID_S]
+    at = time / number.grid_s
     cell = min(int(at), speed.shape[0] - 2)
     part = at - cell
     set_speed = speed[cell, 0] + part * (speed[cell + 1, 0] - speed[cell, 0])
     gain = speed[cell, 1] + part * (speed[cell + 1, 1] - speed[cell, 1])
     error = set_speed - v[7]
-    push[0] += number[MOTOR_NM] + number[LINE_INERTIA] * gain
-    push[0] += number[MOTOR_GAIN] * (error + behind * number[MOTOR_MEMORY])
-    push[3] -= number[LOAD_NM] + number[LOAD_SLOPE] * (v[8] - number[OMEGA_2])
+    push[0] += number.motor_nm + number.line_inertia * gain
+    push[0] += number.motor_gain * (error + behind * number.motor_memory)
+    push[3] -= number.load_nm + number.load_slope * (v[8] - number.omega[1])
     for r in range(torque.shape[0]):
         place, angle = (0, u[7]) if torque[r, 0] == 0.0 else (3, u[8])
         push[place] += torque[r, 2] * cos(torque[r, 1] * angle + torque[r, 3])
@@ -209,18 +184,18 @@ def drive(
 
 
 @njit(cache=True)
-def push_rotor(push: np.ndarray, number: np.ndarray, body: int, x: float, y: float) -> None:
+def push_rotor(push: np.ndarray, number: Any, body: int, x: float, y: float) -> None:
     """Add a force on a rotor and its reaction on the casing at the bearing's seat."""
     push[4 + 2 * body] += x
     push[5 + 2 * body] += y
     push[8] -= x
     push[9] -= y
-    push[10] += x * number[HEIGHT] - y * number[SEAT_1 + body]
+    push[10] += x * number.height - y * number.seat[body]
 
 
 @njit(cache=True)
 def bearings(
-    push: np.ndarray, held: np.ndarray, number: np.ndarray, u: np.ndarray, theta_1: float, theta_2: float,
+    push: np.ndarray, held: np.ndarray, number: Any, u: np.ndarray, theta_1: float, theta_2: float,
     bearing_k: np.ndarray, clearance: np.ndarray, unbalance: np.ndarray,
 ) -> None:  # fmt: skip
     """Add clearance and unbalance; `held` receives the forces on the casing.
@@ -229,11 +204,11 @@ def bearings(
     spring is in the modes, so what clearance takes from it is given back here.
     """
     for i in range(2):
-        theta, omega, sense = (theta_1, number[OMEGA_1], 1.0) if i == 0 else (theta_2, number[OMEGA_2], -1.0)
+        theta, omega, sense = (theta_1, number.omega[0], 1.0) if i == 0 else (theta_2, number.omega[1], -1.0)
         dx, dy = u[3 + 2 * i], u[4 + 2 * i]
         r = sqrt(dx * dx + dy * dy) + 1e-15
-        passing = cos(number[N_BALLS_1 + i] * number[CAGE_RATIO_1 + i] * theta)
-        loose = clearance[i] * (1.0 + number[BALL_RIPPLE] * passing)
+        passing = cos(number.n_balls[i] * number.cage_ratio[i] * theta)
+        loose = clearance[i] * (1.0 + number.ball_ripple * passing)
         share = (sqrt(r * r + loose * loose) - loose) / r
         full_x, full_y = bearing_k[i, 0] * dx, bearing_k[i, 1] * dy
         held[2 * i], held[2 * i + 1] = full_x * share, full_y * share
@@ -268,14 +243,14 @@ def pulse(
 
 @njit(cache=True)
 def trains(
-    push: np.ndarray, held: np.ndarray, number: np.ndarray, theta_1: float, theta_2: float, pointers: np.ndarray,
+    push: np.ndarray, held: np.ndarray, number: Any, theta_1: float, theta_2: float, pointers: np.ndarray,
     all_trains: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray],
 ) -> None:  # fmt: skip
     """Add pulses at shaft angles: torques, or forces between a rotor and the casing."""
     starts, forces, turns, kinds, widths_s = all_trains
     for r in range(starts.shape[0]):
         on_first = kinds[r, 0] == 0.0
-        theta, omega = (theta_1, number[OMEGA_1]) if on_first else (theta_2, number[OMEGA_2])
+        theta, omega = (theta_1, number.omega[0]) if on_first else (theta_2, number.omega[1])
         force, pointers[r] = pulse(theta, omega, widths_s[r], starts[r], forces[r], pointers[r])
         if force == 0.0:
             continue
@@ -324,7 +299,7 @@ def add_mesh(
     force: float,
     n_pairs: int,
     pairs: np.ndarray,
-    number: np.ndarray,
+    number: Any,
     shapes: np.ndarray,
     outputs: np.ndarray,
 ) -> None:
@@ -334,8 +309,8 @@ def add_mesh(
         rub = pairs[i, SLIP] * pairs[i, CARRIED]
         side += rub
         torque_1 += rub * pairs[i, RHO]
-        torque_2 -= rub * (number[RHO_SUM] - pairs[i, RHO])
-    off_x, off_y = side * number[LINE_Y], -side * number[LINE_X]
+        torque_2 -= rub * (number.rho_sum - pairs[i, RHO])
+    off_x, off_y = side * number.line_y, -side * number.line_x
     for m in range(f.shape[0]):
         f[m] += shapes[1, m] * torque_1 + shapes[2, m] * torque_2 - outputs[0, m] * force
         f[m] += off_x * (shapes[6, m] - shapes[4, m]) + off_y * (shapes[7, m] - shapes[5, m])
@@ -361,7 +336,7 @@ def keep(
 
 @njit(cache=True)
 def march(
-    n_out: int, n_before: int, stride: int, step_s: float, number: np.ndarray, modal: Modal, q: np.ndarray,
+    n_out: int, n_before: int, stride: int, step_s: float, number: Any, modal: Modal, q: np.ndarray,
     p: np.ndarray, supports: Supports, tables: Tables, offsets: np.ndarray, lines: Lines, speed: np.ndarray,
     all_trains: Trains,
 ) -> np.ndarray:  # fmt: skip
@@ -386,8 +361,8 @@ def march(
             predict(steps, q, p, f, q_new, p_new)
         look(outputs, q_new, p_new, u, v)
         # Turned to the tooth it meets with, the driven shaft is turned as a whole, from the gear to the brake.
-        u[2] += number[PHASE_2]
-        u[8] += number[PHASE_2]
+        u[2] += number.phase_2
+        u[8] += number.phase_2
         theta_1, theta_2 = u[1], u[2]
         for m in range(n):
             push[m] = steady[m]
@@ -396,7 +371,7 @@ def march(
         sways(push, sway, theta_1, theta_2)
         trains(push, held, number, theta_1, theta_2, pointers, all_trains)
         shift, opening = waves(runout, theta_1, theta_2), centre_opening(runout, theta_1, theta_2)
-        h = number[SOFT_M] + 0.5 * abs(number[WEDGE_M] + waves(wobble, theta_1, theta_2))
+        h = number.soft_m + 0.5 * abs(number.wedge_m + waves(wobble, theta_1, theta_2))
         n_pairs = pairs_in_reach(pairs, number, theta_1, shift, opening, offsets, tables)
         # Everything but the mesh is known now; its force follows from the compression it leaves.
         x_free, v_free = u[0], v[0]
@@ -419,5 +394,5 @@ def march(
         if step % stride == 0 and step // stride > n_before:
             row = out[step // stride - n_before - 1]
             keep(row, held, force, modal, q, p, f)
-            row[8] += number[PHASE_2]
+            row[8] += number.phase_2
     return out

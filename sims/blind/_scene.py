@@ -12,8 +12,7 @@ import numpy as np
 from gearsig.checks import FloatArray
 from gearsig.recording import Channel, Recording
 from gearsig.rig import Sensor
-from sims.blind import _march as at
-from sims.blind._march import march
+from sims.blind._march import NUMBERS, march
 from sims.blind._rig import (
     N_PATH,
     SHAFTS,
@@ -245,15 +244,15 @@ def march_arguments(scene: Scene, sub_steps: int, **numbers: float) -> tuple[Any
     rate_hz, step_s = 2 * rig.sampling_rate_hz, 1 / (rig.sampling_rate_hz * sub_steps)
     modes = modes_of(rig.parts)
     q, p, steady = _start(scene, modes)
-    number = _numbers(scene)
-    for name, value in numbers.items():
-        number[getattr(at, name.upper())] = value
+    number = np.zeros((), NUMBERS)
+    for name, value in (_numbers(scene) | numbers).items():
+        number[name] = value
     return (
         2 * round(condition.duration_s * rig.sampling_rate_hz),
         round(WARM_UP_S * rate_hz),
         sub_steps // 2,
         step_s,
-        number,
+        number[()],
         (step_coefficients(modes, step_s), modes.shapes, modes.outputs, modes.omega, modes.zeta),
         q,
         p,
@@ -292,34 +291,44 @@ def _friction_nm(scene: Scene) -> float:
     return float(scene.mesh_force_n * lever.mean())
 
 
-def _numbers(scene: Scene) -> Matrix:
+def _numbers(scene: Scene) -> dict[str, Any]:
+    """Values of `NUMBERS`."""
     rig, pair, parts = scene.rig, scene.rig.pair, scene.rig.parts
     j = parts.inertia_kgm2
     ratio = pair.z1 / pair.z2
     line_inertia = j[0] + j[1] + (j[2] + j[3]) * ratio**2
     effective = 1 / (pair.base_radii_m[0] ** 2 / j[1] + pair.base_radii_m[1] ** 2 / j[2])
-    number = np.zeros(at.N_NUMBERS)
-    number[[at.RB_1, at.RB_2]] = pair.base_radii_m
-    number[[at.LINE_X, at.LINE_Y]] = np.cos(parts.line_angle), np.sin(parts.line_angle)
-    number[[at.BASE_PITCH, at.CONTACT_RATIO]] = pair.base_pitch_m, pair.contact_ratio
-    number[[at.RHO_START, at.RHO_SUM]] = pair.rho_start_m, pair.centre_distance_m * sin(pair.alpha)
-    number[[at.SOFT_M, at.WEDGE_M, at.BACKLASH_M]] = rig.soft_m, scene.wedge_m, scene.backlash_m
-    number[at.MESH_DAMPING] = 2 * rig.mesh_damping_ratio * np.sqrt(effective / rig.mesh_stiffness_n_per_m())
-    number[at.BACK_STIFFNESS] = rig.mesh_stiffness_n_per_m()
-    number[at.LOAD_NM] = scene.condition.true_nm / ratio
-    number[at.LOAD_SLOPE] = rig.load_slope * scene.condition.true_nm / ratio / scene.omega[1]
-    number[at.MOTOR_NM], number[at.LINE_INERTIA] = scene.condition.true_nm + _friction_nm(scene), line_inertia
-    number[at.MOTOR_MEMORY] = 0.5 / rig.motor_time_s
-    number[at.MOTOR_GAIN] = line_inertia / rig.motor_time_s
-    number[at.GRID_S] = GRID_S
-    number[[at.OMEGA_1, at.OMEGA_2]] = scene.omega
-    for i, (cage, balls) in enumerate(((at.CAGE_RATIO_1, at.N_BALLS_1), (at.CAGE_RATIO_2, at.N_BALLS_2))):
-        number[cage], number[balls] = rig.bearing(i).orders()["FTF"], rig.bearings[i][0]
-    number[[at.END_A, at.END_E]] = pair.end_shift_per_m()
-    number[at.BALL_RIPPLE] = scene.ball_ripple
-    number[at.PHASE_2] = 2 * pi * scene.offsets[1] / pair.z2
-    number[[at.SEAT_1, at.SEAT_2]], number[at.HEIGHT] = parts.seat_x_m, parts.height_m
-    return number
+    end_a, end_e = pair.end_shift_per_m()
+    return {
+        "rb": pair.base_radii_m,
+        "line_x": np.cos(parts.line_angle),
+        "line_y": np.sin(parts.line_angle),
+        "base_pitch": pair.base_pitch_m,
+        "contact_ratio": pair.contact_ratio,
+        "rho_start": pair.rho_start_m,
+        "rho_sum": pair.centre_distance_m * sin(pair.alpha),
+        "soft_m": rig.soft_m,
+        "wedge_m": scene.wedge_m,
+        "backlash_m": scene.backlash_m,
+        "mesh_damping": 2 * rig.mesh_damping_ratio * np.sqrt(effective / rig.mesh_stiffness_n_per_m()),
+        "back_stiffness": rig.mesh_stiffness_n_per_m(),
+        "load_nm": scene.condition.true_nm / ratio,
+        "load_slope": rig.load_slope * scene.condition.true_nm / ratio / scene.omega[1],
+        "motor_nm": scene.condition.true_nm + _friction_nm(scene),
+        "line_inertia": line_inertia,
+        "motor_memory": 0.5 / rig.motor_time_s,
+        "motor_gain": line_inertia / rig.motor_time_s,
+        "grid_s": GRID_S,
+        "omega": scene.omega,
+        "cage_ratio": [rig.bearing(i).orders()["FTF"] for i in range(2)],
+        "n_balls": [rig.bearings[i][0] for i in range(2)],
+        "end_a": end_a,
+        "end_e": end_e,
+        "ball_ripple": scene.ball_ripple,
+        "phase_2": 2 * pi * scene.offsets[1] / pair.z2,
+        "seat": parts.seat_x_m,
+        "height": parts.height_m,
+    }
 
 
 def _rows(rows: Rows, width: int) -> Matrix:

@@ -9,12 +9,11 @@ from math import cos, sin
 import numpy as np
 
 from gearsig.compiled import copy, njit
-from sims.gear_pair import carried_part, element_forces, foot
+from sims.gear_pair import carried_part, element_forces, foot, friction_of_pair
 from sims.machine import profile_value, set_speed, torque_ripple
 from sims.mesh import (
     MAX_CYCLES,
     advance,
-    contact_friction_n,
     cubic,
     engagement_and_slope,
     height_now,
@@ -52,7 +51,7 @@ def late_entry(k, dx, dy):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def contact_forces(  # noqa: PLR0915  one pass over the pairs: no part of it stands alone
+def contact_forces(
     k, curves, rows, pitch, delta, delta_rate, late, cycles, cycle_rate, omega_1, omega_2, slip_x, rough, rough_rate
 ):
     """(ΣN, torque −∂U/∂c, Σf, Σfρ1, Σfρ2) of the driving flanks.
@@ -105,38 +104,25 @@ def contact_forces(  # noqa: PLR0915  one pass over the pairs: no part of it sta
             continue
         shape_slope = sa * a + sb * b + sc * c + sd * d
         force, stiffness = pair_force(depth, compliance, k.contact_coefficient, k.load_dependent, 1.0)
-        gate = 1.0
-        if depth < k.damping_ramp:
-            u = depth / k.damping_ramp
-            gate = u * u * (3.0 - 2.0 * u)
         depth_rate = delta_rate - rough_rate - shape_slope * cycle_rate
-        total = weight * (force + k.damping_time * gate * stiffness * depth_rate)
+        total = weight * (force + k.damping_time * _damped_part(k, depth) * stiffness * depth_rate)
         total = max(total, 0.0)
         normal += total
         along_cycles += total * shape_slope + weight * 0.5 * force * force * compliance_slope
         if weight_slope != 0.0:
             along_cycles -= weight_slope * energy_of_pair(depth, compliance, force, k.load_dependent)
         if k.friction and total > 0.0:
-            rho_1 = k.start_radius + progress * k.base_pitch
-            rho_2 = k.action_length - rho_1
-            rubbing = contact_friction_n(
-                total,
-                omega_1 * rho_1,
-                omega_2 * rho_2,
-                slip_x,
-                rho_1 * rho_2 / k.action_length,
-                k.width / k.n_slices,
-                k.reduced_modulus,
-                k.log10_oil,
-                k.oil_constant,
-                k.sign_threshold,
-                k.friction_factor,
-                k.dry_friction,
-            )
-            friction += rubbing
-            moment_1 += rubbing * rho_1
-            moment_2 += rubbing * rho_2
+            width = k.width / k.n_slices
+            rubbing, on_1, on_2 = friction_of_pair(k, total, progress, omega_1, omega_2, slip_x, width)
+            friction, moment_1, moment_2 = friction + rubbing, moment_1 + on_1, moment_2 + on_2
     return normal, along_cycles, friction, moment_1, moment_2
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _damped_part(k, depth):
+    """Part of its damping that a contact has, which comes in smoothly."""
+    u = min(depth / k.damping_ramp, 1.0)
+    return u * u * (3.0 - 2.0 * u)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -176,11 +162,7 @@ def back_flank_force(k, depth, rate):
     """(N', U') of the flanks behind, pressed by `depth`: one constant stiffness, its damping as on the driving side."""
     if depth <= 0.0:
         return 0.0, 0.0
-    gate = 1.0
-    if depth < k.damping_ramp:
-        u = depth / k.damping_ramp
-        gate = u * u * (3.0 - 2.0 * u)
-    force = k.back_stiffness * (depth + k.damping_time * gate * rate)
+    force = k.back_stiffness * (depth + k.damping_time * _damped_part(k, depth) * rate)
     return max(force, 0.0), 0.5 * k.back_stiffness * depth * depth
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import cos, floor, pi, sin, sqrt
 from typing import Any
@@ -331,16 +331,11 @@ def _frequencies_hz(m: FloatArray, k: FloatArray) -> FloatArray:
     from scipy.linalg import eigh
 
     squares = eigh(k, m, eigvals_only=True)
-    result: FloatArray = np.sqrt(np.maximum(squares, 0.0)) / (2.0 * pi)
-    return result
-
-
-def _fastest_rate_per_s(m: FloatArray, k: FloatArray, c: FloatArray) -> float:
-    """Largest magnitude of an eigenvalue of the damped machine: heavy dampers are as stiff as springs to a solver."""
-    return float(np.max(np.abs(_eigenvalues_per_s(m, k, c))))
+    return np.sqrt(np.maximum(squares, 0.0)) / (2.0 * pi)
 
 
 def _eigenvalues_per_s(m: FloatArray, k: FloatArray, c: FloatArray) -> NDArray[np.complex128]:
+    """Of the damped machine: heavy dampers are as stiff as springs to a solver."""
     n, per_mass = N_COORDINATES, 1.0 / np.diag(m)[:, None]
     state = np.zeros((2 * n, 2 * n))
     state[:n, n:] = np.eye(n)
@@ -365,7 +360,7 @@ def default_step_s(machine: Machine, operation: Operation, step_angle_rad: float
     """Step that stiffness, damping and tooth passage allow."""
     m, k, c = matrices(machine, mesh_force_n(machine, operation))
     fastest = 2.0 * pi * float(_frequencies_hz(m, k)[-1])
-    step = min(step_angle_rad / fastest, STABLE / _fastest_rate_per_s(m, k, c))
+    step = min(step_angle_rad / fastest, STABLE / float(np.abs(_eigenvalues_per_s(m, k, c)).max()))
     mesh_hz = operation.speed_rpm.largest / 60.0 * machine.mesh.pair.driver.teeth
     if mesh_hz > 0.0 and machine.mesh.ramp > 0.0:
         step = min(step, machine.mesh.ramp / mesh_hz / STEPS_PER_RAMP)
@@ -441,8 +436,6 @@ def respond(
     step_s: float | None = None,
     stride: int = 1,
     first: PairState | None = None,
-    on_progress: Callable[[float], None] | None = None,
-    steps_per_call: int = STEPS_PER_CALL,
 ) -> Response:
     """Integrate the sixteen coordinates from the static balance on, or from where another run ended.
 
@@ -464,10 +457,6 @@ def respond(
         Every how many steps a point is kept.
     first : PairState or None
         `Response.last` of another run; None: the static balance at `start_s`.
-    on_progress : callable or None
-        Called now and then with the part that is done, 0 to 1.
-    steps_per_call : int
-        Of compiled code between two of these calls.
 
     Raises
     ------
@@ -482,7 +471,7 @@ def respond(
     for that step.
     """
     step = default_step_s(machine, operation) if step_s is None else step_s
-    plan = RunPlan(start_s, duration_s, step, stride, steps_per_call)
+    plan = RunPlan(start_s, duration_s, step, stride, STEPS_PER_CALL)
     ready = prepare(machine, operation, rng, start_s, first)
     q, v = ready.q.copy(), ready.v.copy()  # the kernel overwrites them
     set_angle = q[:1].copy() if first is None else np.array([first.set_angle_rad])
@@ -515,7 +504,6 @@ def respond(
         signals,
         with_energy=False,
         remedy="look for stiffness, damping and inertia that do not go together, or give a shorter step_s",
-        on_progress=on_progress,
     )
     last = PairState(q, v, float(set_angle[0]))
     return Response(start_s, step * stride, kept, step, energies, last)

@@ -382,12 +382,6 @@ def user_files() -> tuple[Path, ...]:
     return tuple(Path(text) for text in os.environ.get(VARIABLE, "").split(os.pathsep) if text)
 
 
-def with_user_file(path: Path) -> str:
-    """Return the variable's value with a further file."""
-    files = dict.fromkeys([*map(str, user_files()), str(path.resolve())])
-    return os.pathsep.join(files)
-
-
 def loaded(path: Path) -> Effect:
     """Return the effect of a file.
 
@@ -480,7 +474,8 @@ def add_effect(path: str | Path) -> Effect:
         If it cannot be used, or an effect of that name is there already.
     """
     before = os.environ.get(VARIABLE)
-    os.environ[VARIABLE] = with_user_file(Path(path))
+    files = dict.fromkeys([*map(str, user_files()), str(Path(path).resolve())])
+    os.environ[VARIABLE] = os.pathsep.join(files)
     effects.cache_clear()
     try:
         effects()

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from gearsig.checks import within
+from gearsig.checks import known_name, within
 from gearsig.errors import InputError
 from sims.effects._effect import MachineFacts, Option, Options, OptionValue, PlausibleRange, Scale, Severity
-from sims.machine import RACE_EDGE_MM, BearingSupport, Machine, RaceDefect, bearing_index
+from sims.machine import RACE_EDGE_MM, BearingSupport, Machine, RaceDefect
 from sims.measure import MeasuredChannel
 from sims.mesh import GearGeometry, RootCrack, ToothChip, ToothSpall
 
@@ -39,7 +39,8 @@ RACE_OPTIONS = (
 def chosen_bearing(machine: Machine, options: Options) -> int:
     """Place of the chosen bearing in the machine."""
     name = str(options["bearing"])
-    return bearing_index(machine, name) if name else 0
+    names = [support.bearing.name for support in machine.bearings]
+    return names.index(known_name(name, names, f"there is no bearing {name!r}")) if name else 0
 
 
 def with_bearing(machine: Machine, index: int, **changes: object) -> Machine:

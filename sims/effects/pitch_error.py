@@ -8,6 +8,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 from sims.effects import _parts as parts
+from sims.effects import textbook as book
 from sims.effects._effect import (
     GEAR_OPTION,
     TOOTH_OPTION,
@@ -17,20 +18,6 @@ from sims.effects._effect import (
     Options,
     PlausibleRange,
     Severity,
-)
-from sims.effects.textbook import (
-    MAX_ADVANCE,
-    UP,
-    Signature,
-    SyntheticScene,
-    Textbook,
-    balance,
-    draw_side,
-    late_tooth,
-    over_teeth,
-    sign,
-    swollen,
-    tooth_window,
 )
 from sims.machine import Machine, pitch_tolerance_um
 from sims.mesh import FlankDeviation
@@ -69,32 +56,34 @@ def cumulative_pitch(n_teeth: int, rng: np.random.Generator) -> FloatArray:
     return np.asarray(cumulative - cumulative.mean())
 
 
-def textbook_signature(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
+def textbook_signature(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
     """Each tooth comes early or late by its own amount: lines at all orders of its shaft; or one tooth does."""
     if rng.uniform() < ONE_TOOTH_SHARE:
         return _pitch_of_one_tooth(scene, size, rng)
     return pitch_of_all_teeth(scene, size, rng)
 
 
-def _pitch_of_one_tooth(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
+def _pitch_of_one_tooth(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
     """One tooth comes early or late, and takes more or less of the load than its neighbours."""
-    side = draw_side(rng)
-    window, _ = tooth_window(scene, side, float(rng.uniform(1.0, 2.5)), rng)
-    late, gain, _ = balance(rng, 3)
-    return Signature(swollen(0.6 * sign(rng) * gain * size, window), late_tooth(scene, late * size, window, rng))
+    side = book.draw_side(rng)
+    window, _ = book.tooth_window(scene, side, float(rng.uniform(1.0, 2.5)), rng)
+    late, gain, _ = book.balance(rng, 3)
+    return book.Signature(
+        book.swollen(0.6 * book.sign(rng) * gain * size, window), book.late_tooth(scene, late * size, window, rng)
+    )
 
 
-def pitch_of_all_teeth(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
+def pitch_of_all_teeth(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
     """Each tooth comes early or late by its own amount: lines at all orders of its shaft."""
-    side = draw_side(rng)
+    side = book.draw_side(rng)
     errors, gains = (rng.standard_normal(scene.teeth[side]) for _ in range(2))
-    at, gain, slow = balance(rng, 3)
+    at, gain, slow = book.balance(rng, 3)
     run = np.cumsum(errors - errors.mean())
-    early, louder, low = (over_teeth(scene, side, of_teeth) for of_teeth in (errors, gains, run))
+    early, louder, low = (book.over_teeth(scene, side, of_teeth) for of_teeth in (errors, gains, run))
     low = low / max(float(run.std()), 1e-12)
-    return Signature(
+    return book.Signature(
         np.maximum(1.0 + 0.6 * gain * size * louder, 0.0),
-        0.3 * MAX_ADVANCE * min(at * size, 1.0) / scene.teeth[0] * np.clip(early, -2.5, 2.5),
+        0.3 * book.MAX_ADVANCE * min(at * size, 1.0) / scene.teeth[0] * np.clip(early, -2.5, 2.5),
         (0.5 * slow * size * low,),
     )
 
@@ -141,8 +130,8 @@ EFFECT = Effect(
             (options, (0, 2)) for stands in STANDS for options in parts.first_teeth(machine, stands=stands)
         ],
     ),
-    textbook=Textbook(
-        (("tooth.{side}.elsewhere", UP), ("shaft.{side}.low", UP), ("sideband.{side}.3to5", UP)),
+    textbook=book.Textbook(
+        (("tooth.{side}.elsewhere", book.UP), ("shaft.{side}.low", book.UP), ("sideband.{side}.3to5", book.UP)),
         "all orders of the shaft rise, at every tooth",
         textbook_signature,
     ),

@@ -67,10 +67,13 @@ class GearBlank:
 
     def __post_init__(self) -> None:
         self._check_bore()
-        if self.web_thickness_mm is None:
-            self._refuse_parts_without_web()
-        else:
+        if self.web_thickness_mm is not None:
             self._check_web()
+            return
+        for name in ("rim_thickness_mm", "hub_thickness_mm"):
+            value = getattr(self, name)
+            if value is not None:
+                raise InputError(f"{name} is {value:g} mm, but a full disc has none", remedy="give web_thickness_mm")
 
     @property
     def n_teeth(self) -> int:
@@ -87,7 +90,9 @@ class GearBlank:
         """Inner radius of the rim; of a full disc, the radius where the fine mesh below the teeth ends."""
         thickness = 3.0 * self.geometry.module_mm if self.rim_thickness_mm is None else self.rim_thickness_mm
         radius = self.geometry.root_radius_mm - thickness
-        return radius if self.web_thickness_mm is not None else max(radius, self._middle_of_body_mm)
+        if self.web_thickness_mm is not None:
+            return radius
+        return max(radius, (self.geometry.root_radius_mm + self.geometry.bore_mm) / 2.0)
 
     @property
     def hub_radius_mm(self) -> float:
@@ -108,10 +113,6 @@ class GearBlank:
         values |= {"geometry": GearGeometry(**values["geometry"]), "material": Material(**values["material"])}
         return cls(**values)
 
-    @property
-    def _middle_of_body_mm(self) -> float:
-        return (self.geometry.root_radius_mm + self.geometry.bore_mm) / 2.0
-
     def _check_bore(self) -> None:
         g = self.geometry
         largest = g.root_radius_mm - MIN_RIM * g.module_mm
@@ -121,12 +122,6 @@ class GearBlank:
                 allowed=f"at most {largest:.4g} mm, 1 module below the root circle",
                 remedy="take a smaller bore",
             )
-
-    def _refuse_parts_without_web(self) -> None:
-        for name in ("rim_thickness_mm", "hub_thickness_mm"):
-            value = getattr(self, name)
-            if value is not None:
-                raise InputError(f"{name} is {value:g} mm, but a full disc has none", remedy="give web_thickness_mm")
 
     def _check_web(self) -> None:
         g = self.geometry
@@ -206,8 +201,7 @@ def flank_place(gear: GearGeometry, roll_rad: FloatArray) -> FloatArray:
     """Arc length over total length of `side_curve` at roll angles of the involute, 0 to 1."""
     total = side_curve(gear)[1]
     length_to_tip = gear.base_radius_mm * (gear.tip_roll_rad**2 - np.asarray(roll_rad) ** 2) / 2.0
-    place: FloatArray = 1.0 - length_to_tip / total
-    return place
+    return 1.0 - length_to_tip / total
 
 
 @lru_cache(maxsize=64)

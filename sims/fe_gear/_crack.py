@@ -164,8 +164,7 @@ def tooth_compliance_with(mesh: SectorMesh, chain: FloatArray, grid: FlankGrid, 
     """
     stiffness, kept = _ring(mesh, chain)
     rows = flank_rows(mesh, grid, spread, np.arange(mesh.n_nodes), 3 * mesh.n_nodes)[:, kept]
-    compliance: FloatArray = rows @ factorised(stiffness)(rows.T)
-    return compliance
+    return rows @ factorised(stiffness)(rows.T)
 
 
 def _ring(mesh: SectorMesh, chain: FloatArray) -> tuple[sparse.csc_array, IntArray]:
@@ -247,8 +246,7 @@ def _free_dof(mesh: SectorMesh) -> IntArray:
 
 def _free_side(mesh: SectorMesh, side: IntArray) -> IntArray:
     free = side[~np.isin(side, mesh.bore)]
-    dof: IntArray = (3 * free[:, None] + np.arange(3)).ravel()
-    return dof
+    return (3 * free[:, None] + np.arange(3)).ravel()
 
 
 # What cracks add to the compliance of a reduced gear's tooth, from finite elements, kept over depth and width.
@@ -282,15 +280,13 @@ def crack_added_m_per_n(gear: ReducedGear, crack: RootCrack) -> FloatArray:
     Raises
     ------
     InputError
-        If the crack goes past the tooth, its front is not straight, or the mesh cannot follow it.
+        If the crack goes past the tooth, or the mesh cannot follow it.
 
     Notes
     -----
     Cracks of the ready-made gears at 45° come with the product. Others take seconds once and are kept on disk.
     """
     check_crack(gear.blank.geometry, crack)
-    if crack.front != "straight":
-        raise InputError("front of the crack is 'parabolic'", allowed="straight", remedy="give the mean depth")
     added = _at_depth(gear, crack)
     face_mm = gear.blank.geometry.face_width_mm
     if crack.width_mm is None or crack.width_mm >= face_mm:

@@ -22,6 +22,7 @@ from sims.fe_gear._cyclic import (
     cyclic_modes,
     hub_sum,
     lowest_with_static,
+    real_values,
 )
 from sims.fe_gear._mesh import IntArray, SectorMesh
 from sims.fe_gear._reduced_gear import (
@@ -160,11 +161,9 @@ def _with_nodes(masters: Masters, chosen: IntArray, n_nodes: int) -> Masters:
 
 def _real_motion(gear: CyclicGear, modes: CyclicModes) -> FloatArray:
     """Motion of all nodes in the real modes (sector, node, component, mode)."""
-    columns = []
-    for k, n in enumerate(modes.nodal_diameters):
-        waves = np.exp(1j * gear.phase_rad(int(n)) * np.arange(gear.n_sectors))[:, None] * modes.shapes[:, k]
-        columns += [waves.real, waves.imag][: int(modes.multiplicity(gear.n_sectors)[k])]
-    motion = np.stack(columns, axis=-1)
+    phase = 2.0 * np.pi * modes.nodal_diameters / gear.n_sectors
+    waves = np.exp(1j * phase * np.arange(gear.n_sectors)[:, None])[:, None] * modes.shapes
+    motion = real_values(waves, modes.multiplicity(gear.n_sectors))
     return motion.reshape(gear.n_sectors, -1, 3, motion.shape[-1])
 
 
@@ -173,9 +172,8 @@ def motion_at(masters: Masters, gear: CyclicGear, modes: CyclicModes) -> FloatAr
     columns = []
     for k, n in enumerate(modes.nodal_diameters):
         rows, turn = phased_rows(masters, gear, int(n))
-        moved = turn @ (rows @ modes.shapes[:, k])
-        columns += [moved.real, moved.imag][: int(modes.multiplicity(gear.n_sectors)[k])]
-    return np.column_stack(columns)
+        columns.append(turn @ (rows @ modes.shapes[:, k]))
+    return real_values(np.column_stack(columns), modes.multiplicity(gear.n_sectors))
 
 
 # How well a reduced gear keeps the modes of the full model.
@@ -206,8 +204,7 @@ class ReductionAccuracy:
     @property
     def errors(self) -> FloatArray:
         """Relative errors of the frequencies."""
-        relative: FloatArray = self.reduced_hz / self.full_hz - 1.0
-        return relative
+        return self.reduced_hz / self.full_hz - 1.0
 
     @property
     def worst_error(self) -> float:
@@ -309,8 +306,6 @@ class CraigBamptonGear:
     stiffness, mass : array, (n_dof, n_dof)
         Masters first (six of the hub: m, rad; then contact patches, auxiliary nodes: m), then modal coordinates.
     masters : Masters
-    fixed_frequencies_hz : array
-        Of the fixed-interface modes.
     accuracy : ReductionAccuracy
         Against the full model.
     """
@@ -318,7 +313,6 @@ class CraigBamptonGear:
     stiffness: FloatArray = field(repr=False)
     mass: FloatArray = field(repr=False)
     masters: Masters = field(repr=False)
-    fixed_frequencies_hz: FloatArray
     accuracy: ReductionAccuracy
 
 
@@ -356,8 +350,7 @@ class _Targets(NamedTuple):
     @property
     def squares(self) -> FloatArray:
         """ω², (r,)."""
-        squares: FloatArray = (2.0 * np.pi * self.frequencies_hz) ** 2
-        return squares
+        return (2.0 * np.pi * self.frequencies_hz) ** 2
 
 
 def craig_bampton(
@@ -416,7 +409,7 @@ def _space(gear: CyclicGear, masters: Masters, reference: CyclicModes, n_shapes:
     z, m = gear.n_sectors, masters.n_masters
     squares: list[FloatArray] = []
     at_masters: list[FloatArray] = []
-    products: list[tuple[int, FloatArray]] = []
+    products: list[tuple[int, int, FloatArray]] = []
     compliance, inertia = np.zeros((m, m)), np.zeros((m, m))
     with_static = np.zeros((int(reference.multiplicity(z).sum()), m))
     for n in gear.diameters:
@@ -428,15 +421,15 @@ def _space(gear: CyclicGear, masters: Masters, reference: CyclicModes, n_shapes:
         compliance += weight * np.real(turn @ (rows @ static) @ turn.conj().T)
         inertia += weight * np.real(turn @ (static.conj().T @ moved) @ turn.conj().T)
         pair = 0 < 2 * n < z
-        squares.append(np.repeat((2.0 * np.pi * frequencies) ** 2, 2 if pair else 1))
-        at_masters.append(_real_columns(turn @ (rows @ shapes), pair))
+        multiplicity = np.full(n_shapes, 2 if pair else 1)
+        squares.append(np.repeat((2.0 * np.pi * frequencies) ** 2, multiplicity))
+        at_masters.append(real_values(turn @ (rows @ shapes), multiplicity))
         for place, shape in _references(reference, n, z):
             _add_products(with_static, place, shape, moved @ turn.conj().T, pair)
-            products.append((place, _mode_products(shape, np.asarray(mass @ shapes), z, pair)))
+            products.append((place, n, _mode_products(shape, np.asarray(mass @ shapes), z, pair)))
     widths = np.cumsum([0, *(len(s) for s in squares)])
     with_modes = np.zeros((len(with_static), widths[-1]))
-    for place, block in products:
-        n = int(_diameter_of(reference, place, z))
+    for place, n, block in products:
         with_modes[place : place + len(block), widths[n] : widths[n + 1]] = block
     return _Space(np.concatenate(squares), np.hstack(at_masters), compliance, inertia, with_modes, with_static)
 
@@ -468,7 +461,7 @@ def _reduced(space: _Space, masters: Masters, springs: FloatArray, targets: _Tar
     products = np.hstack((on_masters, (space.with_modes - on_masters @ c) @ turn)) @ vectors
     frequencies = np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi)
     accuracy = matched(targets.frequencies_hz, frequencies[N_HUB:], products[:, N_HUB:], rigid_hz=frequencies[:N_HUB])
-    return CraigBamptonGear(stiffness, mass, masters, np.sqrt(values) / (2.0 * np.pi), accuracy)
+    return CraigBamptonGear(stiffness, mass, masters, accuracy)
 
 
 def _needed(squares: FloatArray, coupled: FloatArray, targets: _Targets, n_modes: int) -> IntArray:
@@ -493,22 +486,10 @@ def _definite_modes(stiffness: FloatArray, mass: FloatArray) -> tuple[FloatArray
     return values, white @ turn
 
 
-def _real_columns(columns: ComplexArray, pair: bool) -> FloatArray:
-    """Cosine and sine modes side by side."""
-    if not pair:
-        return columns.real
-    return np.stack((columns.real, columns.imag), axis=-1).reshape(len(columns), -1)
-
-
 def _references(modes: CyclicModes, n: int, z: int) -> list[tuple[int, ComplexArray]]:
     """Place among the real reference modes, and shape, of those of nodal diameter n."""
     starts = np.concatenate(([0], np.cumsum(modes.multiplicity(z))))
     return [(int(starts[k]), modes.shapes[:, k]) for k in np.flatnonzero(modes.nodal_diameters == n)]
-
-
-def _diameter_of(modes: CyclicModes, place: int, z: int) -> int:
-    starts = np.cumsum(modes.multiplicity(z))
-    return int(modes.nodal_diameters[int(np.searchsorted(starts, place, side="right"))])
 
 
 def _add_products(into: FloatArray, place: int, shape: ComplexArray, moved: ComplexArray, pair: bool) -> None:

@@ -176,8 +176,7 @@ def _surface_weights(mesh: SectorMesh) -> FloatArray:
     around = whole_weights(np.linspace(0.0, 1.0, mesh.bore.shape[0]), mesh.size.order)
     around[0] += around[-1]
     along = whole_weights(mesh.points_m[mesh.bore[0], 2], mesh.size.order)
-    weights: FloatArray = np.outer(around[:-1], along).ravel()
-    return weights
+    return np.outer(around[:-1], along).ravel()
 
 
 Held = Literal["free", "bore"]
@@ -260,8 +259,7 @@ class CyclicGear:
     @cached_property
     def own_nodes(self) -> IntArray:
         """Nodes of the sector without its high side."""
-        nodes: IntArray = np.setdiff1d(np.arange(self.mesh.n_nodes), self.mesh.high_side)
-        return nodes
+        return np.setdiff1d(np.arange(self.mesh.n_nodes), self.mesh.high_side)
 
     @cached_property
     def _fold(self) -> tuple[sparse.csr_array, sparse.csr_array]:
@@ -295,8 +293,7 @@ class CyclicGear:
     @cached_property
     def hub(self) -> FloatArray:
         """Rows (6, n_own) that give a sector's share of the bore's mean motion, in the axes of that sector."""
-        rows: FloatArray = hub_rows(self.mesh, 3 * len(self.own_nodes), self.own_places)
-        return rows
+        return hub_rows(self.mesh, 3 * len(self.own_nodes), self.own_places)
 
     @cached_property
     def own_places(self) -> IntArray:
@@ -444,6 +441,12 @@ class CyclicModes(Result):
         return np.where(single, 1, 2)
 
 
+def real_values(values: ComplexArray, multiplicity: IntArray) -> FloatArray:
+    """Values of the real modes, from those of the shapes along the last axis: real parts, of pairs Im as well."""
+    parts = np.stack((values.real, values.imag), axis=-1)
+    return parts[..., np.arange(2) < multiplicity[:, None]]
+
+
 def cyclic_modes(gear: CyclicGear, n_modes: int = 20, held: Held = "free", *, elastic: bool = False) -> CyclicModes:
     """Return the lowest modes; a pair counts as two, and is never cut.
 
@@ -514,8 +517,7 @@ class _Problem(NamedTuple):
 
     def static(self, loads: ComplexArray) -> ComplexArray:
         """K⁻¹ loads; without a shift and with nothing held only."""
-        solved: ComplexArray = self.basis @ self.solve(np.asarray(self.basis.conj().T @ loads))
-        return solved
+        return self.basis @ self.solve(np.asarray(self.basis.conj().T @ loads))
 
 
 def _problem(gear: CyclicGear, n: int, held: Held) -> _Problem:
@@ -534,15 +536,17 @@ def _problem(gear: CyclicGear, n: int, held: Held) -> _Problem:
 
 
 def _lowest(problem: _Problem, n_shapes: int) -> tuple[FloatArray, ComplexArray]:
+    from scipy.linalg import eigh
     from scipy.sparse.linalg import LinearOperator, eigsh
 
     stiffness, mass = problem.stiffness, problem.mass
     inverse = LinearOperator(stiffness.shape, matvec=problem.solve, dtype=stiffness.dtype)
     start = np.random.default_rng(1).standard_normal(len(problem.kept)).astype(stiffness.dtype)
     _, vectors = eigsh(stiffness, n_shapes, M=mass, sigma=problem.shift, OPinv=inverse, v0=start, tol=1e-11)
-    values, shapes = _rayleigh_ritz(stiffness, mass, vectors)
+    small_k, small_m = (vectors.conj().T @ (matrix @ vectors) for matrix in (stiffness, mass))
+    values, turn = eigh(small_k, small_m)
     full = np.zeros((problem.n_own, n_shapes), dtype=np.complex128)
-    full[problem.kept] = shapes * np.sqrt(problem.scale)
+    full[problem.kept] = vectors @ turn * np.sqrt(problem.scale)
     return np.sqrt(np.maximum(values, 0.0)) / (2.0 * pi), _phased(np.asarray(problem.basis @ full))
 
 
@@ -571,17 +575,6 @@ def _limit(modes: list[tuple[float, int, ComplexArray]], n_modes: int, n_sectors
 
 def _multiplicity(n: int, n_sectors: int) -> int:
     return 1 if n == 0 or 2 * n == n_sectors else 2
-
-
-def _rayleigh_ritz(
-    stiffness: sparse.csc_array, mass: sparse.csc_array, vectors: np.ndarray[Any, Any]
-) -> tuple[FloatArray, np.ndarray[Any, Any]]:
-    from scipy.linalg import eigh
-
-    small_k = vectors.conj().T @ (stiffness @ vectors)
-    small_m = vectors.conj().T @ (mass @ vectors)
-    values, turn = eigh(small_k, small_m)
-    return values, vectors @ turn
 
 
 def _phased(shapes: ComplexArray) -> ComplexArray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import pi
 from typing import Any, NamedTuple
 
@@ -124,25 +124,13 @@ def _body_grid(blank: GearBlank, size: MeshSize, foot: FloatArray) -> FloatArray
     radii = [g.bore_mm + (blank.hub_radius_mm - g.bore_mm) * _even(hub)[:-1]] if hub else []
     # Cells of a disc grow from the bore with the radius; a web is divided evenly.
     start, end = blank.hub_radius_mm, blank.rim_radius_mm
-    radii.append(_graded(start, end, web))
-    body_angles = _eased(angles, radii, g)
+    radii.append(with_middles(start * (end / start) ** (np.arange(web + 1) / web)))
     radius = np.concatenate(radii)
+    # Columns stand as at the rim there, and evenly at the bore.
+    part = ((radius - g.bore_mm) / (radius[-1] - g.bore_mm))[:, None]
+    body_angles = angles * part + np.linspace(angles[0], angles[-1], len(angles)) * (1.0 - part)
     body = radius[:, None, None] * np.stack((np.cos(body_angles), np.sin(body_angles)), axis=-1)
     return np.concatenate((body, rim))
-
-
-def _graded(start: float, end: float, n_cells: int) -> FloatArray:
-    """2n + 1 radii; corners in geometric progression (cells as square as they can be), middles halfway."""
-    return with_middles(start * (end / start) ** (np.arange(n_cells + 1) / n_cells))
-
-
-def _eased(angles: FloatArray, radii: list[FloatArray], gear: GearGeometry) -> FloatArray:
-    """Angles of columns [row, column]: as at the rim there, even at the bore."""
-    radius = np.concatenate(radii)
-    part = ((radius - gear.bore_mm) / (radius[-1] - gear.bore_mm))[:, None]
-    even = np.linspace(angles[0], angles[-1], len(angles))
-    eased: FloatArray = angles * part + even * (1.0 - part)
-    return eased
 
 
 def _rim_angles(gear: GearGeometry, size: MeshSize) -> FloatArray:
@@ -242,8 +230,7 @@ class SectorMesh:
     @property
     def angles_rad(self) -> FloatArray:
         """Polar angle of each node."""
-        angle: FloatArray = np.arctan2(self.points_m[:, 1], self.points_m[:, 0])
-        return angle
+        return np.arctan2(self.points_m[:, 1], self.points_m[:, 0])
 
 
 def sector_mesh(blank: GearBlank, size: MeshSize, crack: CrackLine | None = None) -> SectorMesh:
@@ -260,16 +247,27 @@ def sector_mesh(blank: GearBlank, size: MeshSize, crack: CrackLine | None = None
     n_layers = len(layers_mm)
     in_plane = np.repeat(plane.points_mm, n_layers, axis=0)
     points = np.column_stack((in_plane, np.tile(layers_mm, len(plane.points_mm)))) * 1e-3
-    every = _extruded(plane.cells, n_layers, range(0, n_layers - 1, 2))
-    cells = every
-    if web != (0, n_layers - 1):
-        web_cells = _extruded(plane.cells[: plane.n_web_cells], n_layers, range(web[0], web[1], 2))
-        cells = np.concatenate(
-            (web_cells, _extruded(plane.cells[plane.n_web_cells :], n_layers, range(0, n_layers - 1, 2)))
+    web_cells = _extruded(plane.cells[: plane.n_web_cells], n_layers, range(web[0], web[1], 2))
+    other_cells = _extruded(plane.cells[plane.n_web_cells :], n_layers, range(0, n_layers - 1, 2))
+    cells = np.concatenate((web_cells, other_cells))
+
+    def place(nodes: IntArray) -> IntArray:
+        return nodes[..., None] * n_layers + np.arange(n_layers)
+
+    low, high, bore, tooth = (place(nodes) for nodes in (plane.low_side, plane.high_side, plane.bore, plane.tooth))
+    step = 3 - size.order  # eight-node cells stand between the corners of the 27-node ones
+    mesh = _of_used_nodes(
+        SectorMesh(
+            blank,
+            size,
+            points,
+            cells[:, ::step, ::step, ::step],
+            low.ravel(),
+            high.ravel(),
+            bore[::step, ::step],
+            tooth[::step, ::step, ::step],
         )
-    mesh = _without_loose_nodes(blank, size, points, cells, plane, n_layers)
-    if size.order == 1:
-        mesh = _corners_alone(mesh)
+    )
     check_jacobians(mesh)
     return mesh
 
@@ -290,46 +288,19 @@ def _extruded(plane_cells: IntArray, n_layers: int, starts: range) -> IntArray:
     return cells.reshape(-1, 3, 3, 3)
 
 
-def _without_loose_nodes(
-    blank: GearBlank, size: MeshSize, points: FloatArray, cells: IntArray, plane: SectorPlane, n_layers: int
-) -> SectorMesh:
+def _of_used_nodes(mesh: SectorMesh) -> SectorMesh:
     """Renumber so that only nodes that belong to a cell are left: beside a web there are none."""
-    used = np.zeros(len(points), dtype=bool)
-    used[cells] = True
-    number = np.cumsum(used) - 1
-
-    def place(nodes: IntArray) -> IntArray:
-        spread: IntArray = nodes[..., None] * n_layers + np.arange(n_layers)
-        return spread
-
-    low, high = place(plane.low_side).ravel(), place(plane.high_side).ravel()
-    return SectorMesh(
-        blank,
-        size,
-        points[used],
-        number[cells],
-        number[low[used[low]]],
-        number[high[used[high]]],
-        number[place(plane.bore)],
-        number[place(plane.tooth)],
-    )
-
-
-def _corners_alone(mesh: SectorMesh) -> SectorMesh:
-    """Return the mesh of eight-node cells between the corners of the 27-node ones."""
-    corners = mesh.cells[:, ::2, ::2, ::2]
     used = np.zeros(mesh.n_nodes, dtype=bool)
-    used[corners] = True
+    used[mesh.cells] = True
     number = np.cumsum(used) - 1
-    return SectorMesh(
-        mesh.blank,
-        mesh.size,
-        mesh.points_m[used],
-        number[corners],
-        number[mesh.low_side[used[mesh.low_side]]],
-        number[mesh.high_side[used[mesh.high_side]]],
-        number[mesh.bore[::2, ::2]],
-        number[mesh.tooth[::2, ::2, ::2]],
+    return replace(
+        mesh,
+        points_m=mesh.points_m[used],
+        cells=number[mesh.cells],
+        low_side=number[mesh.low_side[used[mesh.low_side]]],
+        high_side=number[mesh.high_side[used[mesh.high_side]]],
+        bore=number[mesh.bore],
+        tooth=number[mesh.tooth],
     )
 
 
@@ -369,8 +340,7 @@ class FaceView:
 
     def values(self, at_nodes: FloatArray) -> FloatArray:
         """Values at the points, from values at the nodes of as many sectors, (n_sectors, n_nodes)."""
-        flat: FloatArray = at_nodes[:, self.nodes].ravel()
-        return flat
+        return at_nodes[:, self.nodes].ravel()
 
 
 def face_view(mesh: SectorMesh, sectors: tuple[int, ...] | None = None) -> FaceView:
@@ -424,8 +394,7 @@ def _foremost(mesh: SectorMesh) -> IntArray:
     _, column = np.unique(np.round(middle[:, :2], 9), axis=0, return_inverse=True)
     order = np.lexsort((middle[:, 2], column.ravel()))
     last = np.append(np.diff(column.ravel()[order]) != 0, True)
-    foremost: IntArray = np.sort(order[last])
-    return foremost
+    return np.sort(order[last])
 
 
 def _walls(points_mm: FloatArray, local: IntArray) -> IntArray:
@@ -437,10 +406,9 @@ def _walls(points_mm: FloatArray, local: IntArray) -> IntArray:
     behind[order[equal]], behind[order[equal + 1]] = order[equal + 1], order[equal]
     ends = np.concatenate([np.column_stack((local[:, r, :-1].ravel(), local[:, r, 1:].ravel())) for r in (0, -1)])
     a, b = ends[np.all(behind[ends] >= 0, axis=1)].T
-    walls: IntArray = np.concatenate(
+    return np.concatenate(
         (np.column_stack((a, b, behind[b])), np.column_stack((a, behind[b], behind[a]))), dtype=np.int64
     )
-    return walls
 
 
 def _triangles(local: IntArray) -> IntArray:
@@ -626,8 +594,7 @@ def _incompatible_stiffness(mesh: SectorMesh, fields: CellFields, material: Mate
     modes = modes * (np.linalg.det(jacobian)[:, None] / fields.determinants)[:, :, None, None]
     whole = _cell_stiffness(np.concatenate((fields.gradients, modes), axis=3), fields.volumes, material)
     inner = whole[:, 24:, 24:]
-    condensed: FloatArray = whole[:, :24, :24] - whole[:, :24, 24:] @ np.linalg.solve(inner, whole[:, 24:, :24])
-    return condensed
+    return whole[:, :24, :24] - whole[:, :24, 24:] @ np.linalg.solve(inner, whole[:, 24:, :24])
 
 
 def _cell_mass(fields: CellFields, density: float) -> FloatArray:

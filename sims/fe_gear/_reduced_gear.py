@@ -37,6 +37,7 @@ from sims.fe_gear._cyclic import (
     Held,
     cyclic_modes,
     hub_sum,
+    real_values,
 )
 from sims.fe_gear._mesh import IntArray, SectorMesh, line_weights, mesh_quality, parabolic_weights, sector_mesh
 from sims.mesh import GearGeometry, involute_outline
@@ -189,8 +190,7 @@ class ReducedGear:
     @property
     def radius_m(self) -> FloatArray:
         """Distance of the heights from the axis, (n_heights,)."""
-        radius: FloatArray = self.blank.geometry.base_radius_mm * 1e-3 * np.hypot(1.0, self.grid.roll_rad)
-        return radius
+        return self.blank.geometry.base_radius_mm * 1e-3 * np.hypot(1.0, self.grid.roll_rad)
 
     def modes_at(self, tooth: int) -> FloatArray:
         """Push displacement of a tooth's points in each elastic mode, (n_modes, n_points), 1/√kg.
@@ -240,8 +240,7 @@ class ReducedGear:
         # Holding the hub: reactions −Φᵀ on the hub, and the rigid motion that brings the hub back.
         rigid = np.hstack([self.rigid_at(t) for t in teeth])
         hub = np.hstack([self.hub_flank_at(t) for t in teeth])
-        held: FloatArray = blocks - hub.T @ rigid - rigid.T @ hub + rigid.T @ self.hub_compliance @ rigid
-        return held
+        return blocks - hub.T @ rigid - rigid.T @ hub + rigid.T @ self.hub_compliance @ rigid
 
     def _block(self, stored: FloatArray, offset: int) -> FloatArray:
         z = self.blank.n_teeth
@@ -415,8 +414,7 @@ def turning_weights(mesh: SectorMesh, nodes: SectionNodes) -> FloatArray:
     square = float(w @ np.sum(offset**2, axis=1))
     if square <= 1e-12:
         return np.zeros_like(offset)
-    weights: FloatArray = w[:, None] * np.column_stack((-offset[:, 1], offset[:, 0])) / square
-    return weights
+    return w[:, None] * np.column_stack((-offset[:, 1], offset[:, 0])) / square
 
 
 def _turn(lever: FloatArray, push: FloatArray) -> float:
@@ -609,17 +607,14 @@ def _real_modes(
     gear: CyclicGear, modes: CyclicModes, rows: FloatArray
 ) -> tuple[FloatArray, IntArray, FloatArray, FloatArray]:
     """Cosine and sine modes at the flank points of tooth 0 and at the hub."""
-    frequencies, diameters, at_flanks, at_hub = [], [], [], []
-    for k, n in enumerate(modes.nodal_diameters):
-        flank = rows @ modes.shapes[:, k]
-        hub = hub_sum(int(n), gear.n_sectors) @ (gear.hub @ modes.shapes[:, k])
-        parts = (np.real, np.imag) if 0 < 2 * n < gear.n_sectors else (np.real,)
-        for part in parts:
-            frequencies.append(modes.frequencies_hz[k])
-            diameters.append(n)
-            at_flanks.append(part(flank))
-            at_hub.append(part(hub))
-    return np.array(frequencies), np.array(diameters), np.array(at_flanks), np.array(at_hub)
+    z, shares, multiplicity = gear.n_sectors, gear.hub @ modes.shapes, modes.multiplicity(gear.n_sectors)
+    at_hub = [hub_sum(int(n), z) @ share for n, share in zip(modes.nodal_diameters, shares.T, strict=True)]
+    return (
+        np.repeat(modes.frequencies_hz, multiplicity),
+        np.repeat(modes.nodal_diameters, multiplicity),
+        real_values(rows @ modes.shapes, multiplicity).T,
+        real_values(np.column_stack(at_hub), multiplicity).T,
+    )
 
 
 # Reduced gears on disk, under the key of what made them: arrays without pickles, whole or not at all.
@@ -710,7 +705,7 @@ def read_gear(path: str | Path) -> ReducedGear:
         ) from error
 
 
-def cached_gear(blank: GearBlank, plan: ReductionPlan, folder: str | Path | None = None) -> ReducedGear:
+def cached_gear(blank: GearBlank, plan: ReductionPlan) -> ReducedGear:
     """Return a reduced gear from the cache, or reduce it and keep it there.
 
     A file that is damaged is made again: it holds nothing that cannot be. One that another version of the code made is
@@ -720,28 +715,23 @@ def cached_gear(blank: GearBlank, plan: ReductionPlan, folder: str | Path | None
     ----------
     blank : GearBlank
     plan : ReductionPlan
-    folder : path or None
-        None: `gearsig.cache.cache_folder("gears")`.
 
     Raises
     ------
     OtherVersionError
         If another version of the code kept this gear.
     InputError
-        If the gear cannot be reduced, or the folder not written.
+        If the gear cannot be reduced.
     """
-    path = (cache_folder("gears") if folder is None else Path(folder)) / f"{gear_name(blank, plan)}.npz"
+    path = cache_folder("gears") / f"{gear_name(blank, plan)}.npz"
     try:
         kept = read_gear(path)
     except OtherVersionError:
         raise
     except InputError:  # not there, or damaged
         gear = reduce_gear(blank, plan)
-        if folder is not None:
+        with suppress(InputError):  # the cache folder cannot be written: the next process reduces it again
             write_gear(path, gear)
-        else:
-            with suppress(InputError):  # the cache folder cannot be written: the next process reduces it again
-                write_gear(path, gear)
         return gear
     if kept.key != gear_key(blank, plan):
         raise OtherVersionError(

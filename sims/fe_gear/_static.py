@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gearsig.checks import FloatArray, count, positive, within
+from gearsig.checks import FloatArray, positive, within
 from gearsig.errors import InputError
 from sims.fe_gear._blank import mesh_size_for, one_thread
 from sims.fe_gear._cyclic import ComplexArray, CyclicGear, CyclicModes, Held, cyclic_modes, mode_field
@@ -75,7 +75,10 @@ def load_tooth(
     grid = FlankGrid(np.array([roll]), np.array([0.0]))
     row = flank_rows(mesh, grid, spread, gear.own_places, 3 * len(gear.own_nodes))[int(flank)]
     with one_thread():
-        field_of_sectors = _static_field(gear, force * row)
+        waves: ComplexArray = np.array(
+            [gear.solver(n, "bore")(force * row) for n in gear.diameters], dtype=np.complex128
+        )
+        field_of_sectors = np.fft.irfft(waves, n=gear.n_sectors, axis=0)
     return ToothLoad(mesh, force, float(roll), gear.sector_fields(field_of_sectors), float(field_of_sectors[0] @ row))
 
 
@@ -102,8 +105,7 @@ def stress_pa(mesh: SectorMesh, displacement_m: FloatArray) -> FloatArray:
     total, shared = np.zeros((mesh.n_nodes, 3, 3)), np.zeros(mesh.n_nodes)
     np.add.at(total, nodes, stress)
     np.add.at(shared, nodes, 1.0)
-    mean: FloatArray = total / shared[:, None, None]
-    return mean
+    return total / shared[:, None, None]
 
 
 def von_mises_pa(mesh: SectorMesh, displacement_m: FloatArray) -> FloatArray:
@@ -151,16 +153,6 @@ def modal_load(gear: CyclicGear, modes: CyclicModes, load: ToothLoad) -> FloatAr
             share = load.force_n * float(row @ shape) / (2.0 * np.pi * hertz) ** 2
             total += share * mode_field(gear, modes, mode, sine=sine)
     return total
-
-
-def _static_field(gear: CyclicGear, load: FloatArray) -> FloatArray:
-    """Displacement (n_sectors, n_own_dof) for a load on sector 0, the bore held."""
-    z = gear.n_sectors
-    waves: ComplexArray = np.zeros((z // 2 + 1, len(load)), dtype=np.complex128)
-    for n in gear.diameters:
-        waves[n] = gear.solver(n, "bore")(load)
-    moved: FloatArray = np.fft.irfft(waves, n=z, axis=0)
-    return moved
 
 
 # How far a mesh is from a finer one: natural frequencies and the compliance of a tooth.
@@ -233,10 +225,8 @@ _EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4)
 _FACES = np.array([[0, 1, 1], [2, 1, 1], [1, 0, 1], [1, 2, 1], [1, 1, 0], [1, 1, 2]])
 
 
-def write_vtk(
-    path: str | Path, mesh: SectorMesh, values: Mapping[str, FloatArray] | None = None, *, n_sectors: int | None = None
-) -> Path:
-    """Write sectors of a gear, with values at their nodes, as hexahedra of 27 nodes (VTK type 29) or eight (12).
+def write_vtk(path: str | Path, mesh: SectorMesh, values: Mapping[str, FloatArray] | None = None) -> Path:
+    """Write a gear, with values at their nodes, as hexahedra of 27 nodes (VTK type 29) or eight (12).
 
     Parameters
     ----------
@@ -244,10 +234,8 @@ def write_vtk(
         Ends in .vtu or .vtk.
     mesh : SectorMesh
     values : mapping or None
-        Name → array of (n_sectors, n_nodes) or (n_sectors, n_nodes, 3), e.g. displacement in m, stress in Pa; vectors
-        in the axes of each sector, turned here.
-    n_sectors : int or None
-        From sector 0 counter-clockwise; None: the whole gear. Nodes that two sectors share are written once.
+        Name → array of (n_teeth, n_nodes) or (n_teeth, n_nodes, 3), e.g. displacement in m, stress in Pa; vectors in
+        the axes of each sector, turned here. Nodes that two sectors share are written once.
 
     Returns
     -------
@@ -259,15 +247,16 @@ def write_vtk(
         If the name has another ending, an array has another shape, or the file cannot be written.
     """
     import meshio
+    from scipy.spatial.transform import Rotation
 
     target = Path(path)
     if target.suffix not in SUFFIXES:
         raise InputError(f"extension {target.suffix or '(none)'!r}", where=target.name, allowed=" ".join(SUFFIXES))
-    n = mesh.blank.n_teeth if n_sectors is None else count(n_sectors, "n_sectors")
-    if n > mesh.blank.n_teeth:
-        raise InputError(f"n_sectors is {n}", allowed=f"at most {mesh.blank.n_teeth}")
-    number = _shared_numbers(mesh, n)
-    turns = _turns(mesh, n)
+    gear, n = CyclicGear(mesh), mesh.blank.n_teeth
+    # The high side of a sector is the low side of the next one.
+    sector = (np.arange(n)[:, None] + np.isin(np.arange(mesh.n_nodes), mesh.high_side)) % n
+    number = gear.own_places + len(gear.own_nodes) * sector
+    turns = Rotation.from_euler("z", mesh.blank.pitch_angle_rad * np.arange(n)[:, None]).as_matrix()
     points = _merged(np.einsum("kij,aj->kai", turns, mesh.points_m), number)
     kind, order = ("hexahedron27", _vtk_order()) if mesh.size.order == 2 else ("hexahedron", _CORNERS // 2 @ [4, 2, 1])
     cells = number[:, mesh.cells.reshape(len(mesh.cells), -1)[:, order]].reshape(-1, len(order))
@@ -286,27 +275,8 @@ def _vtk_order() -> IntArray:
     return order
 
 
-def _shared_numbers(mesh: SectorMesh, n_sectors: int) -> IntArray:
-    """Number of each sector's nodes, (n_sectors, n_nodes): the high side is the low side of the next sector."""
-    nodes = np.setdiff1d(np.arange(mesh.n_nodes), mesh.high_side)
-    number = np.empty((n_sectors + 1, mesh.n_nodes), dtype=np.int64)
-    number[:, nodes] = np.arange(len(nodes)) + len(nodes) * np.arange(n_sectors + 1)[:, None]
-    last = 0 if n_sectors == mesh.blank.n_teeth else n_sectors
-    number[:-1, mesh.high_side] = number[[*range(1, n_sectors), last]][:, mesh.low_side]
-    shared = number[:-1]
-    _, packed = np.unique(shared, return_inverse=True)
-    return packed.reshape(shared.shape)
-
-
-def _turns(mesh: SectorMesh, n_sectors: int) -> FloatArray:
-    angle = mesh.blank.pitch_angle_rad * np.arange(n_sectors)
-    c, s, zero, unit = np.cos(angle), np.sin(angle), 0.0 * angle, 0.0 * angle + 1.0
-    rows = ((c, -s, zero), (s, c, zero), (zero, zero, unit))
-    return np.array([[list(column) for column in row] for row in rows]).transpose(2, 0, 1)
-
-
 def _turned(name: str, values: FloatArray, turns: FloatArray, mesh: SectorMesh) -> FloatArray:
-    array = np.asarray(values, dtype=np.float64)[: len(turns)]
+    array = np.asarray(values, dtype=np.float64)
     if array.shape[:2] != (len(turns), mesh.n_nodes) or array.shape[2:] not in ((), (3,)):
         raise InputError(
             f"{name} has shape {np.shape(values)}",

@@ -8,7 +8,7 @@ from math import pi, radians, sqrt
 
 import numpy as np
 
-from gearsig.checks import FloatArray, not_negative, one_of, positive, within
+from gearsig.checks import FloatArray, positive, within
 from gearsig.errors import InputError
 from gearsig.rig import (
     DAMPING_LAWS,
@@ -29,7 +29,6 @@ from sims.mesh import GearGeometry, PairGeometry, wear_profile
 from sims.simulator import Parameter, ParameterValues
 
 STATIC_RATIO_RANGE = (1.0, 10.0)
-SPEED_BAND_RANGE = (0.01, 1.0)
 MESH_RAMP_RANGE = (0.005, 0.1)
 MIN_CONTACT_RATIO = 1.1
 
@@ -69,82 +68,36 @@ class Bristle:
     damping_time_s: float = 0.0
     viscous: float = 0.0
 
-    def __post_init__(self) -> None:
-        not_negative(self.level, "level of the friction")
-        within(self.static_ratio, "static_ratio of the friction", *STATIC_RATIO_RANGE)
-        positive(self.stribeck_speed, "stribeck_speed of the friction")
-        positive(self.presliding, "presliding of the friction")
-        not_negative(self.damping_time_s, "damping_time_s of the friction", "s")
-        not_negative(self.viscous, "viscous friction")
-
-
-@dataclass(frozen=True)
-class HydraulicMotor:
-    """A hydraulic motor behind a proportional valve: torque up to the speed that its flow allows.
-
-    T = T_set(t) · (1 + ε cos(n θ1)) · clip((ω_lim − ω1)/(b ω_lim), −1, 1)
-
-    Parameters
-    ----------
-    inertia_kg_m2 : float
-        Of the motor, ahead of the torque sensor.
-    drag : Bristle
-        Friction of motor and bearings; the brake adds to its level.
-    speed_band : float
-        b: part of the speed limit over which the torque falls from full to none.
-    ripple_fraction, ripple_order : float
-        ε and n: pistons make the torque ripple.
-    """
-
-    inertia_kg_m2: float
-    drag: Bristle
-    speed_band: float = 0.3
-    ripple_fraction: float = 0.0
-    ripple_order: float = 9.0
-
-    def __post_init__(self) -> None:
-        not_negative(self.inertia_kg_m2, "inertia_kg_m2 of the motor", "kg m^2")
-        within(self.speed_band, "speed_band of the motor", *SPEED_BAND_RANGE)
-        within(self.ripple_fraction, "ripple_fraction of the motor", 0.0, 1.0)
-        positive(self.ripple_order, "ripple_order of the motor")
-
-
-@dataclass(frozen=True)
-class GrippedLoad:
-    """What the wheel turns besides its inertia: friction of the gripper's bearings, weight of a piece off centre.
-
-    Parameters
-    ----------
-    friction : Bristle
-    unbalance_nm : float
-        Weight times distance from the axis.
-    unbalance_angle_rad : float
-        Angle from below at which the piece hangs when the wheel is at 0.
-    """
-
-    friction: Bristle
-    unbalance_nm: float = 0.0
-    unbalance_angle_rad: float = 0.0
-
-    def __post_init__(self) -> None:
-        not_negative(self.unbalance_nm, "unbalance_nm", "N m")
-
 
 @dataclass(frozen=True)
 class ForgingDrive:
-    """Pinion with motor, wheel with gripper and piece; one turning freedom each.
+    """Pinion with hydraulic motor, wheel with gripper and piece; one turning freedom each.
+
+    A motor behind a proportional valve gives torque up to the speed that its flow allows:
+
+        T = T_set(t) · (1 + ε cos(n θ1)) · clip((ω_lim − ω1)/(b ω_lim), −1, 1)
 
     Parameters
     ----------
     path : PathOfContact
     contact : ToothContact
-        Its inertias are those of the pinion and of the wheel with gripper and piece.
-    motor : HydraulicMotor
-    load : GrippedLoad
+        Its inertias are those of the motor, the pinion, and the wheel with gripper and piece.
     flanks : Bristle
         Of the tooth flanks, level 1: their friction is μN.
+    drag : Bristle
+        Friction of motor and bearings; the brake adds to its level.
+    load_friction : Bristle
+        Of the gripper's bearings.
     speed_limit_rad_s : float
-        ω_lim of the pinion that the flow allows; 0: no limit.
+        ω_lim of the pinion; 0: no limit.
+    speed_band : float
+        b: part of the speed limit over which the torque falls from full to none.
+    ripple_fraction, ripple_order : float
+        ε and n: pistons make the torque ripple.
+    unbalance_nm : float
+        Weight of a piece off centre times its distance from the axis.
+    unbalance_angle_rad : float
+        Angle from below at which it hangs when the wheel is at 0.
     weak_tooth : WeakTooth or None
     wear_um : tuple of float
         Worn off both drive flanks together, at equal steps of the path of contact from where a pair enters to where it
@@ -160,18 +113,19 @@ class ForgingDrive:
 
     path: PathOfContact
     contact: ToothContact
-    motor: HydraulicMotor
-    load: GrippedLoad
     flanks: Bristle
+    drag: Bristle
+    load_friction: Bristle
     speed_limit_rad_s: float = 0.0
+    speed_band: float = 0.3
+    ripple_fraction: float = 0.0
+    ripple_order: float = 9.0
+    unbalance_nm: float = 0.0
+    unbalance_angle_rad: float = 0.0
     weak_tooth: WeakTooth | None = None
     wear_um: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        not_negative(self.speed_limit_rad_s, "speed_limit_rad_s", "rad/s")
-        for depth in self.wear_um:
-            not_negative(depth, "wear_um", "um")
-        within(self.path.ramp, "mesh_ramp", *MESH_RAMP_RANGE)
         highest = 1.9 - self.path.ramp
         within(self.path.contact_ratio, "contact_ratio", MIN_CONTACT_RATIO, highest, remedy="one to two pairs touch")
         if self.contact.driven_inertia_kg_m2 is None or self.pinion_side_inertia_kg_m2 <= 0.0:
@@ -180,7 +134,7 @@ class ForgingDrive:
     @property
     def pinion_side_inertia_kg_m2(self) -> float:
         """Of motor and pinion."""
-        return self.motor.inertia_kg_m2 + self.contact.driver_inertia_kg_m2
+        return self.contact.motor_inertia_kg_m2 + self.contact.driver_inertia_kg_m2
 
     @property
     def reduced_mass_kg(self) -> float:
@@ -228,16 +182,8 @@ class Cycle:
     press_duration_s: float = 0.02
 
     def __post_init__(self) -> None:
-        one_of(self.mode, "mode", MODES)
-        for name in ("on_s", "off_s", "rise_s", "press_duration_s"):
-            positive(getattr(self, name), name, "s")
-        for name in ("brake_delay_s", "press_delay_s"):
-            not_negative(getattr(self, name), name, "s")
-        not_negative(self.brake_nm, "brake_nm", "N m")
-        if self.mode == START_STOP:
-            self._check_times()
-
-    def _check_times(self) -> None:
+        if self.mode == CONTINUOUS:
+            return
         if self.rise_s >= min(self.on_s, self.off_s):
             raise InputError(f"rise_s is {self.rise_s:g} s", allowed="less than on_s and off_s")
         if self.press_nm and self.press_delay_s + self.press_duration_s > self.off_s:
@@ -402,9 +348,7 @@ _MASSES = (
 )
 
 _DRIVE = (
-    Parameter(
-        "motor_speed_band", "", "part of the speed limit over which the torque falls to nothing", *SPEED_BAND_RANGE, 0.3
-    ),
+    Parameter("motor_speed_band", "", "part of the speed limit over which the torque falls to nothing", 0.01, 1.0, 0.3),
     Parameter("torque_ripple", "", "ripple of the motor, part of its torque", 0, 1, 0.0),
     Parameter("torque_ripple_order", "", "ripples per revolution: pistons", 0.1, 1000, 9.0),
     Parameter("drag_nm", "N m", "sliding friction of motor and pinion shaft", 0, 1e5, 5.0),
@@ -501,26 +445,27 @@ def build_drive(values: ParameterValues, speed_limit_rpm: float, weak_tooth: Wea
     brake = values.number("brake_nm")
     drag, held = values.number("drag_nm"), values.number("load_friction_nm")
     pinion_side = contact.motor_inertia_kg_m2 + contact.driver_inertia_kg_m2
-    motor = HydraulicMotor(
-        contact.motor_inertia_kg_m2,
-        _bristle(values, "drag", drag, drag + brake, pinion_side),
-        values.number("motor_speed_band"),
-        values.number("torque_ripple"),
-        values.number("torque_ripple_order"),
-    )
-    load = GrippedLoad(
-        _bristle(values, "load", held, held, contact.driven_inertia_kg_m2 or 0.0),
-        values.number("piece_mass_kg") * GRAVITY_MPS2 * values.number("piece_offset_mm") * 1e-3,
-        radians(values.number("piece_angle_deg")),
-    )
     flanks = Bristle(
         1.0,
         values.number("flank_static_ratio"),
         values.number("flank_stribeck_mps"),
         values.number("flank_presliding_um") * 1e-6,
     )
-    limit = speed_limit_rpm * pi / 30.0
-    return ForgingDrive(path, contact, motor, load, flanks, limit, weak_tooth, worn_um(values, path))
+    return ForgingDrive(
+        path,
+        contact,
+        flanks,
+        _bristle(values, "drag", drag, drag + brake, pinion_side),
+        _bristle(values, "load", held, held, contact.driven_inertia_kg_m2 or 0.0),
+        speed_limit_rpm * pi / 30.0,
+        values.number("motor_speed_band"),
+        values.number("torque_ripple"),
+        values.number("torque_ripple_order"),
+        values.number("piece_mass_kg") * GRAVITY_MPS2 * values.number("piece_offset_mm") * 1e-3,
+        radians(values.number("piece_angle_deg")),
+        weak_tooth,
+        worn_um(values, path),
+    )
 
 
 def build_contact(values: ParameterValues, path: PathOfContact) -> ToothContact:

@@ -11,7 +11,6 @@ from math import ceil, cos, exp, floor, pi, sin
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import RK45
 
 from gearsig.checks import FloatArray, known_name, one_of, positive, within
@@ -63,9 +62,9 @@ RECORD = np.dtype(
 def drive_numbers(drive: ForgingDrive) -> Any:
     """Return the drive as a record of `RECORD`."""
     path, contact = drive.path, drive.contact
-    motor, load, flanks = drive.motor, drive.load, drive.flanks
+    flanks = drive.flanks
     k = np.zeros(1, dtype=RECORD).view(np.recarray)[0]
-    k["motor_inertia"], k["pinion_inertia"] = motor.inertia_kg_m2, contact.driver_inertia_kg_m2
+    k["motor_inertia"], k["pinion_inertia"] = contact.motor_inertia_kg_m2, contact.driver_inertia_kg_m2
     k["wheel_inertia"] = contact.driven_inertia_kg_m2
     k["rb1"], k["rb2"] = path.base_radii_m
     k["half_backlash"] = contact.half_backlash_um * 1e-6
@@ -79,14 +78,14 @@ def drive_numbers(drive: ForgingDrive) -> Any:
     k["tooth_friction"] = contact.friction_coefficient
     k["tooth_static_ratio"], k["tooth_stribeck"] = flanks.static_ratio, flanks.stribeck_speed
     k["tooth_presliding"] = flanks.presliding
-    k["speed_limit"], k["speed_band"] = drive.speed_limit_rad_s, motor.speed_band
-    k["ripple_fraction"], k["ripple_order"] = motor.ripple_fraction, motor.ripple_order
-    k["drag"], k["drag_viscous"] = motor.drag.level, motor.drag.viscous
-    k["load_friction"], k["load_viscous"] = load.friction.level, load.friction.viscous
-    for name, bristle in (("motor", motor.drag), ("load", load.friction)):
+    k["speed_limit"], k["speed_band"] = drive.speed_limit_rad_s, drive.speed_band
+    k["ripple_fraction"], k["ripple_order"] = drive.ripple_fraction, drive.ripple_order
+    k["drag"], k["drag_viscous"] = drive.drag.level, drive.drag.viscous
+    k["load_friction"], k["load_viscous"] = drive.load_friction.level, drive.load_friction.viscous
+    for name, bristle in (("motor", drive.drag), ("load", drive.load_friction)):
         k[f"{name}_static_ratio"], k[f"{name}_stribeck"] = bristle.static_ratio, bristle.stribeck_speed
         k[f"{name}_presliding"], k[f"{name}_bristle_time"] = bristle.presliding, bristle.damping_time_s
-    k["unbalance_torque"], k["unbalance_angle"] = load.unbalance_nm, load.unbalance_angle_rad
+    k["unbalance_torque"], k["unbalance_angle"] = drive.unbalance_nm, drive.unbalance_angle_rad
     weak = drive.weak_tooth
     k["weak_teeth"] = path.teeth[0 if weak is None else weak.gear]
     depths = drive.wear_um
@@ -149,8 +148,7 @@ class DriveResponse(Result, columns=("time_s", "signals")):
 
     def contact(self, column: str) -> FloatArray:
         """Return a column of the contacts by its name."""
-        values: FloatArray = self.contacts[:, CONTACT_COLUMNS.index(column)]
-        return values
+        return self.contacts[:, CONTACT_COLUMNS.index(column)]
 
 
 def respond(
@@ -189,62 +187,32 @@ def respond(
     positive(duration_s, "duration_s", "s")
     positive(interval_s, "interval_s", "s")
     within(tolerance, "tolerance", 1e-12, 1e-3)
-    run = _DriveRun.begin(drive, first or FirstState(), signals, duration_s, interval_s)
+    n = ceil(duration_s / interval_s - 1e-9)
+    if n > MAX_POINTS:
+        raise InputError(f"{n} points are too many", allowed=f"up to {MAX_POINTS}", remedy="shorten the run")
+    select = np.array([SIGNALS.index(one_of(name, "signals", SIGNALS)) for name in signals], dtype=np.int64)
+    output = np.full((n, len(select)), np.nan)
+    contacts = np.zeros((1000 + int(CONTACTS_PER_SECOND * duration_s), len(CONTACT_COLUMNS)))
+    y, mode, counts = np.zeros(N_STATES), np.zeros(3), np.zeros(4, dtype=np.int64)
+    start = first or FirstState()
+    y[:4] = start.pinion_angle_rad, start.pinion_speed_rad_s, start.compression_m, start.compression_rate_mps
+    k = drive_numbers(drive)
+    flank = float(np.sign(y[2]))
+    if flank * y[2] > reach(k, y[0], flank)[0]:
+        open_contact(k, y, 0.0, flank, mode, contacts[0])
+        counts[1] = 1
+    step_s, absolute = 1e-6, ABSOLUTE * (tolerance / TOLERANCE)
     for begin, end in pairwise(profiles.segments(duration_s)):
-        run.advance(begin, end, profiles.straight(begin, end), tolerance)
-    return run.response(signals)
-
-
-@dataclass
-class _DriveRun:
-    """A run on its way: states, contact, and what has been kept; arrays that the kernel fills in place."""
-
-    k: Any
-    y: FloatArray
-    mode: FloatArray
-    counts: NDArray[np.int64]
-    select: NDArray[np.int64]
-    output: FloatArray
-    contacts: FloatArray
-    interval_s: float
-    step_s: float = 1e-6
-
-    @classmethod
-    def begin(
-        cls, drive: ForgingDrive, start: FirstState, signals: Sequence[str], duration_s: float, interval_s: float
-    ) -> _DriveRun:
-        """Make room for the signals, and put the drive into its first state."""
-        n = ceil(duration_s / interval_s - 1e-9)
-        if n > MAX_POINTS:
-            raise InputError(f"{n} points are too many", allowed=f"up to {MAX_POINTS}", remedy="shorten the run")
-        select = np.array([SIGNALS.index(one_of(name, "signals", SIGNALS)) for name in signals], dtype=np.int64)
-        contacts = np.zeros((1000 + int(CONTACTS_PER_SECOND * duration_s), len(CONTACT_COLUMNS)))
-        y, mode, counts = np.zeros(N_STATES), np.zeros(3), np.zeros(4, dtype=np.int64)
-        y[:4] = start.pinion_angle_rad, start.pinion_speed_rad_s, start.compression_m, start.compression_rate_mps
-        k = drive_numbers(drive)
-        flank = float(np.sign(y[2]))
-        if flank * y[2] > reach(k, y[0], flank)[0]:
-            open_contact(k, y, 0.0, flank, mode, contacts[0])
-            counts[1] = 1
-        return cls(k, y, mode, counts, select, np.full((n, len(select)), np.nan), contacts, interval_s)
-
-    def advance(self, begin_s: float, end_s: float, profile: FloatArray, tolerance: float) -> None:
-        """Integrate over one segment of straight profiles."""
-        absolute = ABSOLUTE * (tolerance / TOLERANCE)
-        self.step_s, status = integrate(
-            self.k, self.y, self.mode, begin_s, end_s, min(self.step_s, 1e-5), profile, absolute, tolerance,
-            self.interval_s, self.select, self.counts, self.output, self.contacts,
+        step_s, status = integrate(
+            k, y, mode, begin, end, min(step_s, 1e-5), profiles.straight(begin, end), absolute, tolerance,
+            interval_s, select, counts, output, contacts,
         )  # fmt: skip
-        if status != DONE or not np.isfinite(self.y).all():
-            raise _failure(status, end_s)
-
-    def response(self, signals: Sequence[str]) -> DriveResponse:
-        """Return what was kept."""
-        filled = int(self.counts[0])
-        self.output[filled:] = self.output[filled - 1]  # rounding may leave the last point just beyond the end
-        kept = {name: np.ascontiguousarray(self.output[:, i]) for i, name in enumerate(signals)}
-        contacts = self.contacts[: self.counts[1]].copy()
-        return DriveResponse(self.interval_s, kept, contacts, int(self.counts[2]), int(self.counts[3]))
+        if status != DONE or not np.isfinite(y).all():
+            raise _failure(status, end)
+    n_filled, n_contacts, n_steps, n_refused = counts.tolist()
+    output[n_filled:] = output[n_filled - 1]  # rounding may leave the last point just beyond the end
+    kept = {name: np.ascontiguousarray(output[:, i]) for i, name in enumerate(signals)}
+    return DriveResponse(interval_s, kept, contacts[:n_contacts].copy(), n_steps, n_refused)
 
 
 def _failure(status: int, before_s: float) -> RefusalError:
@@ -722,7 +690,8 @@ def _fill_rows(k, y, t, h, mode, profile, stages, interval, select, counts, outp
 def _change_contact(k, y, t, next_flank, mode, counts, contacts):
     """End the contact there is, begin the next; false where no row is left for it."""
     if mode[0] != 0.0:
-        _close(contacts[counts[1] - 1], t, y)
+        row = contacts[counts[1] - 1]
+        row[5], row[6], row[8] = t, abs(y[3]), y[9] - row[8]
     if next_flank != 0.0:
         if counts[1] == contacts.shape[0]:
             return False
@@ -744,11 +713,6 @@ def open_contact(k, y, t, flank, mode, row):
     row[3], row[4] = floor(y[0] * k.cycles_per_rad - k.phase), y[0]
     row[5], row[6], row[7] = np.nan, np.nan, 0.0
     row[8], row[9] = y[9], 1.0 if speed < k.speed_floor else 0.0
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _close(row, t, y):
-    row[5], row[6], row[8] = t, abs(y[3]), y[9] - row[8]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -122,6 +122,8 @@ CHANNELS = (
 )
 """What a recording of the motion holds."""
 FILTERED = SAMPLINGS[1]
+FILTERED_SLOW = "torque, force, speeds and accelerations filtered below {:g} Hz before they were sampled"
+INSTANTS = "torque, force, speeds and accelerations sampled at instants, without a filter"
 VIBRATION = Channel("vibration", "acceleration", "m/s^2", "pinion bearing, along the line of action")
 
 
@@ -172,17 +174,11 @@ def record(
         provenance=Provenance(
             source="simulation: forging manipulator drive",
             reader="sims.forging",
-            history=(_sampling_text(sampling_rate_hz, is_filtered=is_filtered),),
+            history=((FILTERED_SLOW if is_filtered else INSTANTS).format(0.5 * sampling_rate_hz),),
         ),
         truth={**truth, **_truth(motion)},
         warnings=(FOLDS.format(0.5 * sampling_rate_hz),) if folds else (),
     )
-
-
-def _sampling_text(rate_hz: float, *, is_filtered: bool) -> str:
-    if is_filtered:
-        return f"torque, force, speeds and accelerations filtered below {0.5 * rate_hz:g} Hz before they were sampled"
-    return "torque, force, speeds and accelerations sampled at instants, without a filter"
 
 
 def _readings(

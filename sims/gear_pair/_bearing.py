@@ -65,8 +65,7 @@ def contact_n_per_m15(bearing: Bearing) -> float:
 
 def element_angles_rad(n: int, cage_rad: float) -> FloatArray:
     """ψ of the elements, counter-clockwise from +x, (n,)."""
-    angles: FloatArray = cage_rad + 2.0 * pi * np.arange(n) / n
-    return angles
+    return cage_rad + 2.0 * pi * np.arange(n) / n
 
 
 def shaft_place_m(support: BearingSupport, load_n: FloatArray, cage_rad: float = 0.0) -> FloatArray:

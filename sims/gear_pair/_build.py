@@ -620,7 +620,7 @@ def _check_balls(bearing: Bearing) -> None:
 
 def _sensors(chain: MeasurementChain, shaft: str) -> tuple[Sensor, ...]:
     sensors = [Sensor(c.name, "acceleration", "m/s^2", c.position) for c in chain.channels]
-    if isinstance(chain.tachometer, Tachometer):
+    if chain.tachometer is not None:
         sensors.append(Sensor(chain.tachometer.channel, "tachometer", "V", f"{chain.tachometer.shaft or shaft} shaft"))
     sensors += [Sensor(e.channel, "encoder", "deg", e.shaft or shaft, wraps=e.wraps) for e in chain.encoders]
     return tuple(sensors)
@@ -628,11 +628,11 @@ def _sensors(chain: MeasurementChain, shaft: str) -> tuple[Sensor, ...]:
 
 def _speed_source(chain: MeasurementChain, shaft: str) -> SpeedSource | None:
     tacho = chain.tachometer
-    if isinstance(tacho, Tachometer):
+    if tacho is not None:
         return TachometerChannel(tacho.channel, tacho.pulses_per_revolution, shaft=tacho.shaft or shaft)
-    for encoder in chain.encoders[:1] if tacho is None else ():
+    for encoder in chain.encoders[:1]:
         return EncoderChannel(encoder.channel, 360.0, wraps=encoder.wraps, shaft=encoder.shaft or shaft)
-    return None  # a counter's pulse times belong to the recording
+    return None
 
 
 def _constant(profile: Profile) -> float | None:

@@ -191,7 +191,7 @@ def installed_of_rig(rig: Rig, size: float, modes: Sequence[HousingMode], used: 
     shafts = (pair.driver, pair.driven)
     bearings: list[Bearing] = []
     for side in range(2):
-        of_shaft = sorted(own_bearings(rig, shafts[side]), key=lambda b: b.name not in used)[:2]
+        of_shaft = sorted((b for b in rig.bearings if b.shaft == shafts[side]), key=lambda b: b.name not in used)[:2]
         bearings += [completed_bearing(b, size) for b in of_shaft]
         bearings += [_spare(rig, shafts[side], 2 * side + n + 1, size) for n in range(len(of_shaft), 2)]
     pickup = _pickup(rig, shafts)
@@ -202,11 +202,6 @@ def installed_of_rig(rig: Rig, size: float, modes: Sequence[HousingMode], used: 
         tuple(modes),
         pickup,
     )
-
-
-def own_bearings(rig: Rig, shaft: str) -> list[Bearing]:
-    """Return the bearings of a shaft, in the rig's order."""
-    return [b for b in rig.bearings if b.shaft == shaft]
 
 
 def completed_bearing(bearing: Bearing, size: float) -> Bearing:

@@ -10,13 +10,21 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from gearsig.checks import FloatArray, count, positive
+from gearsig.compiled import UNCOUNTED, njit
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Recording
 from gearsig.results import Result
 from gearsig.rig import Rig
 from sims.machine import RECOVERY_S, Machine, Operation, Profile
 from sims.measure import MeasurementChain, Motion
-from sims.mesh import FlankRoughness, FractalSurface, TimeLockedRoughness, oil_terms, reduced_modulus_pa
+from sims.mesh import (
+    FlankRoughness,
+    FractalSurface,
+    TimeLockedRoughness,
+    contact_friction_n,
+    oil_terms,
+    reduced_modulus_pa,
+)
 
 # --------------------
 # Drive, inertias and friction as plain numbers, which compiled code reads.
@@ -118,7 +126,7 @@ FRICTION_FIELDS: list[Any] = [
         )
     ),
 ]
-"""Of the record: what `sims.mesh.contact_friction_n` needs."""
+"""Of the record: what `friction_of_pair` needs."""
 
 
 def friction_fields(machine: Machine, operation: Operation, force_n: float) -> dict[str, Any]:
@@ -148,6 +156,28 @@ def greatest_sliding_mps(machine: Machine, omega_rad_s: float) -> float:
     pair = machine.mesh.pair
     cycles = np.array([0.0, pair.contact_ratio])
     return float(np.max(np.abs(pair.sliding_speed_m_s(cycles, omega_rad_s * 30.0 / pi))))
+
+
+@njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)  # type: ignore[untyped-decorator,unused-ignore]
+def friction_of_pair(k, force, progress, omega_1, omega_2, slip_x, width):  # type: ignore[no-untyped-def]
+    """(f, fρ1, fρ2) of a pair at ζ; the film knows the speeds, the sign of its friction feels `slip_x` besides."""
+    rho_1 = k.start_radius + progress * k.base_pitch
+    rho_2 = k.action_length - rho_1
+    rubbing = contact_friction_n(
+        force,
+        omega_1 * rho_1,
+        omega_2 * rho_2,
+        slip_x,
+        rho_1 * rho_2 / k.action_length,
+        width,
+        k.reduced_modulus,
+        k.log10_oil,
+        k.oil_constant,
+        k.sign_threshold,
+        k.friction_factor,
+        k.dry_friction,
+    )
+    return rubbing, rubbing * rho_1, rubbing * rho_2
 
 
 # Roughness of a pair's flanks, drawn.
@@ -224,6 +254,10 @@ class PairResponse(Result, Generic[State], columns=("time_s", "signals")):
         )
 
 
+MAX_STEPS = 400_000_000
+"""Ten minutes to half an hour of computing or so; more is taken for a mistake."""
+
+
 @dataclass(frozen=True)
 class RunPlan:
     """Steps of a run, and which of them are kept.
@@ -235,8 +269,6 @@ class RunPlan:
         Every how many steps a point is kept.
     steps_per_call : int
         After these many compiled code comes back for a look whether it is to stop.
-    max_steps : int
-        Ten minutes to half an hour of computing or so; more is taken for a mistake.
     """
 
     start_s: float
@@ -244,17 +276,16 @@ class RunPlan:
     step_s: float
     stride: int
     steps_per_call: int
-    max_steps: int = 400_000_000
 
     def __post_init__(self) -> None:
         positive(self.duration_s, "duration_s", "s")
         positive(self.step_s, "step_s", "s")
         count(self.stride, "stride")
-        if self.n_steps > self.max_steps:
+        if self.n_steps > MAX_STEPS:
             raise InputError(
                 f"{self.n_steps:.3g} steps of {self.step_s:.3g} s",
                 where="duration_s",
-                allowed=f"at most {self.max_steps:.0e} steps",
+                allowed=f"at most {MAX_STEPS:.0e} steps",
                 remedy="simulate a shorter time, or in parts",
             )
 
@@ -264,13 +295,7 @@ class RunPlan:
         return ceil(self.duration_s / self.step_s - 1e-9)
 
     def run(
-        self,
-        march: March,
-        signals: Sequence[str],
-        *,
-        with_energy: bool,
-        remedy: str,
-        on_progress: Callable[[float], None] | None,
+        self, march: March, signals: Sequence[str], *, with_energy: bool, remedy: str
     ) -> tuple[dict[str, FloatArray], FloatArray]:
         """Return the signals by name, and the energies where they are asked for.
 
@@ -295,8 +320,6 @@ class RunPlan:
                     f"at a step of {self.step_s:.3g} s",
                     remedy=remedy,
                 )
-            if on_progress is not None:
-                on_progress((begun + n) / n_steps)
         return dict(zip(signals, rows.T, strict=True)), energies
 
 
@@ -416,8 +439,6 @@ class MeasuredRun(Generic[State]):
         Rate of the motion at least that is handed to the measurement chain.
     noise_rng : numpy.random.Generator or None
         For the chain, instead of the stream made of `rng`: the same machine with other noise.
-    on_progress : callable or None
-        Called now and then with the part of the motion that is done, 0 to 1.
     """
 
     rng: np.random.Generator
@@ -431,7 +452,6 @@ class MeasuredRun(Generic[State]):
     before: PairResponse[State] | None = None
     min_motion_hz: float = MIN_MOTION_HZ
     noise_rng: np.random.Generator | None = None
-    on_progress: Callable[[float], None] | None = None
 
     def streams(self) -> tuple[np.random.Generator, np.random.Generator]:
         """Return the generators of the machine and of the chain; to be called once."""
@@ -503,7 +523,6 @@ class Measurement(Generic[State]):
             "step_s": self.step_s,
             "stride": self.stride,
             "first": self.run.first,
-            "on_progress": self.run.on_progress,
         }
 
     @property

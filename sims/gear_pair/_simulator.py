@@ -301,12 +301,8 @@ def _spread(rng: np.random.Generator) -> float:
     return float(2.0 ** rng.uniform(-1.0, 1.0))
 
 
-def as_plain(values: dict[str, Any]) -> dict[str, Any]:
-    """Round numbers to six digits: what a preset file holds is what runs."""
-    return {name: _rounded(v) if isinstance(v, float) else v for name, v in values.items()}
-
-
 def _rounded(value: float) -> float:
+    """To six digits: what a preset file holds is what runs."""
     return float(f"{value:.6g}")
 
 
@@ -499,7 +495,9 @@ class PairTwin:
                 *(f"{name}: usual, the rig does not tell" for name in self.nominal.assumed),
             ),
             does_not_represent=("the real machine's own flanks, tolerances and housing",),
-            parameters=MappingProxyType(as_plain(self._model_parameters(values))),
+            parameters=MappingProxyType(
+                {name: _rounded(v) if isinstance(v, float) else v for name, v in self._model_parameters(values).items()}
+            ),
             speed_rpm=point.speed_rpm,
             torque_nm=point.torque_nm,
             effects=tuple(EffectSetting(a.name, a.severity, dict(a.options)) for a in added),

@@ -13,7 +13,7 @@ import numpy as np
 from gearsig.checks import FloatArray, frozen_array, known_name, not_negative, positive, within
 from gearsig.errors import InputError
 from gearsig.recording import Channel, Provenance, Recording
-from gearsig.rig import EncoderChannel, PulseTimes, Rig, SpeedSource, TachometerChannel
+from gearsig.rig import EncoderChannel, Rig, SpeedSource, TachometerChannel
 from sims.measure._sensors import (
     Accelerometer,
     ColouredNoise,
@@ -21,7 +21,6 @@ from sims.measure._sensors import (
     Encoder,
     MainsHum,
     ModalPath,
-    PulseCounter,
     Tachometer,
     disc_edges,
     pulse_voltage,
@@ -124,11 +123,6 @@ class AntiAlias:
     def __post_init__(self) -> None:
         within(self.attenuation_db, "attenuation_db of the anti-alias filter", 40.0, 140.0, "dB")
         within(self.passband_fraction, "passband_fraction of the anti-alias filter", 0.2, 0.48)
-
-    @property
-    def passband_error(self) -> float:
-        """Largest relative error of a sine's amplitude in the pass band, 10^(-A/20)."""
-        return float(10.0 ** (-self.attenuation_db / 20.0))
 
     def reach_s(self, sampling_rate_hz: float) -> float:
         """Time on each side of a sample that takes part in it: half the filter's length, by Kaiser's formula."""
@@ -236,8 +230,7 @@ class MeasurementChain:
     sampling_rate_hz : float
     channels : tuple of MeasuredChannel
     anti_alias : AntiAlias
-    tachometer : Tachometer, PulseCounter or None
-        A voltage channel, or time stamps without a channel.
+    tachometer : Tachometer or None
     encoders : tuple of Encoder
         The first is the speed source where there is no tachometer.
 
@@ -253,7 +246,7 @@ class MeasurementChain:
     sampling_rate_hz: float
     channels: tuple[MeasuredChannel, ...]
     anti_alias: AntiAlias = field(default_factory=AntiAlias)
-    tachometer: Tachometer | PulseCounter | None = None
+    tachometer: Tachometer | None = None
     encoders: tuple[Encoder, ...] = ()
 
     def __post_init__(self) -> None:
@@ -389,16 +382,10 @@ class MeasurementChain:
         if tacho is not None:
             shaft = tacho.shaft or _default_shaft(motion, rig)
             revolutions = motion.angle_rad(shaft, "tachometer") / (2 * np.pi)
-            duty = tacho.duty if isinstance(tacho, Tachometer) else 0.5
-            edges = disc_edges(revolutions, fine_s, tacho.pulses_per_revolution, duty, tacho.first_pulse_rev)
-            if isinstance(tacho, Tachometer):
-                rows.append(_voltage(tacho, edges, time_s, rng))
-                channels.append(Channel(tacho.channel, "tachometer", "V", shaft))
-                speed = TachometerChannel(tacho.channel, tacho.pulses_per_revolution, shaft=shaft)
-            else:
-                stamps = tacho.stamp(edges[0], rng)
-                inside = stamps[(stamps >= 0) & (stamps <= time_s[-1])]
-                speed = PulseTimes(inside, tacho.pulses_per_revolution, shaft=shaft)
+            edges = disc_edges(revolutions, fine_s, tacho.pulses_per_revolution, tacho.duty, tacho.first_pulse_rev)
+            rows.append(_voltage(tacho, edges, time_s, rng))
+            channels.append(Channel(tacho.channel, "tachometer", "V", shaft))
+            speed = TachometerChannel(tacho.channel, tacho.pulses_per_revolution, shaft=shaft)
         for encoder in self.encoders:
             shaft = encoder.shaft or _default_shaft(motion, rig)
             angle = np.interp(time_s, fine_s, motion.angle_rad(shaft, "encoder"))

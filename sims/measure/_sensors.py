@@ -55,11 +55,6 @@ def low_pass(frequency_hz: float, damping_ratio: float, step_s: float) -> Sectio
     return discrete((w * w,), (1.0, 2 * damping_ratio * w, w * w), step_s)
 
 
-def high_pass(frequency_hz: float, step_s: float) -> Section:
-    """s/(s + ω), discrete."""
-    return discrete((1.0, 0.0), (1.0, 2 * np.pi * frequency_hz), step_s)
-
-
 def apply_bank(sections: list[Section], gains: FloatArray, inputs: FloatArray, direct: FloatArray) -> FloatArray:
     """Sum of filtered inputs, each filter from the steady state that belongs to the first values.
 
@@ -121,8 +116,6 @@ class Accelerometer:
         At the recording's start.
     drift_mps2_per_s : float
         Change of the bias with time, as from warming up.
-    wander_mps2_per_sqrt_s : float
-        Random walk of the bias: its standard deviation after 1 s.
     """
 
     resonance_hz: float | None = None
@@ -132,7 +125,6 @@ class Accelerometer:
     noise_mps2_per_sqrt_hz: float = 0.0
     bias_mps2: float = 0.0
     drift_mps2_per_s: float = 0.0
-    wander_mps2_per_sqrt_s: float = 0.0
     clip_percent: float = 0.0
 
     def __post_init__(self) -> None:
@@ -144,7 +136,6 @@ class Accelerometer:
             positive(self.range_mps2, "range_mps2 of the accelerometer", "m/s^2")
         within(self.clip_percent, "clip_percent of the accelerometer", 0.0, 50.0, "%")
         not_negative(self.noise_mps2_per_sqrt_hz, "noise_mps2_per_sqrt_hz of the accelerometer")
-        not_negative(self.wander_mps2_per_sqrt_s, "wander_mps2_per_sqrt_s of the accelerometer")
         for name in ("bias_mps2", "drift_mps2_per_s"):
             if not np.isfinite(getattr(self, name)):
                 raise InputError(f"{name} of the accelerometer is {getattr(self, name)}", allowed="a finite number")
@@ -163,11 +154,12 @@ class Accelerometer:
             x = apply(low_pass(self.resonance_hz, self.damping_ratio, step_s), x)
         if self.lower_limit_hz > 0:
             # The coupling has long settled on the mean, not on a first value that may be the middle of a blow.
-            x = apply(high_pass(self.lower_limit_hz, step_s), np.concatenate(([np.mean(x)], x)))[1:]
+            coupling = discrete((1.0, 0.0), (1.0, 2 * np.pi * self.lower_limit_hz), step_s)
+            x = apply(coupling, np.concatenate(([np.mean(x)], x)))[1:]
         return x
 
     def read(self, acceleration_mps2: FloatArray, time_s: FloatArray, rng: np.random.Generator) -> FloatArray:
-        """Reading over time on a fine even grid, (n_steps,); noise, then wander, are drawn from `rng`.
+        """Reading over time on a fine even grid, (n_steps,); noise is drawn from `rng`.
 
         The noise fills the band of the grid; the anti-alias filter that follows leaves its density in the band of the
         recording.
@@ -177,11 +169,6 @@ class Accelerometer:
         if self.noise_mps2_per_sqrt_hz > 0:
             sigma = self.noise_mps2_per_sqrt_hz * np.sqrt(0.5 / step_s)
             reading += sigma * rng.standard_normal(len(time_s))
-        if self.wander_mps2_per_sqrt_s > 0:
-            walk = np.cumsum(rng.standard_normal(len(time_s)))
-            # From 0 at the recording's start, so that bias_mps2 means what it says.
-            start = walk[np.searchsorted(time_s, 0.0)] if time_s[-1] >= 0 else walk[-1]
-            reading += self.wander_mps2_per_sqrt_s * np.sqrt(step_s) * (walk - start)
         limit = self._limit_mps2(reading[time_s >= 0.0] if time_s[-1] >= 0.0 else reading)
         return reading if limit is None else np.clip(reading, -limit, limit)
 
@@ -296,8 +283,7 @@ class ModalPath:
         for mode in self.modes:
             r = f / mode.frequency_hz
             total += mode.gains.get(position, 0.0) / (1 - r**2 + 2j * mode.damping_ratio * r)
-        result: FloatArray = total
-        return result
+        return total
 
 
 def _weights(gains: Mapping[str, float], positions: tuple[str, ...]) -> FloatArray:
@@ -425,6 +411,10 @@ class MainsHum:
 # --------------------
 
 
+HIGH_V = 5.0
+"""Of a pulse, from 0 V."""
+
+
 @dataclass(frozen=True)
 class Tachometer:
     """A pulse channel; the middle of each rising edge lies at shaft angle (k + offset)/n.
@@ -435,7 +425,6 @@ class Tachometer:
         Empty: the reference shaft.
     pulses_per_revolution : int
     channel : str
-    low_v, high_v : float
     duty : float
         Pulse width over pulse period, in angle; 0.01 to 0.99.
     edge_s : float
@@ -451,8 +440,6 @@ class Tachometer:
     shaft: str = ""
     pulses_per_revolution: int = 1
     channel: str = "tacho"
-    low_v: float = 0.0
-    high_v: float = 5.0
     duty: float = 0.1
     edge_s: float = 2e-4
     jitter_s: float = 0.0
@@ -482,49 +469,7 @@ def pulse_voltage(tacho: Tachometer, rising_s: FloatArray, falling_s: FloatArray
             knots = (np.sort(edges)[:, None] + np.array([-0.5, 0.5]) * tacho.edge_s).ravel()
             steps = (np.arange(len(edges))[:, None] + np.array([0.0, 1.0])).ravel()
             up += sign * np.interp(time_s, knots, steps)
-    return tacho.low_v + (tacho.high_v - tacho.low_v) * up
-
-
-# Angle channels beside the voltage of a tachometer: pulses timed by a counter, and an encoder.
-
-
-@dataclass(frozen=True)
-class PulseCounter:
-    """Pulses timed by a counter: times of rising edges, rounded down to the clock's ticks.
-
-    Parameters
-    ----------
-    shaft : str
-        Empty: the reference shaft.
-    pulses_per_revolution : int
-    clock_hz : float or None
-        None: no rounding.
-    jitter_s : float
-        Standard deviation of an edge's time, ahead of the rounding.
-    first_pulse_rev : float
-        Shaft angle of an edge, 0 to 1.
-    """
-
-    shaft: str = ""
-    pulses_per_revolution: int = 1
-    clock_hz: float | None = None
-    jitter_s: float = 0.0
-    first_pulse_rev: float = 0.0
-
-    def __post_init__(self) -> None:
-        count(self.pulses_per_revolution, "pulses_per_revolution of the counter")
-        if self.clock_hz is not None:
-            positive(self.clock_hz, "clock_hz of the counter", "Hz")
-        not_negative(self.jitter_s, "jitter_s of the counter", "s")
-        within(self.first_pulse_rev, "first_pulse_rev of the counter", 0.0, 1.0, "rev")
-
-    def stamp(self, rising_s: FloatArray, rng: np.random.Generator) -> FloatArray:
-        """Time stamps of edges, ascending."""
-        times = np.sort(rising_s + self.jitter_s * rng.standard_normal(len(rising_s)))
-        if self.clock_hz is None:
-            return times
-        ticks: FloatArray = np.floor(times * self.clock_hz)
-        return ticks / self.clock_hz
+    return HIGH_V * up
 
 
 @dataclass(frozen=True)
@@ -540,8 +485,6 @@ class Encoder:
         The reading stays up to one count behind the angle.
     wraps : bool
         Whether it starts again after each revolution.
-    runout_deg : float
-        Peak of a once-per-revolution error, from a disc that sits off centre.
     noise_deg : float
         Standard deviation of each reading's error ahead of the counting.
     """
@@ -550,17 +493,15 @@ class Encoder:
     shaft: str = ""
     counts_per_revolution: int = 4096
     wraps: bool = True
-    runout_deg: float = 0.0
     noise_deg: float = 0.0
 
     def __post_init__(self) -> None:
         count(self.counts_per_revolution, "counts_per_revolution of the encoder", minimum=4)
-        within(self.runout_deg, "runout_deg of the encoder", -10.0, 10.0, "deg")
         not_negative(self.noise_deg, "noise_deg of the encoder", "deg")
 
     def read_deg(self, angle_rad: FloatArray, rng: np.random.Generator | None = None) -> FloatArray:
         """Reading at the given shaft angles; without `rng` free of noise."""
-        read_rev = angle_rad / (2 * np.pi) + self.runout_deg / 360.0 * np.sin(angle_rad)
+        read_rev = angle_rad / (2 * np.pi)
         if rng is not None and self.noise_deg:
             read_rev = read_rev + self.noise_deg / 360.0 * rng.standard_normal(np.shape(angle_rad))
         counts = np.floor(read_rev * self.counts_per_revolution)

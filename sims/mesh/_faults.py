@@ -44,9 +44,7 @@ class RootCrack:
     tooth : int
         Which tooth of the gear, from 0.
     width_mm : float or None
-        How far it reaches over the face width from one end; None: all through.
-    front : str
-        "straight": the same depth over `width_mm`. "parabolic": depth_mm · √(1 − w/width_mm) at w from the end face.
+        How far it reaches over the face width from one end, everywhere as deep; None: all through.
 
     Notes
     -----
@@ -58,7 +56,6 @@ class RootCrack:
     angle_deg: float = 45.0
     tooth: int = 0
     width_mm: float | None = None
-    front: str = "straight"
 
     def __post_init__(self) -> None:
         positive(self.depth_mm, "depth_mm of the crack", "mm", remedy="leave out the crack for a healthy tooth")
@@ -66,7 +63,6 @@ class RootCrack:
         count(self.tooth, "tooth of the crack", minimum=0)
         if self.width_mm is not None:
             positive(self.width_mm, "width_mm of the crack", "mm")
-        one_of(self.front, "front of the crack", ("straight", "parabolic"))
 
 
 def crack_mouth_mm(gear: GearGeometry) -> tuple[float, float]:
@@ -85,11 +81,6 @@ def crack_tip_mm(gear: GearGeometry, depth_mm: float, angle_deg: float) -> tuple
 def crack_percent(gear: GearGeometry, depth_mm: float, angle_deg: float = 45.0) -> float:
     """Depth across the tooth as a percentage of the root's thickness at the crack's mouth, 100 q sin ϑ/(2 y)."""
     return 100.0 * depth_mm * sin(_angle_rad(angle_deg)) / (2.0 * crack_mouth_mm(gear)[1])
-
-
-def crack_depth_mm(gear: GearGeometry, percent: float, angle_deg: float = 45.0) -> float:
-    """Depth that takes `percent` of the root's thickness: the inverse of `crack_percent`."""
-    return percent / 100.0 * 2.0 * crack_mouth_mm(gear)[1] / sin(_angle_rad(angle_deg))
 
 
 CRACK_LAWS = ("two lines", "limiting line", "parallel line")
@@ -135,8 +126,7 @@ def effective_flank_mm(
         return np.where(x_mm >= x_end, np.minimum(y_mm, limit), y_mm)
     before = y_mouth + (y_tip - y_mouth) * (x_mm - x_mouth) / (x_tip - x_mouth)
     lost = np.where(x_mm >= x_mouth, np.maximum(before - behind, 0.0), np.maximum(y_mm - behind, 0.0))
-    result: FloatArray = np.where(x_mm >= x_end, y_mm - lost, y_mm)
-    return result
+    return np.where(x_mm >= x_end, y_mm - lost, y_mm)
 
 
 @lru_cache(maxsize=256)
@@ -289,8 +279,7 @@ def spall_share(
     depth = min(1.0, spall.depth_um * 1e-3 / flattening)
     low, high = _ends_mm(pair, side, spall)
     inside = part_inside(arc_length_mm(gear, roll_length_mm), low, high, half_width)
-    result: FloatArray = spall.width_mm / pair.face_width_mm * depth * inside
-    return result
+    return spall.width_mm / pair.face_width_mm * depth * inside
 
 
 def spall_separation_m(pair: PairGeometry, side: int, spall: ToothSpall, roll_length_mm: FloatArray) -> FloatArray:
@@ -418,5 +407,4 @@ def _is_whole(pair: PairGeometry, chip: ToothChip) -> bool:
 def _edge_separation_m(pair: PairGeometry, side: int, chip: ToothChip, progress: FloatArray) -> FloatArray:
     """0 up to the chip's edge, and what is more than at the corner of a whole tooth beyond it."""
     lost = (chip.height_mm, 0.0) if side == 1 else (0.0, chip.height_mm)
-    result: FloatArray = corner_separation_m(pair, progress, lost) - corner_separation_m(pair, progress)
-    return result
+    return corner_separation_m(pair, progress, lost) - corner_separation_m(pair, progress)

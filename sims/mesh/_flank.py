@@ -23,12 +23,7 @@ class FlankDeviation:
     tip_relief_um : float
         Metal taken off at the tip, 0 for none.
     tip_relief_length_mm : float
-        Length of the relief along the line of action, from the tip down.
-    tip_relief_exponent : float
-        1: straight; 2: parabolic.
-    profile_um : tuple of float
-        Measured profile deviation at equal steps of roll from the end of the fillet to the tip; straight between them.
-        Empty: none.
+        Length of the relief along the line of action, from the tip down; straight.
     pitch_um : tuple of float
         Cumulative pitch deviation of each tooth, as many as the gear has teeth. Empty: none.
     wear_um : float
@@ -37,20 +32,14 @@ class FlankDeviation:
 
     tip_relief_um: float = 0.0
     tip_relief_length_mm: float = 1.0
-    tip_relief_exponent: float = 1.0
-    profile_um: tuple[float, ...] = ()
     pitch_um: tuple[float, ...] = ()
     wear_um: float = 0.0
 
     def __post_init__(self) -> None:
         not_negative(self.tip_relief_um, "tip_relief_um", "µm")
         positive(self.tip_relief_length_mm, "tip_relief_length_mm", "mm")
-        positive(self.tip_relief_exponent, "tip_relief_exponent")
         not_negative(self.wear_um, "wear_um", "µm")
-        frozen_array(self.profile_um, "profile_um", ndim=1)
         frozen_array(self.pitch_um, "pitch_um", ndim=1)
-        if len(self.profile_um) == 1:
-            raise InputError("profile_um holds one value", allowed="none, or at least two from fillet to tip")
 
 
 IDEAL_FLANK = FlankDeviation()
@@ -80,12 +69,7 @@ def flank_separation_m(gear: GearGeometry, deviation: FlankDeviation, roll_lengt
     rho = np.asarray(roll_length_mm, dtype=np.float64)
     tip = gear.tip_roll_rad * gear.base_radius_mm
     into = np.maximum(rho - (tip - deviation.tip_relief_length_mm), 0.0) / deviation.tip_relief_length_mm
-    total = deviation.tip_relief_um * into**deviation.tip_relief_exponent
-    if deviation.profile_um:
-        places = np.linspace(gear.form_roll_rad * gear.base_radius_mm, tip, len(deviation.profile_um))
-        total = total + np.interp(rho, places, np.asarray(deviation.profile_um))
-    result: FloatArray = total * 1e-6
-    return result
+    return deviation.tip_relief_um * into * 1e-6
 
 
 def pitch_separation_m(gear: GearGeometry, deviation: FlankDeviation) -> FloatArray:
@@ -129,15 +113,13 @@ def wear_profile(pair: PairGeometry, side: int, roll_length_mm: FloatArray) -> F
     """
     ends = contact_ends_mm(pair, side)
     largest = float(np.max(_specific_sliding(pair, side, np.array(ends))))
-    result: FloatArray = _specific_sliding(pair, side, np.clip(roll_length_mm, *ends)) / largest
-    return result
+    return _specific_sliding(pair, side, np.clip(roll_length_mm, *ends)) / largest
 
 
 def _specific_sliding(pair: PairGeometry, side: int, roll_length_mm: FloatArray) -> FloatArray:
     gear, mate = (pair.driver, pair.driven) if side == 1 else (pair.driven, pair.driver)
     rho = np.maximum(np.asarray(roll_length_mm, dtype=np.float64), MIN_RADIUS * gear.module_mm)
-    result: FloatArray = np.abs(1.0 - gear.teeth / mate.teeth * (pair.action_length_mm - rho) / rho)
-    return result
+    return np.abs(1.0 - gear.teeth / mate.teeth * (pair.action_length_mm - rho) / rho)
 
 
 # --------------------
@@ -195,8 +177,7 @@ class Lead:
 
     def gap_m(self, places: FloatArray) -> FloatArray:
         """Missing metal by crowning and misalignment at places −½ to ½ of the face; 0 in its middle."""
-        result: FloatArray = 1e-6 * (self.crowning_um * (2.0 * places) ** 2 + self.error_um * places)
-        return result
+        return 1e-6 * (self.crowning_um * (2.0 * places) ** 2 + self.error_um * places)
 
     def late(self, pair: PairGeometry, places: FloatArray) -> FloatArray:
         """Base pitches by which places −½ to ½ of the face enter after the end that enters first, 0 to ε_β.
@@ -204,8 +185,7 @@ class Lead:
         The driver turns counter-clockwise, seen from +z: the far end of a right-handed tooth runs ahead.
         """
         hand = 1.0 if self.helix_angle_deg >= 0.0 else -1.0
-        result: FloatArray = self.overlap_ratio(pair) * (0.5 - hand * places)
-        return result
+        return self.overlap_ratio(pair) * (0.5 - hand * places)
 
     def overlap_ratio(self, pair: PairGeometry) -> float:
         """ε_β = b tan β/(π m_t), how many pitches one end of the face is behind the other."""
@@ -312,8 +292,7 @@ def normal_roll_rad(gear: GearGeometry, virtual: GearGeometry, roll_rad: FloatAr
         return roll_rad
     height = gear.base_radius_mm * np.hypot(1.0, roll_rad) - gear.pitch_radius_mm
     ratio = (virtual.pitch_radius_mm + height) / virtual.base_radius_mm
-    result: FloatArray = np.sqrt(np.maximum(ratio**2 - 1.0, 0.0))
-    return result
+    return np.sqrt(np.maximum(ratio**2 - 1.0, 0.0))
 
 
 # --------------------
@@ -321,6 +300,9 @@ def normal_roll_rad(gear: GearGeometry, virtual: GearGeometry, roll_rad: FloatAr
 # fractal geometry in roughness characterization and contact mechanics of surfaces*, Journal of Tribology 112 (1990).
 # --------------------
 
+
+CYCLES_PER_METRE = 1.5 ** np.arange(7.0, 19.0)
+"""γⁿ of the profile's lines, (n_lines,)."""
 
 LISTED_TRAVEL_MPS = 1.0312
 """Speed along the profile that puts lines 7 … 18 at 17.6 … 1524 Hz: γⁿ cycles per metre times this.
@@ -332,7 +314,7 @@ module 2 at 500 rpm, 0.95 to 1.02 m/s.
 
 @dataclass(frozen=True)
 class FractalSurface:
-    """z(h) = G^(D-1) Σ γ^(-(2-D)n) cos(2πγⁿh + κ_n), n = n_first … n_last.
+    """z(h) = G^(D-1) Σ γ^(-(2-D)n) cos(2πγⁿh + κ_n), γ = 1.5, n = 7 … 18: wavelengths of 59 mm … 0.68 mm.
 
     Parameters
     ----------
@@ -340,27 +322,14 @@ class FractalSurface:
         G, not below 0; 0 is a smooth flank.
     dimension : float
         D, above 1 and below 2: low for wavy, high for jagged profiles.
-    n_first, n_last : int
-        Lines; γⁿ is in cycles per metre, so that 7 … 18 are wavelengths of 59 mm … 0.68 mm.
-    gamma : float
-        γ, 1.5 unless there is a reason.
     """
 
     scale_m: float
     dimension: float = 1.5
-    n_first: int = 7
-    n_last: int = 18
-    gamma: float = 1.5
 
     def __post_init__(self) -> None:
         not_negative(self.scale_m, "scale_m of the roughness", "m")
         within(self.dimension, "dimension of the roughness", 1.001, 1.999)
-        within(self.gamma, "gamma of the roughness", 1.01, 10.0)
-        if not (isinstance(self.n_first, int) and isinstance(self.n_last, int) and self.n_first <= self.n_last):
-            raise InputError(
-                f"lines {self.n_first} to {self.n_last} of the roughness",
-                allowed="whole numbers, the first not above the last",
-            )
 
     @classmethod
     def of_roughness(cls, rms_um: float, dimension: float = 1.5) -> FractalSurface:
@@ -378,15 +347,9 @@ class FractalSurface:
         return cls((rms_m / unit.rms_m) ** (1.0 / (dimension - 1.0)), dimension)
 
     @property
-    def cycles_per_metre(self) -> FloatArray:
-        """γⁿ, (n_lines,)."""
-        lines: FloatArray = self.gamma ** np.arange(self.n_first, self.n_last + 1, dtype=np.float64)
-        return lines
-
-    @property
     def amplitudes_m(self) -> FloatArray:
         """Peak amplitude of each line, (n_lines,)."""
-        amplitudes: FloatArray = self.scale_m ** (self.dimension - 1) * self.cycles_per_metre ** -(2 - self.dimension)
+        amplitudes: FloatArray = self.scale_m ** (self.dimension - 1) * CYCLES_PER_METRE ** -(2 - self.dimension)
         return amplitudes
 
     @property
@@ -396,9 +359,7 @@ class FractalSurface:
 
     def draw_phases(self, rng: np.random.Generator, n_profiles: int = 1) -> FloatArray:
         """Uniform phases κ, (n_profiles, n_lines)."""
-        n_lines = self.n_last - self.n_first + 1
-        phases: FloatArray = rng.uniform(0.0, 2 * np.pi, (n_profiles, n_lines))
-        return phases
+        return rng.uniform(0.0, 2 * np.pi, (n_profiles, len(CYCLES_PER_METRE)))
 
 
 @dataclass(frozen=True)
@@ -412,16 +373,12 @@ class TimeLockedRoughness:
     ----------
     surface : FractalSurface
     phases_rad : array, (n_lines,)
-    travel_mps : float
-        v, above 0.
     """
 
     surface: FractalSurface
     phases_rad: FloatArray
-    travel_mps: float = LISTED_TRAVEL_MPS
 
     def __post_init__(self) -> None:
-        positive(self.travel_mps, "travel_mps of the roughness", "m/s")
         object.__setattr__(self, "phases_rad", _phases(self.phases_rad, 1, len(self.surface.amplitudes_m)))
 
     @classmethod
@@ -432,11 +389,16 @@ class TimeLockedRoughness:
     @property
     def frequencies_hz(self) -> FloatArray:
         """γⁿ v, (n_lines,)."""
-        return self.surface.cycles_per_metre * self.travel_mps
+        return CYCLES_PER_METRE * LISTED_TRAVEL_MPS
 
     def height_m(self, time_s: ArrayLike) -> FloatArray:
         """Δb at the given times."""
-        return _cosines(self.surface.amplitudes_m, 2 * np.pi * self.frequencies_hz, self.phases_rad, time_s)
+        t = np.asarray(time_s, dtype=np.float64)
+        total = np.zeros(t.shape)
+        lines = zip(self.surface.amplitudes_m, 2 * np.pi * self.frequencies_hz, self.phases_rad, strict=True)
+        for a, w, phase in lines:  # line by line: no (time × line) matrix
+            total += a * np.cos(w * t + phase)
+        return total
 
     def phasors(self, step_s: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
         """What `roughness_kernel.height_now` and `advance` work on, from time 0.
@@ -500,20 +462,12 @@ class FlankRoughness:
         row = np.mod(tooth, self.n_teeth)
         total = np.zeros(np.broadcast_shapes(np.shape(row), s.shape))
         # cos(ks + φ) by the cosines and sines of both: one profile of positions serves all teeth.
-        for n, cycles in enumerate(self.surface.cycles_per_metre):
+        for n, cycles in enumerate(CYCLES_PER_METRE):
             place, phase = 2 * np.pi * cycles * s, self.phases_rad[row, n]
             a = self.surface.amplitudes_m[n]
             total += a * np.cos(phase) * np.cos(place)
             total -= a * np.sin(phase) * np.sin(place)
         return total
-
-
-def _cosines(amplitudes: FloatArray, omega: FloatArray, phases: FloatArray, time_s: ArrayLike) -> FloatArray:
-    t = np.asarray(time_s, dtype=np.float64)
-    total = np.zeros(t.shape)
-    for a, w, phase in zip(amplitudes, omega, phases, strict=True):  # line by line: no (time × line) matrix
-        total += a * np.cos(w * t + phase)
-    return total
 
 
 def _phases(phases_rad: FloatArray, ndim: int, n_lines: int) -> FloatArray:

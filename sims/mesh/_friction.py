@@ -13,7 +13,7 @@ from gearsig.compiled import njit
 from gearsig.errors import InputError
 from gearsig.results import Result
 from sims.mesh._geometry import Material, flexibility_per_pa
-from sims.mesh._mesh_stiffness import MeshTable, share_torque
+from sims.mesh._mesh_stiffness import share_torque
 from sims.mesh._stiffness import GearMesh
 
 MAX_FRICTION = 0.3
@@ -41,14 +41,11 @@ class FrictionResult:
     ----------
     coefficient : array
         From 0 to `MAX_FRICTION`, in the common shape of what was given.
-    capped : array of bool
-        Where the regression gave more than the cap.
     notes : tuple of str
         One per quantity that leaves the regression's range, with value and limit; empty inside.
     """
 
     coefficient: FloatArray
-    capped: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
     notes: tuple[str, ...] = ()
 
 
@@ -115,7 +112,7 @@ def friction_coefficient(
         inputs["entrainment_mps"],
         inputs["radius_m"],
     )
-    return FrictionResult(np.minimum(raw, MAX_FRICTION), raw > MAX_FRICTION, _range_notes(inputs))
+    return FrictionResult(np.minimum(raw, MAX_FRICTION), _range_notes(inputs))
 
 
 def line_contact_pressure_gpa(
@@ -139,8 +136,7 @@ def line_contact_pressure_gpa(
     positive(reduced_modulus_pa, "reduced_modulus_pa", "Pa")
     radius = _checked(radius_m, "radius_m", above_zero=True)
     force = np.maximum(_checked(normal_force_n, "normal_force_n", signed=True), 0.0)
-    pressure: FloatArray = 1e-9 * np.sqrt(force * reduced_modulus_pa / (np.pi * face_width_m * radius))
-    return pressure
+    return 1e-9 * np.sqrt(force * reduced_modulus_pa / (np.pi * face_width_m * radius))
 
 
 def reduced_modulus_pa(material_1: Material, material_2: Material) -> float:
@@ -310,8 +306,6 @@ def friction_over_mesh(
     viscosity_cp: float,
     roughness_um: float,
     mesh_cycles: FloatArray | None = None,
-    *,
-    table: MeshTable | None = None,
 ) -> MeshFriction:
     """Friction coefficient and force of each pair, with the load it carries in static equilibrium.
 
@@ -324,15 +318,13 @@ def friction_over_mesh(
         As for `friction_coefficient`.
     mesh_cycles : array or None
         c; None: 200 points of one cycle.
-    table : MeshTable or None
-        Of this mesh, if it is at hand.
 
     Notes
     -----
     Friction does not act back on the load sharing here. The pressure is that of smooth flanks of full width. A pair of
     helical teeth counts as in contact where the middle of its face is.
     """
-    shared = share_torque(mesh, torque_nm, mesh_cycles, table=table)
+    shared = share_torque(mesh, torque_nm, mesh_cycles)
     u_1, u_2, radius_m = _speeds_and_radius(mesh, shared.mesh_cycles, positive(speed_rpm, "speed_rpm", "rpm"))
     normal = shared.pair_forces_n
     sliding, entrainment = u_2 - u_1, 0.5 * (u_1 + u_2)

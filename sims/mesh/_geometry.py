@@ -31,8 +31,7 @@ def involute(pressure_angle_rad: FloatArray | float) -> FloatArray:
     Source: ISO 21771, *Gears – Cylindrical involute gears and gear pairs* (2007).
     """
     angle: FloatArray = np.asarray(pressure_angle_rad, dtype=np.float64)
-    result: FloatArray = np.tan(angle) - angle
-    return result
+    return np.tan(angle) - angle
 
 
 def inverse_involute(value_rad: float) -> float:
@@ -208,8 +207,7 @@ class GearGeometry:
                 f"radius_mm is {radius.min():g} mm", allowed=f"at least the base radius, {self.base_radius_mm:g} mm"
             )
         alpha = np.arccos(self.base_radius_mm / radius)
-        thickness: FloatArray = 2.0 * radius * (self.base_half_angle_rad - involute(alpha))
-        return thickness
+        return 2.0 * radius * (self.base_half_angle_rad - involute(alpha))
 
     def _check_tool(self) -> None:
         alpha = self.pressure_angle_rad
@@ -506,8 +504,7 @@ class PairGeometry:
         omega_1 = driver_speed_rpm * pi / 30.0
         omega_2 = omega_1 * self.driver.teeth / self.driven.teeth
         rho_1, rho_2 = self.contact_radii_mm(mesh_cycles, pair)
-        speed: FloatArray = (omega_2 * rho_2 - omega_1 * rho_1) * 1e-3
-        return speed
+        return (omega_2 * rho_2 - omega_1 * rho_1) * 1e-3
 
     @cached_property
     def _tight_angle_rad(self) -> float:
@@ -580,8 +577,7 @@ def arc_length_mm(gear: GearGeometry, roll_length_mm: FloatArray | float) -> Flo
         ρ, distance from the base tangent point; below 0 counts as 0.
     """
     rho = np.maximum(np.asarray(roll_length_mm, dtype=np.float64), 0.0)
-    result: FloatArray = rho**2 / (2.0 * gear.base_radius_mm)
-    return result
+    return rho**2 / (2.0 * gear.base_radius_mm)
 
 
 def flank_length_mm(gear: GearGeometry) -> float:
@@ -604,8 +600,7 @@ def pitch_point_mm(pair: PairGeometry, side: int) -> float:
 def curvature_radius_mm(pair: PairGeometry, roll_length_mm: FloatArray | float) -> FloatArray:
     """Radius of relative curvature, R = ρ1 ρ2/(ρ1 + ρ2); the same whichever gear ρ belongs to, and not below 0."""
     rho = np.clip(np.asarray(roll_length_mm, dtype=np.float64), 0.0, pair.action_length_mm)
-    result: FloatArray = rho * (pair.action_length_mm - rho) / pair.action_length_mm
-    return result
+    return rho * (pair.action_length_mm - rho) / pair.action_length_mm
 
 
 def contact_half_width_mm(pair: PairGeometry, material_1: Material, material_2: Material) -> float:
@@ -629,15 +624,13 @@ def part_inside(place_mm: FloatArray, low_mm: float, high_mm: float, half_width_
     """
     width = 2.0 * half_width_mm
     begun = smooth_step((place_mm - low_mm) / width + 0.5)
-    result: FloatArray = begun - smooth_step((place_mm - high_mm) / width + 0.5)
-    return result
+    return begun - smooth_step((place_mm - high_mm) / width + 0.5)
 
 
 def smooth_step(t: FloatArray) -> FloatArray:
     """Return 6t⁵ − 15t⁴ + 10t³, from 0 at t ≤ 0 to 1 at t ≥ 1 with two continuous derivatives."""
     u = np.clip(t, 0.0, 1.0)
-    result: FloatArray = u**3 * (u * (6.0 * u - 15.0) + 10.0)
-    return result
+    return u**3 * (u * (6.0 * u - 15.0) + 10.0)
 
 
 def corner_separation_m(
@@ -672,8 +665,7 @@ def corner_separation_m(
     start, at = length - mate_end, pair.contact_radii_mm(progress)[0]
     entry = _corner_mm(rb1, rb2, length, start, np.maximum(start - at, 0.0))
     leave = _corner_mm(rb2, rb1, length, length - end, np.maximum(at - end, 0.0))
-    result: FloatArray = 1e-3 * (entry + leave)
-    return result
+    return 1e-3 * (entry + leave)
 
 
 def _corner_mm(rb_flank: float, rb_tip: float, length: float, start: float, before: FloatArray) -> FloatArray:
@@ -690,5 +682,4 @@ def _corner_mm(rb_flank: float, rb_tip: float, length: float, start: float, befo
     tangent = np.sqrt(np.maximum((radius / rb_flank) ** 2 - 1.0, 0.0))
     base_angle = np.arctan2(up, across) + tangent - np.arctan(tangent)
     roll = (start - before) / rb_flank
-    result: FloatArray = np.where(before > 0.0, rb_flank * (base_angle - roll), 0.0)
-    return result
+    return np.where(before > 0.0, rb_flank * (base_angle - roll), 0.0)

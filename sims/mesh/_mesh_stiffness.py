@@ -71,8 +71,7 @@ def roughness_heights_m(
 def _ordinary(mesh: GearMesh, number: int, progress: FloatArray) -> FloatArray:
     side, rho = mesh.side(number), mesh.pair.contact_radii_mm(progress)[number - 1]
     worn = side.flank.wear_um * 1e-6 * wear_profile(mesh.pair, number, rho)
-    result: FloatArray = flank_separation_m(side.gear, side.flank, rho) + worn
-    return result
+    return flank_separation_m(side.gear, side.flank, rho) + worn
 
 
 class ToothRows(NamedTuple):
@@ -269,11 +268,7 @@ def one_mesh_cycle(n_points: int = 200) -> FloatArray:
 
 
 def mesh_stiffness(
-    mesh: GearMesh,
-    mesh_cycles: FloatArray | None = None,
-    force_n: float | None = None,
-    *,
-    table: MeshTable | None = None,
+    mesh: GearMesh, mesh_cycles: FloatArray | None = None, force_n: float | None = None
 ) -> MeshStiffness:
     """Stiffness of the mesh along the line of action.
 
@@ -288,8 +283,6 @@ def mesh_stiffness(
         Mesh force, above 0. None: every pair on the path of contact touches (separations do not count, so that a chip
         or a spall over the whole face does not show), for the linear contact law only. Given: the tangent stiffness of
         the pairs that carry at that force.
-    table : MeshTable or None
-        Of this mesh, if it is at hand: making one takes longer than reading it.
 
     Returns
     -------
@@ -301,7 +294,7 @@ def mesh_stiffness(
         Without a force if the contact stiffens with the load.
     """
     cycles = one_mesh_cycle() if mesh_cycles is None else frozen_array(mesh_cycles, "mesh_cycles", ndim=1)
-    table = mesh_table(mesh) if table is None else table
+    table = mesh_table(mesh)
     compliance, separation, weight = pair_states(table, cycles)
     if force_n is None:
         if table.load_dependent:
@@ -410,15 +403,12 @@ def _tangents(table: MeshTable, compliance: FloatArray, weight: FloatArray, forc
 # Compiled: what each pair carries. Imported only where it is used, since it loads the compiler.
 
 
-@njit(cache=True)
-def engagement(progress: float, contact_ratio: float, ramp: float) -> float:
-    """Part of its stiffness a pair has: 0 outside, 1 inside, with a quintic step of width `ramp` at either end."""
-    return float(engagement_and_slope(progress, 0.0, contact_ratio, ramp)[0])
-
-
 @njit(cache=True, nogil=True, error_model="numpy")
 def engagement_and_slope(progress: float, late: float, contact_ratio: float, ramp: float) -> tuple[float, float]:
-    """(w, ∂w/∂ζ) of `engagement`, for a pair that enters `late` base pitches late."""
+    """(w, ∂w/∂ζ): part of its stiffness that a pair has, and its slope; it enters `late` base pitches late.
+
+    0 outside, 1 inside, with a quintic step of width `ramp` at either end.
+    """
     if ramp <= 0.0:
         return (1.0 if late <= progress <= contact_ratio else 0.0), 0.0
     rise, rise_slope = _smooth((progress - late) / ramp + 0.5)
@@ -502,40 +492,6 @@ def pair_force(
 
 
 @njit(cache=True)
-def share_load(
-    force: float,
-    compliance: FloatArray,
-    separation: FloatArray,
-    weight: FloatArray,
-    contact: float,
-    load_dependent: bool,
-    pair_forces: FloatArray,
-) -> tuple[float, float]:
-    """Approach δ at which the pairs' forces N_i(δ − E_i) sum to `force`; return δ and dF/dδ, fill `pair_forces`.
-
-    The sum is convex in δ, and a pair that carried everything alone gives a δ that is too large: Newton comes down.
-    """
-    delta = 1e300
-    for i in range(compliance.size):
-        if weight[i] > 0.0:
-            n = force / weight[i]
-            approach = compliance[i] * n + (contact * n**0.9 if load_dependent else contact * n)
-            delta = min(delta, separation[i] + approach)
-    slope = 0.0
-    for _ in range(60):
-        total, slope = -force, 0.0
-        for i in range(compliance.size):
-            n, k = pair_force(delta - separation[i], compliance[i], contact, load_dependent, weight[i])
-            pair_forces[i] = n
-            total += n
-            slope += k
-        if abs(total) <= 1e-13 * force or slope <= 0.0:
-            break
-        delta -= total / slope
-    return delta, slope
-
-
-@njit(cache=True)
 def share_loads(
     force: float,
     compliance: FloatArray,
@@ -543,15 +499,34 @@ def share_loads(
     weight: FloatArray,
     contact: float,
     load_dependent: bool,
-    delta: FloatArray,
-    slope: FloatArray,
+    approach: FloatArray,
+    stiffness: FloatArray,
     pair_forces: FloatArray,
 ) -> None:
-    """`share_load` at each row; fills the last three."""
-    for row in range(delta.size):
-        delta[row], slope[row] = share_load(
-            force, compliance[row], separation[row], weight[row], contact, load_dependent, pair_forces[row]
-        )
+    """Approach δ at which the pairs' forces N_i(δ − E_i) sum to `force`, and dF/dδ, row by row; fills the last three.
+
+    The sum is convex in δ, and a pair that carried everything alone gives a δ that is too large: Newton comes down.
+    """
+    for row in range(approach.size):
+        delta = 1e300
+        for i in range(weight.shape[1]):
+            if weight[row, i] > 0.0:
+                n = force / weight[row, i]
+                alone = compliance[row, i] * n + (contact * n**0.9 if load_dependent else contact * n)
+                delta = min(delta, separation[row, i] + alone)
+        slope = 0.0
+        for _ in range(60):
+            total, slope = -force, 0.0
+            for i in range(weight.shape[1]):
+                depth = delta - separation[row, i]
+                n, k = pair_force(depth, compliance[row, i], contact, load_dependent, weight[row, i])
+                pair_forces[row, i] = n
+                total += n
+                slope += k
+            if abs(total) <= 1e-13 * force or slope <= 0.0:
+                break
+            delta -= total / slope
+        approach[row], stiffness[row] = delta, slope
 
 
 @njit(cache=True)
@@ -581,7 +556,7 @@ def fill_pairs(
             k, s = newest - j // n_slices, j % n_slices
             progress = mesh_cycles[row] - k - late[s]
             tooth_1, tooth_2 = k % teeth[0], k % teeth[1]
-            weight[row, j] = engagement(progress, contact_ratio, ramp)
+            weight[row, j] = engagement_and_slope(progress, 0.0, contact_ratio, ramp)[0]
             if weight[row, j] == 0.0 and n_slices > 1:  # far beyond the table, too
                 compliance[row, j], separation[row, j] = n_slices * curves[of[0, tooth_1], 1], 0.0
                 continue

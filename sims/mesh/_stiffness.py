@@ -180,8 +180,7 @@ def _rim_of_harmonic(n: int, radius_ratio: float, poisson_ratio: float) -> Float
         [(ub, vb, k * du + lam * (u + n * v), mu * (dv - v - n * u)) for (ub, vb), (u, v), (du, dv) in solutions]
     ).T
     parts = np.linalg.solve(equations, [[0.0, 0.0], [0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-    result: FloatArray = np.array([rim for _, rim, _ in solutions]).T @ parts
-    return result
+    return np.array([rim for _, rim, _ in solutions]).T @ parts
 
 
 # --------------------
@@ -335,17 +334,10 @@ def cracked_tooth_compliance(
     """
     check_crack(gear, crack)
     width = face_width_m if crack.width_mm is None else min(crack.width_mm * 1e-3, face_width_m)
-    part, weight = np.array([0.0]), np.array([1.0])
-    if crack.front == "parabolic":
-        part, weight = _gauss(12)
-    stiffness = np.zeros(np.shape(np.atleast_1d(roll_rad)))
+    stiffness = width / tooth_compliance(gear, material, roll_rad, (crack.depth_mm, crack.angle_deg)).total
     if width < face_width_m:
         stiffness += (face_width_m - width) / tooth_compliance(gear, material, roll_rad).total
-    for p, w in zip(part, weight, strict=True):
-        depth = crack.depth_mm * float(np.sqrt(1.0 - p))
-        stiffness += width * w / tooth_compliance(gear, material, roll_rad, (depth, crack.angle_deg)).total
-    result: FloatArray = 1.0 / stiffness
-    return result
+    return 1.0 / stiffness
 
 
 def _sections(gear: GearGeometry, tau: FloatArray, crack: tuple[float, float] | None, law: str) -> _Sections:
@@ -509,10 +501,8 @@ class MeshSide(NamedTuple):
 
     def faults_of(self, tooth: int) -> ToothFaults:
         """What is wrong with one tooth."""
-        crack = next((fault for fault in self.cracks if fault.tooth == tooth), None)
-        spall = next((fault for fault in self.spalls if fault.tooth == tooth), None)
-        chip = next((fault for fault in self.chips if fault.tooth == tooth), None)
-        return ToothFaults(crack, spall, chip)
+        kinds = (self.cracks, self.spalls, self.chips)
+        return ToothFaults(*(next((f for f in kind if f.tooth == tooth), None) for kind in kinds))  # type: ignore[arg-type]
 
     @property
     def faulty_teeth(self) -> tuple[int, ...]:
@@ -647,11 +637,8 @@ class GearMesh:
 
     def side(self, number: int) -> MeshSide:
         """Return gear 1, the driver, or gear 2, the driven one, with what is its own."""
-        if number == 1:
-            driver_side = (self.pair.driver, self.material_1, self.flank_1, self.roughness_1)
-            return MeshSide(*driver_side, self.cracks_1, self.spalls_1, self.chips_1)
-        two = (self.pair.driven, self.material_2, self.flank_2, self.roughness_2)
-        return MeshSide(*two, self.cracks_2, self.spalls_2, self.chips_2)
+        gear = (self.pair.driver, self.pair.driven)[number - 1]
+        return MeshSide(gear, *(getattr(self, f"{name}_{number}") for name in MeshSide._fields[1:]))
 
     def roll_length_mm(self, side: int, progress: FloatArray) -> FloatArray:
         """ρ of gear 1 or 2 at ζ, not below 0: a ramp may begin below the base circle, where there is no flank."""

@@ -98,7 +98,12 @@ def presets(model: str) -> dict[str, Preset]:
 def preset(model: str, name: str) -> Preset:
     """Return the preset `name` of a model; an empty name is its first, one that ends in .toml is a file."""
     if is_file(name):
-        return _of_model(read_preset(Path(name)), model)
+        candidate = read_preset(Path(name))
+        if candidate.model != model:
+            raise InputError(
+                f"is a preset of the model {candidate.model!r}", where=f"{candidate.name}.toml", allowed=f"{model!r}"
+            )
+        return candidate
     of_model = presets(model)
     if not name and of_model:
         return next(iter(of_model.values()))
@@ -140,14 +145,6 @@ def read_preset(path: Path) -> Preset:
         effects=_effects(data.get("effects", []), f"{where}: [[effects]]"),
         installed=MappingProxyType(_table(data.get("installed", {}), f"{where}: [installed]")),
     )
-
-
-def _of_model(candidate: Preset, model: str) -> Preset:
-    if candidate.model != model:
-        raise InputError(
-            f"is a preset of the model {candidate.model!r}", where=f"{candidate.name}.toml", allowed=f"{model!r}"
-        )
-    return candidate
 
 
 def _effects(rows: object, where: str) -> tuple[EffectSetting, ...]:

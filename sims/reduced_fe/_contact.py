@@ -60,8 +60,7 @@ def over_height(roll: FloatArray, values: FloatArray, heights: FloatArray) -> Fl
         slices = [over_height(roll, values[:, s], heights[:, s]) for s in range(heights.shape[1])]
         return np.stack(slices, axis=1)
     spline = CubicSpline(roll, values, axis=0)
-    result: FloatArray = spline(np.clip(heights, roll[0], roll[-1]))
-    return result
+    return spline(np.clip(heights, roll[0], roll[-1]))
 
 
 # What faulty teeth add to the compliance between the slices of a tooth pair.
@@ -156,8 +155,7 @@ class ContactTable:
     @property
     def progress(self) -> FloatArray:
         """ζ of the columns."""
-        result: FloatArray = self.start + self.step * np.arange(-1, len(self.direct) - 1)
-        return result
+        return self.start + self.step * np.arange(-1, len(self.direct) - 1)
 
     def column(self, progress: float) -> int:
         """Column nearest to ζ."""
@@ -270,7 +268,8 @@ def _compliances(
             )
             direct += block_direct
         else:
-            direct += _along_diagonal(gear.grid.roll_rad, block, roll[:, 0])
+            heights = np.arange(len(gear.grid.roll_rad))
+            direct += over_height(gear.grid.roll_rad, block[heights, :, heights, :], roll[:, 0])
         for o in range(min(n_offsets, gear.n_offsets - 1)):
             older = rolls_rad(mesh.pair, slices_progress + o + 1.0)[side]
             block = _between(gear, [0, -sign * (o + 1)], compliance)
@@ -282,14 +281,7 @@ def _between(gear: ReducedGear, teeth: list[int], compliance: ToothCompliance) -
     """Compliance between the driving flanks of the first and the last of the teeth, (heights, slices) twice."""
     n, shape = gear.grid.n_points, gear.grid.shape
     block = compliance(gear, teeth)[:n, -n:]
-    result: FloatArray = block.reshape(*shape, *shape)[FLANK, :, :, FLANK]
-    return result
-
-
-def _along_diagonal(roll: FloatArray, block: FloatArray, at: FloatArray) -> FloatArray:
-    """Compliance between slices at one height, (n, n_slices, n_slices)."""
-    heights = np.arange(len(roll))
-    return over_height(roll, block[heights, :, heights, :], at)
+    return block.reshape(*shape, *shape)[FLANK, :, :, FLANK]
 
 
 def _compliance_between(roll: FloatArray, block: FloatArray, first: FloatArray, second: FloatArray) -> FloatArray:
@@ -480,11 +472,17 @@ def hertz_energy(force, hertz, small):
 
 
 @njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
+def place_of(pair, n):
+    """Remainder of a pair's number by n, as of the teeth of a gear; of floats, a fraction of the time of integers'."""
+    return int(pair - n * np.floor(pair / n))
+
+
+@njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
 def near_pairs(cycles, start, step, corner, separation, rows, pitch, teeth, reach, pairs, columns, parts, apart, slope):
     """Find the pairs whose flanks are less than `reach` apart; return their number.
 
     corner, separation, rows, pitch : see `ContactTable.arrays`.
-    teeth : (z1, z2), as floats: their remainder takes a fraction of that of whole numbers.
+    teeth : (z1, z2), as floats.
     pairs : (n_slots,) filled with the pairs' numbers k, the newest first.
     start, step : see `ContactTable`.
     columns, parts : column i of the table and part t of a step beyond it.
@@ -501,10 +499,7 @@ def near_pairs(cycles, start, step, corner, separation, rows, pitch, teeth, reac
         if i > last:
             break
         t = place - int(place)
-        tooth_1, tooth_2 = (
-            int(pair - teeth[0] * np.floor(pair / teeth[0])),
-            int(pair - teeth[1] * np.floor(pair / teeth[1])),
-        )
+        tooth_1, tooth_2 = place_of(pair, teeth[0]), place_of(pair, teeth[1])
         a, b = rows[2, tooth_1], rows[3, tooth_2]
         nearest = reach
         for s in range(corner.shape[1]):
@@ -530,10 +525,7 @@ def fill_compliance(n, pairs, columns, parts, teeth, direct, cross, extra, rows,
     for p in range(n):
         i, t = columns[p], parts[p]
         pair = pairs[p]
-        tooth_1, tooth_2 = (
-            int(pair - teeth[0] * np.floor(pair / teeth[0])),
-            int(pair - teeth[1] * np.floor(pair / teeth[1])),
-        )
+        tooth_1, tooth_2 = place_of(pair, teeth[0]), place_of(pair, teeth[1])
         a, b = rows[0, tooth_1], rows[1, tooth_2]
         at = p * n_s
         for s in range(n_s):
@@ -562,10 +554,7 @@ def compliance_slope_energy(n, pairs, columns, teeth, direct, cross, extra, rows
     n_s, total = direct.shape[1], 0.0
     for p in range(n):
         i, pair, at = columns[p], pairs[p], p * direct.shape[1]
-        tooth_1, tooth_2 = (
-            int(pair - teeth[0] * np.floor(pair / teeth[0])),
-            int(pair - teeth[1] * np.floor(pair / teeth[1])),
-        )
+        tooth_1, tooth_2 = place_of(pair, teeth[0]), place_of(pair, teeth[1])
         a, b = rows[0, tooth_1], rows[1, tooth_2]
         for s in range(n_s):
             line = 0.0

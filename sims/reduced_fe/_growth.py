@@ -47,8 +47,7 @@ def energy_release_m(depth_m: FloatArray, compliance_m_per_n: FloatArray, at_m: 
     beyond = slope[-1] + (slope[-1] - slope[-2]) * (depth[-1] - middle[-1]) / (middle[-1] - middle[-2])
     places = np.concatenate(([0.0], middle, depth[-1:]))
     values = np.concatenate((0.0 * slope[:1], slope, beyond[None]))
-    release: FloatArray = PchipInterpolator(places, values, axis=0)(at_m)
-    return release
+    return PchipInterpolator(places, values, axis=0)(at_m)
 
 
 @dataclass(frozen=True)
@@ -85,8 +84,7 @@ class GrowthStage:
     def rate_mm(self, delta_k: FloatArray, c: FloatArray | float = 0.0, m: FloatArray | float = 0.0) -> FloatArray:
         """da/dN at ΔK in MPa √m; `c` and `m` are standard normal variates of the specimen."""
         middle = self.coefficient * 10.0 ** (self.scatter * np.asarray(c)) * delta_k**self.exponent
-        result: FloatArray = middle * (delta_k / self.pivot) ** (self.exponent_scatter * np.asarray(m))
-        return result
+        return middle * (delta_k / self.pivot) ** (self.exponent_scatter * np.asarray(m))
 
 
 @dataclass(frozen=True)
@@ -116,8 +114,7 @@ class GrowthLaw:
     def rate_mm(self, delta_k: FloatArray, c: FloatArray | float = 0.0, m: FloatArray | float = 0.0) -> FloatArray:
         """da/dN in mm; 0 below the threshold."""
         slowest = np.min([stage.rate_mm(delta_k, c, m) for stage in self.stages], axis=0)
-        result: FloatArray = np.where(delta_k > self.threshold, slowest, 0.0)
-        return result
+        return np.where(delta_k > self.threshold, slowest, 0.0)
 
 
 _PER_MPA_SQRT_M = 1e3**0.5

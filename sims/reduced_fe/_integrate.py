@@ -26,9 +26,9 @@ import numpy as np
 
 from gearsig.checks import FloatArray, one_of, positive
 from gearsig.compiled import UNCOUNTED, njit
-from sims.gear_pair import foot
+from sims.gear_pair import foot, friction_of_pair
 from sims.machine import profile_value, set_speed, torque_ripple
-from sims.mesh import contact_friction_n, out_of_place
+from sims.mesh import out_of_place
 from sims.reduced_fe._contact import (
     FAST,
     back_substituted,
@@ -36,6 +36,7 @@ from sims.reduced_fe._contact import (
     fill_compliance,
     hertz_energy,
     near_pairs,
+    place_of,
     solve_contacts,
 )
 
@@ -141,28 +142,6 @@ def outer_forces(k, inputs, q, v, angle, omega, rate, load, out):
 
 
 @njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
-def friction_of_pair(k, force, progress, omega, slip_x):
-    """(f, fρ1, fρ2) of a pair at ζ; the film knows the set speed `omega`, its sign feels the vibration `slip_x`."""
-    rho_1 = k.start_radius + min(max(progress, 0.0), k.contact_ratio) * k.base_pitch
-    rho_2 = k.action_length - rho_1
-    rubbing = contact_friction_n(
-        force,
-        omega * rho_1,
-        omega / k.ratio * rho_2,
-        slip_x,
-        rho_1 * rho_2 / k.action_length,
-        k.width,
-        k.reduced_modulus,
-        k.log10_oil,
-        k.oil_constant,
-        k.sign_threshold,
-        k.friction_factor,
-        k.dry_friction,
-    )
-    return rubbing, rubbing * rho_1, rubbing * rho_2
-
-
-@njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
 def _push(k, side, inputs, angle, omega, drive, out):
     """Add unbalance, weight and a bent coupling, at the set speed."""
     theta = angle if side == 0 else angle / k.ratio
@@ -247,7 +226,7 @@ def room(shape: tuple[int, ...], n_modes: int, n_rows: int) -> tuple[Any, ...]:
     places = np.empty(n_slots), np.empty(n_slots), np.empty(shape), np.empty(shape)
     integers = np.empty(n_slots, dtype=np.int64), np.empty(n_max, dtype=np.int64)
     squares = np.empty((n_max, n_max)), np.empty((n_max, n_max))
-    points = (*(np.empty(n_max) for _ in range(4)), np.empty(n_max), np.zeros(n_max), np.empty(n_max), np.empty(n_max))
+    points = tuple(np.zeros(n_max) for _ in range(8))  # forces of a pair that a later pass finds near start from these
     seen = tuple(np.empty(n_rows) for _ in range(3))
     modes = tuple(np.empty((2, n_modes)) for _ in range(6))
     return places, integers, squares, points, seen, modes, np.zeros(N_EXTRAS + n_slots + n_max)
@@ -336,11 +315,10 @@ def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, and the scra
             for i in range(n * n_s):
                 total += force[i]
                 along_cycles += elastic[i] * along[i]
-            if k.moving_force:
-                along_cycles -= compliance_slope_energy(
-                    n, pairs, columns, k.teeth, direct, cross, extra, table_rows, k.column_step, elastic
-                )
-                along_torque = -k.cycles_per_rad * along_cycles
+            along_cycles -= compliance_slope_energy(
+                n, pairs, columns, k.teeth, direct, cross, extra, table_rows, k.column_step, elastic
+            )
+            along_torque = -k.cycles_per_rad * along_cycles
             off_1, across_1 = k.runout[0] * sin(phi_1), k.runout[0] * cos(phi_1)
             off_2, across_2 = k.runout[1] * sin(phi_2), k.runout[1] * cos(phi_2)
             torque_1 = along_torque - total * across_1
@@ -439,7 +417,7 @@ def _taken_up(k, n, pairs, held, held_root, held_pair, force, root):
     """Forces of the pairs at the step before, where the solution starts; none of pairs that are new."""
     n_slots, n_s = held.shape
     for p in range(n):
-        ring = int(pairs[p] - n_slots * np.floor(pairs[p] / n_slots))
+        ring = place_of(pairs[p], n_slots)
         if held_pair[ring] != pairs[p]:
             held_pair[ring] = pairs[p]
             for s in range(n_s):
@@ -459,8 +437,7 @@ def _approaches(
             i = p * n_s + s
             approach[i], viscous[i], along[i] = off - apart[p, s], 0.0, -slope[p, s]
         for side in range(2):
-            z = k.teeth[side]
-            tooth = int(pairs[p] - z * np.floor(pairs[p] / z))
+            tooth = place_of(pairs[p], k.teeth[side])
             to_tooth(q1, side, turn, tooth, k.n_single, k.n_pairs, seen)
             to_tooth(v1, side, turn, tooth, k.n_single, k.n_pairs, moving)
             for s in range(n_s):
@@ -497,8 +474,9 @@ def _rubbing(k, n, n_s, pairs, cycles, force, omega, slip_x):
         for s in range(n_s):
             carried += force[p * n_s + s]
         if carried > 0.0:
-            pair_force, pair_moment_1, pair_moment_2 = friction_of_pair(k, carried, cycles - pairs[p], omega, slip_x)
-            rubbing, moment_1, moment_2 = rubbing + pair_force, moment_1 + pair_moment_1, moment_2 + pair_moment_2
+            progress = min(max(cycles - pairs[p], 0.0), k.contact_ratio)
+            force_x, on_1, on_2 = friction_of_pair(k, carried, progress, omega, omega / k.ratio, slip_x, k.width)
+            rubbing, moment_1, moment_2 = rubbing + force_x, moment_1 + on_1, moment_2 + on_2
     return rubbing, moment_1, moment_2
 
 
@@ -506,9 +484,8 @@ def _rubbing(k, n, n_s, pairs, cycles, force, omega, slip_x):
 def _contact_on_modes(k, n, n_s, pairs, columns, parts, rows, turn, force, g, f1):
     """Add −N ∂D/∂η of every slice."""
     for side in range(2):
-        z = k.teeth[side]
         for p in range(n):
-            tooth = int(pairs[p] - z * np.floor(pairs[p] / z))
+            tooth = place_of(pairs[p], k.teeth[side])
             g[:] = 0.0
             for s in range(n_s):
                 if force[p * n_s + s] > 0.0:
@@ -529,7 +506,7 @@ def _keep(n, n_slots, pairs, force, root, held, held_root):
     """Keep the pairs' forces for the next step."""
     n_s = held.shape[1]
     for p in range(n):
-        ring = int(pairs[p] - n_slots * np.floor(pairs[p] / n_slots))
+        ring = place_of(pairs[p], n_slots)
         for s in range(n_s):
             held[ring, s], held_root[ring, s] = force[p * n_s + s], root[p * n_s + s]
 
@@ -632,13 +609,9 @@ def step_coefficients(
     h = positive(step_s, "step_s", "s")
     made = [
         _exponential(w, c, h) if method == "exponential" else _newmark(w, c, h)
-        for w, c in _pairs(omega_rad_s, damping_rate)
+        for w, c in zip(omega_rad_s.tolist(), damping_rate.tolist(), strict=True)
     ]
     return np.ascontiguousarray(np.array(made).reshape(-1, 8).T)
-
-
-def _pairs(omega: FloatArray, rate: FloatArray) -> list[tuple[float, float]]:
-    return [(float(w), float(c)) for w, c in zip(omega, rate, strict=True)]
 
 
 def _exponential(w: float, c: float, h: float) -> tuple[float, ...]:

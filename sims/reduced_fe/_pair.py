@@ -325,8 +325,7 @@ def kept_modes(gear: ReducedGear, limit_hz: float, groups: FloatArray) -> Retain
 def residual_compliance(gear: ReducedGear, teeth: list[int], kept: NDArray[np.int64]) -> FloatArray:
     """Free compliance less that of the modes at these places, C − Σ φφᵀ/ω²; never one of a pair without the other."""
     modes = np.hstack([gear.modes_at(t)[kept] for t in teeth]) / gear.angular_frequencies_rad_s[kept, None]
-    residual: FloatArray = gear.compliance_m_per_n(teeth) - modes.T @ modes
-    return residual
+    return gear.compliance_m_per_n(teeth) - modes.T @ modes
 
 
 def build_side(
@@ -510,7 +509,7 @@ _SCALARS = (
 RECORD = np.dtype(
     [(name, np.float64) for name in _SCALARS]
     + [(name, np.float64, (2,)) for name in ("teeth", "unbalance")]
-    + [(name, np.bool_) for name in ("pushes", "rolls", "moving_force")]
+    + [(name, np.bool_) for name in ("pushes", "rolls")]
     + [("n_single", np.int64), ("n_pairs", np.int64)]
     + MACHINE_FIELDS
     + FRICTION_FIELDS
@@ -606,7 +605,7 @@ class FlexiblePairConstants:
 
 @one_thread()
 def constants(
-    pair: FlexiblePair, operation: Operation, *, moving_force: bool = True, rng: np.random.Generator | None = None
+    pair: FlexiblePair, operation: Operation, *, rng: np.random.Generator | None = None
 ) -> FlexiblePairConstants:
     """Turn a flexible pair into plain numbers.
 
@@ -615,8 +614,6 @@ def constants(
     pair : FlexiblePair
     operation : Operation
         Its greatest torque sets the scale of forces and the damping of the contact.
-    moving_force : bool
-        Off: leave out the torque by which stiffness moving past under load acts on the driver, for comparison.
     rng : numpy.random.Generator or None
         Draws the places of rolling elements in bearings with a defect; None: always the same ones.
     """
@@ -647,7 +644,6 @@ def constants(
         or any(s.coupling_angle_deg != 0.0 for s in machine.shafts)
         or any(w.unbalance_g_mm > 0.0 for w in wheels),
         "rolls": any(b.defect is not None or b.clearance_um > 0.0 for b in machine.bearings),
-        "moving_force": moving_force,
         "nominal_torque": force * base[0],
         "n_single": sides[0].n_single,
         "n_pairs": sides[0].n_pairs,

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import pi
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -147,8 +148,7 @@ TRANSMISSION_ERROR = "transmission_error_m"
 KINDS = ("", " velocity", " acceleration")
 
 
-@dataclass(frozen=True)
-class FlexState:
+class FlexState(NamedTuple):
     """Where a flexible pair is: what a later run needs to go on from there; see `integrate_kernel.march`."""
 
     q: FloatArray
@@ -159,12 +159,6 @@ class FlexState:
     root: FloatArray
     pair: FloatArray
     rest: FloatArray
-
-    @property
-    def arrays(self) -> tuple[FloatArray, ...]:
-        """Copies, which the kernel overwrites."""
-        fields = (self.q, self.v, self.f, self.f_before, self.force, self.root, self.pair, self.rest)
-        return tuple(np.array(a) for a in fields)
 
 
 FlexResponse = PairResponse[FlexState]
@@ -185,8 +179,6 @@ def respond(
     with_energy: bool = False,
     first: FlexState | None = None,
     ready: FlexiblePairConstants | None = None,
-    on_progress: Callable[[float], None] | None = None,
-    steps_per_call: int = STEPS_PER_CALL,
 ) -> FlexResponse:
     """Integrate from the static balance on, or from where another run ended.
 
@@ -212,10 +204,6 @@ def respond(
         `FlexResponse.last` of another run; None: the static balance at `start_s`.
     ready : FlexiblePairConstants or None
         Of this pair and operation, where they are at hand.
-    on_progress : callable or None
-        Called now and then with the part that is done, 0 to 1.
-    steps_per_call : int
-        Of compiled code between two of these calls.
 
     Raises
     ------
@@ -225,14 +213,15 @@ def respond(
         If the solution grows beyond all bounds.
     """
     step = positive(step_s, "step_s", "s")
-    plan = RunPlan(start_s, duration_s, step, stride, steps_per_call)
+    plan = RunPlan(start_s, duration_s, step, stride, STEPS_PER_CALL)
     pair_constants = constants(pair, operation) if ready is None else ready
     lines = _lines(pair_constants, signals)
     coefficients = np.array(
         [step_coefficients(s.omega_rad_s, s.damping_rate, step, method) for s in pair_constants.sides]
     )
     check_step(pair, pair_constants, operation, coefficients, method)
-    state = (start_state(pair, pair_constants, operation, start_s) if first is None else first).arrays
+    begin = start_state(pair, pair_constants, operation, start_s) if first is None else first
+    state = tuple(np.array(a) for a in begin)  # copies, which the kernel overwrites
     fixed = (
         pair_constants.record,
         pair_constants.table.arrays,
@@ -258,7 +247,6 @@ def respond(
         signals,
         with_energy=with_energy,
         remedy="lower mesh_damping_ratio, look for inertias that do not go together, or give a shorter step",
-        on_progress=on_progress,
     )
     return FlexResponse(start_s, step * stride, kept, step, energies, FlexState(*state))
 
@@ -387,7 +375,7 @@ def _closed(pair: FlexiblePair, pair_constants: FlexiblePairConstants, state: Fl
     q = state.q.copy()
     per_unit = float(rigid.rows[column].mean(axis=0)[free])
     q[1, free] += (depth - approach(q)) / per_unit
-    return replace(state, q=q)
+    return state._replace(q=q)
 
 
 # Slow sweeps over speed, up and down: rms of the dynamic transmission error, contact loss, jumps.

@@ -14,11 +14,10 @@ from tests.kinematic.model import (
     TransferPath,
 )
 from tests.kinematic.simulate import simulate_kinematic
-from tests.kinematic.speed import CoastDown, ConstantProfile, LinearRamp, SpeedProfile, Wander
+from tests.kinematic.speed import ConstantProfile, LinearRamp, SpeedProfile, Wander
 
 __all__ = [
     "BearingFault",
-    "CoastDown",
     "ColouredNoise",
     "ConstantProfile",
     "KinematicModel",

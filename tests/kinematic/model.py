@@ -348,8 +348,8 @@ def shaft_vibration(part: ShaftOrder, shaft_rev: FloatArray, speed_rpm: FloatArr
 class ToothDamage:
     """One damaged tooth on one gear.
 
-    Severity is in plain numbers: the first amplitude of the ring-down, and how far the mesh vibration dips and lags
-    while the tooth is engaged. A crack mostly dips and lags (lower stiffness); a chip or a spall mostly knocks.
+    Severity is in plain numbers: the first amplitude of the ring-down, and how far the mesh vibration dips while the
+    tooth is engaged. A crack mostly dips (lower stiffness); a chip or a spall mostly knocks.
 
     Parameters
     ----------
@@ -366,8 +366,6 @@ class ToothDamage:
         Standard deviation of the knocks over their mean; negative draws are set to 0.
     mesh_dip_fraction : float
         Part of the mesh amplitude that is missing at the middle of the engagement, 0 to 1.
-    mesh_lag_rad : float
-        Delay of the first mesh harmonic there.
     width_teeth : float
         Full width of the dip in tooth pitches; raised cosine.
     """
@@ -380,7 +378,6 @@ class ToothDamage:
     damping_ratio: float = 0.05
     impulse_spread: float = 0.1
     mesh_dip_fraction: float = 0.0
-    mesh_lag_rad: float = 0.0
     width_teeth: float = 2.0
 
 

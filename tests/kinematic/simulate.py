@@ -211,7 +211,7 @@ class _KinematicRun:
                 window = engagement_window(
                     self.revolutions(damage.shaft), damage.angle_rev, min(damage.width_teeth / teeth, 1.0)
                 )
-                factor, phase = factor - damage.mesh_dip_fraction * window, phase - damage.mesh_lag_rad * window
+                factor = factor - damage.mesh_dip_fraction * window
         return harmonic_sum(mesh, self.mesh_order(mesh.pair) * self.reference_rev, factor, phase)
 
     def bearing(self, fault: BearingFault) -> FloatArray:

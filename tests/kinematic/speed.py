@@ -65,26 +65,6 @@ class LinearRamp:
 
 
 @dataclass(frozen=True)
-class CoastDown:
-    """θ(t) = n₀ τ (1 - exp(-t/τ)): the drive is switched off and viscous losses slow the shaft down."""
-
-    start_rpm: float
-    time_constant_s: float
-
-    def revolutions(self, time_s: FloatArray) -> FloatArray:
-        """Shaft angle in revolutions."""
-        t, n0, tau = np.asarray(time_s, dtype=np.float64), self.start_rpm / 60, self.time_constant_s
-        slowing: FloatArray = np.where(t < 0, n0 * t, -n0 * tau * np.expm1(-np.maximum(t, 0.0) / tau))
-        return slowing
-
-    def speed_rpm(self, time_s: FloatArray) -> FloatArray:
-        """Speed in rpm."""
-        t = np.maximum(np.asarray(time_s, dtype=np.float64), 0.0)
-        slowing: FloatArray = self.start_rpm * np.exp(-t / self.time_constant_s)
-        return slowing
-
-
-@dataclass(frozen=True)
 class Wander:
     """θ(t) = n̄ t + n̄ a (1 - cos 2πft)/(2πf): a speed that swings sinusoidally by ±a about its mean.
 

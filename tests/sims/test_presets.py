@@ -248,17 +248,6 @@ def test_effects_change_the_machine_and_stand_in_the_truth() -> None:
     assert entry["options"]["tooth"] == 4.0
 
 
-@pytest.mark.parametrize("name", CrackedPair().effects)
-def test_every_effect_has_a_meaning_here(name: str) -> None:
-    from sims.effects import effect
-
-    settings = [EffectSetting(name, effect(name).severity.typical)]
-    values = {"sensor_range_mps2": 1000.0}
-    ready = CrackedPair().prepare(SimulationSetup("workshop_29_47", values, settings), np.random.default_rng(0))
-    plain = CrackedPair().prepare(SimulationSetup("workshop_29_47", values), np.random.default_rng(0))
-    assert ready.machine != plain.machine
-
-
 @pytest.mark.parametrize("name", PRESETS)
 def test_a_healthy_machine_does_not_overdrive_its_sensors(name: str) -> None:
     recording = simulate("cracked", preset=name, duration_s=0.2)

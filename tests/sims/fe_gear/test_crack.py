@@ -193,5 +193,3 @@ def test_cracks_that_cannot_be_are_refused() -> None:
         open_crack(SMALL, RootCrack(12.0, 60.0), grid, size=SIZE)
     with pytest.raises(InputError, match="the mesh cannot follow a crack of"):
         open_crack(SMALL, RootCrack(3.0, 15.0), grid, size=SIZE)
-    with pytest.raises(InputError, match="parabolic"):
-        crack_added_m_per_n(small_reduced(), RootCrack(1.0, 60.0, width_mm=5.0, front="parabolic"))

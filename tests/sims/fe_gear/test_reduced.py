@@ -218,17 +218,19 @@ def test_files_that_do_not_fit_are_refused(tmp_path: Path, monkeypatch: pytest.M
         read_gear(path)
 
 
-def test_the_cache_keeps_a_gear_and_remakes_a_damaged_one(tmp_path: Path) -> None:
+def test_the_cache_keeps_a_gear_and_remakes_a_damaged_one(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setenv("GEARSIG_CACHE", str(tmp_path))
+    folder = tmp_path / "gears"
     plan = ReductionPlan(COARSE, n_modes=4, n_heights=2, n_slices=1, n_offsets=2)
-    first = cached_gear(SMALL, plan, tmp_path)
-    (kept,) = tmp_path.iterdir()
+    first = cached_gear(SMALL, plan)
+    (kept,) = folder.iterdir()
     marked = replace(first, mass_kg=9.0)
     write_gear(kept, marked)
-    assert cached_gear(SMALL, plan, tmp_path).mass_kg == 9.0
+    assert cached_gear(SMALL, plan).mass_kg == 9.0
     kept.write_bytes(b"torn")
-    assert cached_gear(SMALL, plan, tmp_path).mass_kg == pytest.approx(first.mass_kg)
-    assert cached_gear(SMALL, replace(plan, n_modes=6), tmp_path).key != first.key
-    assert len(list(tmp_path.iterdir())) == 2
+    assert cached_gear(SMALL, plan).mass_kg == pytest.approx(first.mass_kg)
+    assert cached_gear(SMALL, replace(plan, n_modes=6)).key != first.key
+    assert len(list(folder.iterdir())) == 2
 
 
 def test_a_gear_that_another_version_kept_is_named_and_can_be_cleared_away(tmp_path: Path, monkeypatch) -> None:

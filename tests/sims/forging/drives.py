@@ -11,8 +11,6 @@ from sims.forging import (
     DriveResponse,
     FirstState,
     ForgingDrive,
-    GrippedLoad,
-    HydraulicMotor,
     Schedule,
     build_drive,
     respond,
@@ -32,8 +30,8 @@ def free_bodies(contact: Mapping[str, object] | None = None, **values: Parameter
     """Two gears that nothing drives, holds or rubs; one tooth pair all the time in the angle they turn through."""
     made = drive(0.0, friction_coefficient=0.0, mesh_phase=0.2, **values)
     none = Bristle(0.0, 1.0, 1.0, 1.0)
-    lossless = replace(made, motor=HydraulicMotor(made.motor.inertia_kg_m2, none), load=GrippedLoad(none))
-    return replace(lossless, contact=replace(made.contact, **(contact or {})))  # type: ignore[arg-type]  # as named
+    contact = replace(made.contact, **(contact or {}))  # type: ignore[arg-type]  # as named
+    return replace(made, contact=contact, drag=none, load_friction=none)
 
 
 def impact(made: ForgingDrive, speed_mps: float, **options: object) -> DriveResponse:

@@ -499,8 +499,6 @@ def test_a_piece_off_centre_swings() -> None:
     [
         ({"off_s": 5.0}, "longer than the record"),
         ({"press_delay_s": 3.0}, "press blow"),
-        ({"on_s": -1.0}, "on_s"),
-        ({"mode": "sometimes"}, "mode"),
         ({"rise_s": 1.5}, "rise_s"),
         ({"brake_delay_s": 1.99}, "brake_delay_s"),
     ],

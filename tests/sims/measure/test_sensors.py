@@ -13,7 +13,6 @@ from sims.measure import (
     Encoder,
     ModalPath,
     PathMode,
-    PulseCounter,
     Tachometer,
     disc_edges,
     pulse_voltage,
@@ -73,15 +72,6 @@ def test_bias_and_drift():
     out = read(Accelerometer(bias_mps2=0.5, drift_mps2_per_s=-2.0), np.zeros(250_001))
     assert out[0] == 0.5
     assert out[-1] == pytest.approx(0.5 - 2.0 * 1.0, rel=1e-9)
-
-
-def test_wander_grows_with_the_root_of_time():
-    sensor = Accelerometer(wander_mps2_per_sqrt_s=0.1)
-    t = np.arange(-200, 1001) * 1e-3
-    ends = np.array([sensor.read(np.zeros(1201), t, np.random.default_rng(i))[[200, 450, 1200]] for i in range(800)])
-    np.testing.assert_array_equal(ends[:, 0], 0.0)
-    assert ends[:, 2].std() == pytest.approx(0.1, rel=0.08)
-    assert ends[:, 1].std() == pytest.approx(0.05, rel=0.08)
 
 
 @given(st.floats(-20.0, 20.0), st.integers(8, 24))
@@ -258,21 +248,6 @@ def test_voltage_crosses_half_way_at_the_edges():
     np.testing.assert_allclose(found, rising[: len(found)], atol=1e-9)
 
 
-def test_counter_rounds_down_to_its_clock():
-    rising = np.linspace(0.01, 0.99, 200)
-    stamps = PulseCounter(clock_hz=1e4).stamp(rising, np.random.default_rng(0))
-    assert ((rising - stamps) >= 0).all()
-    assert ((rising - stamps) < 1e-4 + 1e-12).all()
-    np.testing.assert_allclose(stamps * 1e4, np.round(stamps * 1e4), atol=1e-9)
-    np.testing.assert_array_equal(PulseCounter().stamp(rising, np.random.default_rng(0)), rising)
-
-
-def test_counter_jitter_has_its_deviation():
-    rising = np.linspace(0, 1000.0, 20001)
-    stamps = PulseCounter(jitter_s=1e-4).stamp(rising, np.random.default_rng(0))
-    assert (stamps - rising).std() == pytest.approx(1e-4, rel=0.03)
-
-
 @given(st.floats(-1e4, 1e4), st.integers(4, 100_000))
 def test_encoder_resolution(angle, counts):
     """The reading is the angle rounded down to a count; wrapping takes off whole revolutions."""
@@ -283,13 +258,6 @@ def test_encoder_resolution(angle, counts):
     wrapped = float(Encoder(counts_per_revolution=counts).read_deg(np.array([angle]))[0])
     assert 0.0 <= wrapped < 360.0
     assert (reading - wrapped) / 360.0 == pytest.approx(round((reading - wrapped) / 360.0), abs=1e-9)
-
-
-def test_encoder_runout_is_once_per_revolution():
-    angle = np.linspace(0, 4 * np.pi, 4000, endpoint=False)
-    encoder = Encoder(counts_per_revolution=10_000_000, wraps=False, runout_deg=0.5)
-    error = encoder.read_deg(angle) - np.degrees(angle)
-    np.testing.assert_allclose(error, 0.5 * np.sin(angle), atol=1e-4)
 
 
 def test_encoder_noise_has_its_deviation_and_is_only_drawn_where_it_may_be():

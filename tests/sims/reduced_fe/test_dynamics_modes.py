@@ -145,6 +145,18 @@ def test_damping_is_followed_up_to_where_it_is_refused():
     assert fast == pytest.approx(reference, rel=0.01)
 
 
+def test_what_others_left_in_memory_changes_nothing(monkeypatch):
+    """Forces of a pair that comes near in a later pass of the reference's step start from numbers of this run."""
+    pair = heavy_hubs(0.05)
+    clean = respond(pair, OPERATION, duration_s=1e-3, method="newmark")["mesh_force_n"]
+
+    def spoilt(shape, dtype=float, **_):
+        return np.full(shape, 1e300 if dtype is float else 0, dtype)
+
+    monkeypatch.setattr(np, "empty", spoilt)
+    assert np.array_equal(respond(pair, OPERATION, duration_s=1e-3, method="newmark")["mesh_force_n"], clean)
+
+
 @pytest.mark.parametrize(("method", "inertia"), [("exponential", 0.1), ("newmark", 1.0)])
 def test_damping_that_light_bodies_behind_heavy_hubs_cannot_follow_is_refused(method, inertia):
     with pytest.raises(InputError, match=r"hub_inertia_driver_kg_m2: the contact is stiffer or damped more than"):
