@@ -395,10 +395,10 @@ class Figure {
     this.words.replaceChildren();
     if (this.at === null) return;
     const near = 0.004 * (this.view[1] - this.view[0]), value = this.highest(this.at - near, this.at + near);
-    const say = [this.named(this.at)];
+    const [factor, unit] = this.data.per_unit ?? [0, ""];
+    const say = [this.named(this.at) + (factor ? ` (${measure(this.at * factor, unit)})` : "")];
     if (value) say.push(`${figure(value[1])} ${this.data.y_unit}`);
     if (this.tool === "sidebands") say.push(`sidebands every ${figure(this.step)} ${this.data.x_unit}`);
-    if (this.data.per_unit) say.push(measure(this.at * this.data.per_unit[0], this.data.per_unit[1]));
     this.words.textContent = `${TOOLS[this.tool]}: ${say.join(" · ")}`;
   }
 
