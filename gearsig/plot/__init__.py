@@ -97,7 +97,7 @@ from gearsig.plot._phase import (
     phase_portrait_figure,
     recurrence_figure,
 )
-from gearsig.plot._pictures import Captioned, Picture, embed, figure_svg, fleet_trend_picture, svg_panel, svg_ring
+from gearsig.plot._pictures import Captioned, Picture, embed, figure_svg, svg_panel, svg_ring, trend_panel
 from gearsig.plot._spectrum import (
     METHODS,
     displayed_values,
@@ -194,7 +194,6 @@ __all__ = [
     "figure_of_refusal",
     "figure_svg",
     "figure_table",
-    "fleet_trend_picture",
     "font_folder",
     "force_figure",
     "frequency_curves_figure",
@@ -267,6 +266,7 @@ __all__ = [
     "time_frequency_figure",
     "track_orders",
     "tracked_panel",
+    "trend_panel",
     "value_limits",
     "vmd",
     "with_unit",

@@ -78,6 +78,8 @@ class LinePanel:
         Whether `x` need not ascend.
     title : str
         What the panel shows, where that is not plain.
+    dates : bool
+        Whether x is days since 1970.
     """
 
     lines: Sequence[ChartLine]
@@ -90,6 +92,7 @@ class LinePanel:
     spans: Sequence[tuple[float, float, str]] = ()
     is_plane: bool = False
     title: str = ""
+    dates: bool = False
 
 
 @dataclass(frozen=True)

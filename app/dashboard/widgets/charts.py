@@ -198,7 +198,6 @@ def show_lines(
     whole: tuple[float, float] | None = None,
     per_unit: tuple[float, str] | None = None,
     step: float | None = None,
-    dates: bool = False,
     front_first: bool = False,
     log_x: bool = False,
 ) -> None:
@@ -222,8 +221,6 @@ def show_lines(
         What one unit of the x axis is in another unit, for the readout of cursors.
     step : float or None
         Distance of the sidebands that are offered first.
-    dates : bool
-        Whether x is days since 1970.
     front_first : bool
         Name the line in front first: where later lines lie behind earlier ones to be seen.
     log_x : bool
@@ -236,7 +233,7 @@ def show_lines(
     data = _described(panel, key, shown, ends, height_px, has_tools=not is_plane) | {
         "lines": [_sent(line, None if is_plane else shown, alone=len(lines) == 1) for line in lines],
         "cursors": _cursor_rows(panel.cursors, palette(), lines[-1] if lines and not is_plane else None, shown),
-        "dates": dates,
+        "dates": panel.dates,
         "marked": [[float(x), float(y)] for x, y in marked],
         "legend": legend,
         "front_first": front_first,
