@@ -392,9 +392,10 @@ def show_indicators(analysis: Analysis) -> None:
         kept = kept[kept[name].isin(chosen)] if chosen else kept
     # at 800 pixels up to the gear; what the others repeat, or says nothing, takes no room
     widths = {"indicator": 168, "value": 80, "unit": 56, "channel": 66, "of": 140, "band": 130}
-    column = st.column_config.Column
-    config: dict[str, Any] = {name: column(width=px, pinned=name == "indicator") for name, px in widths.items()}
-    config |= {name: None for name in table if (table[name] == "").all()}
+    config: dict[str, Any] = {
+        name: st.column_config.Column(width=px, pinned=name == "indicator") for name, px in widths.items()
+    }
+    config |= {str(name): None for name in table if (table[name] == "").all()}
     formats = {"change (dB)": "+.1f"} if "change (dB)" in kept else {}
     shown = kept.assign(band=kept["band"].where(kept["band"] != kept["of"], ""))
     show_table(shown, formats=formats, width="stretch", height=520, column_config=config, placeholder="–")

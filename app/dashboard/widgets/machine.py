@@ -412,7 +412,7 @@ def _edit_speed(
     _ask_stated(row[0], file, "Sampling rate (Hz)", "rate", about)
     is_stated = stated(file, "speed") is not None
     first = "constant" if is_stated or source not in known else source
-    looks = {"key": key("speed"), "on_change": _forget_speed, "args": (file,)}
+    looks: dict[str, Any] = {"key": key("speed"), "on_change": _forget_speed, "args": (file,)}
     chosen = row[1].selectbox("Speed from", known, known.index(first), **looks)
     if chosen == "constant" and (is_stated or source != chosen):
         about = "Of the reference shaft, if it held still; refined by the signal. It overrides what the file says."
