@@ -632,6 +632,6 @@ def analysed(file: ChosenFile, chosen: Chosen) -> Analysis | None:
         return analysis_of(chosen.request, chosen.content, chosen.reference)
     except GearsigError as error:
         show_error(error)
-        if machine_text(file) or "Machine" in in_page_words(str(error)):  # else no form mends it
+        if machine_text(file) or in_page_words(str(error)) != str(error):  # which speaks of the form
             show_machine(file, is_told=True)
         return None
