@@ -657,14 +657,6 @@ function wrapped(words, n, mostLines) {
 
 const cut = (words, n) => (words.length <= n ? words : `${words.slice(0, Math.max(Math.floor(n) - 1, 1))}…`);
 
-function bytes(packed) {
-  return Uint8Array.from(atob(packed ?? ""), (letter) => letter.charCodeAt(0));
-}
-
-function numbers(packed) {
-  return new Float64Array(bytes(packed).buffer);
-}
-
 function lowerBound(x, value) {
   let low = 0, high = x.length;
   while (low < high) {
