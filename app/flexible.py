@@ -238,7 +238,8 @@ def figures(study: Study, title: str) -> dict[str, Figure]:
             for spread, values in check.frequency_hz.items()
         }
         words = f"Contact spread over nodes at {study.torque_nm:g} N·m, {title}; ripple is that of a tooth's compliance"
-        drawn["contact_spreading"] = plot.contact_spreading_figure(check.mesh_cycles, curves, title=words)
+        panel = plot.curve_panel(check.mesh_cycles, curves, "mesh cycles (tooth passages)", "torsional mode (Hz)")
+        drawn["contact_spreading"] = plot.panels_figure([panel], title=words)
     words = f"Run-up at {study.torque_nm:g} N·m, {title}: acceleration (m/s²) at sensor {study.run_up.source}"
     drawn["run_up"] = plot.order_map_figure(replace(study.run_up, source=words), height_in=4.6)
     if study.sweeps:

@@ -14,7 +14,7 @@ import numpy as np
 from gearsig.checks import FloatArray, count, positive
 from gearsig.errors import InputError
 from gearsig.formatting import counted, csv_rows, signed
-from gearsig.plot import CurvePanel, curves_figure, gear_mesh_figure, gear_modes_figure, gear_stress_figure
+from gearsig.plot import curve_panel, gear_mesh_figure, gear_modes_figure, gear_stress_figure, panels_figure
 from gearsig.report import write_folder
 from sims import fe_gear
 from sims.fe_gear import (
@@ -399,7 +399,7 @@ def growth_figure(study: GrowthStudy) -> Figure:
     intensity, grown = study.intensity, study.growth
     ends = np.full(len(intensity.depth_mm), study.law.threshold)
     panels = [
-        CurvePanel(
+        curve_panel(
             intensity.depth_mm,
             {"of a straight crack": intensity.k_mpa_sqrt_m, "threshold": ends},
             "depth of the crack in mm",
@@ -412,9 +412,9 @@ def growth_figure(study: GrowthStudy) -> Figure:
         rows = zip(names, grown.turns, strict=True)
         curves = {name: np.where(row > 0.0, row, np.nan) for name, row in rows if np.isfinite(row).all()}
         panels.append(
-            CurvePanel(grown.depth_mm, curves, "depth of the crack in mm", "turns", "turns until then", log_y=True)
+            curve_panel(grown.depth_mm, curves, "depth of the crack in mm", "turns", "turns until then", log_y=True)
         )
-    return curves_figure(panels, n_columns=len(panels), title="growth of a root crack", height_in=2.8)
+    return panels_figure(panels, n_columns=len(panels), title="growth of a root crack", height_in=2.8)
 
 
 def write_growth(study: GrowthStudy, folder: Path) -> tuple[Path, ...]:

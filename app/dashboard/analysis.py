@@ -20,7 +20,7 @@ from app.dashboard.theme import is_dark
 from app.dashboard.widgets.charts import download, offer_page, show_figure, show_lines, show_map, show_panel
 from app.dashboard.widgets.chooser import choose_recording
 from app.dashboard.widgets.crack import show_crack
-from app.dashboard.widgets.machine import show_machine
+from app.dashboard.widgets.machine import machine_text, show_machine
 from app.dashboard.widgets.method import MethodPage, cached, show_method
 from app.dashboard.widgets.spectrum import show_average, show_spectrum
 from app.dashboard.widgets.texts import as_typed, in_page_words, show_error, show_facts, show_table, show_unknown_speed
@@ -357,16 +357,16 @@ def _show_quality(analysis: Analysis) -> None:
     problems = channel_problems(state.view_key("problems", analysis), recording)
     table = {
         "channel": recording.channel_names,
+        "data quality": [
+            ", ".join(p.kind for p in problems if p.channel == c.name) or ("good" if c.is_vibration else "not examined")
+            for c in recording.channels
+        ],
         "quantity": [c.quantity.replace("_", " ") for c in recording.channels],
         "unit": [unit_text(c.unit) or "not known" for c in recording.channels],
         "position": [c.position for c in recording.channels],
         "smallest": [float(row.min()) for row in recording.samples],
         "mean": [float(row.mean(dtype=np.float64)) for row in recording.samples],
         "largest": [float(row.max()) for row in recording.samples],
-        "data quality": [
-            ", ".join(p.kind for p in problems if p.channel == c.name) or ("good" if c.is_vibration else "not examined")
-            for c in recording.channels
-        ],
     }
     config = {"channel": st.column_config.TextColumn(width="small")}
     show_table(table, number=".4g", column_config=config, width="stretch")
@@ -390,13 +390,15 @@ def show_indicators(analysis: Analysis) -> None:
         key, read = state.view_key(f"indicator {name}", analysis), address.some_of(known)
         chosen = address.ask(column.multiselect, label, known, key=key, name=name, first=[], read=read)
         kept = kept[kept[name].isin(chosen)] if chosen else kept
+    # at 800 pixels up to the gear; what the others repeat, or says nothing, takes no room
+    widths = {"indicator": 168, "value": 80, "unit": 56, "channel": 66, "of": 140, "band": 130}
     config: dict[str, Any] = {
-        "indicator": st.column_config.TextColumn(width=190, pinned=True),
-        "of": st.column_config.TextColumn(width=130),
-        "band": st.column_config.TextColumn(width=130),
+        name: st.column_config.Column(width=px, pinned=name == "indicator") for name, px in widths.items()
     }
+    config |= {str(name): None for name in table if (table[name] == "").all()}
     formats = {"change (dB)": "+.1f"} if "change (dB)" in kept else {}
-    show_table(kept, formats=formats, width="stretch", height=520, column_config=config, placeholder="–")
+    shown = kept.assign(band=kept["band"].where(kept["band"] != kept["of"], ""))
+    show_table(shown, formats=formats, width="stretch", height=520, column_config=config, placeholder="–")
     below = st.container(horizontal=True, horizontal_alignment="distribute", vertical_alignment="center")
     below.caption(f"{len(kept)} of {len(table)} indicators", width="content")
     with below:
@@ -630,5 +632,6 @@ def analysed(file: ChosenFile, chosen: Chosen) -> Analysis | None:
         return analysis_of(chosen.request, chosen.content, chosen.reference)
     except GearsigError as error:
         show_error(error)
-        show_machine(file, is_told=True)
+        if machine_text(file) or in_page_words(str(error)) != str(error):  # which speaks of the form
+            show_machine(file, is_told=True)
         return None

@@ -9,12 +9,11 @@ from shutil import rmtree
 from tempfile import mkdtemp
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import streamlit as st
 
 from app.dashboard import address, state
 from app.dashboard.state import ChosenFile
-from app.dashboard.widgets.charts import QUIET, padded_limits, show_lines
+from app.dashboard.widgets.charts import show_lines
 from app.dashboard.widgets.chooser import open_file
 from app.dashboard.widgets.texts import as_typed, show_table
 from app.dashboard.widgets.verdict import COLOURS
@@ -25,6 +24,8 @@ from gearsig.errors import InputError
 from gearsig.fleet import (
     CONDITIONS,
     Fleet,
+    OperatingTrend,
+    Trend,
     TrendSettings,
     change_text,
     level_counts,
@@ -32,15 +33,13 @@ from gearsig.fleet import (
     series_level,
     trends_text,
 )
-from gearsig.formatting import moment_text, unit_text, with_minus
-from gearsig.plot import ChartLine, LinePanel, with_unit
+from gearsig.formatting import moment_text, unit_text
+from gearsig.plot import trend_panel
 from gearsig.recording import sha256_of
 from gearsig.rig import rig_file_beside
 
 if TYPE_CHECKING:
     from pandas import DataFrame
-
-    from gearsig.checks import FloatArray
 
 STORE, EXAMPLE, MACHINE, POINT, SERIES = (
     "fleet store",
@@ -272,52 +271,18 @@ def _choose_over(recordings: DataFrame) -> str:
 def _show_trend(fleet: Fleet, row: Row, over: str) -> None:
     """Show one indicator over time, load or speed, in the band of its limits, with what lies beyond marked."""
     only = {name: row[name] for name in ("point", "channel", "place", "computed_on")}
-    machine, name, is_dated = row["machine"], row["name"], over == "date"
-    if is_dated:
-        trends = fleet.trend(machine, name, **only)
-        trend = next((candidate for candidate in trends if candidate.band == row["band"]), trends[0])
-        table = limits = trend.table
-        at = along = table["date"].to_numpy("datetime64[s]").astype(float) / 86400.0
-        changed = f" The level first changed on {moment_text(trend.changed)}." if trend.changed is not None else ""
-        x, text, margin = "date", trend.text + changed, 0.5
+    if over == "date":
+        trends = fleet.trend(row["machine"], row["name"], **only)
+        dated = next((trend for trend in trends if trend.band == row["band"]), trends[0])
+        changed = f" The level first changed on {moment_text(dated.changed)}." if dated.changed is not None else ""
+        shown: Trend | OperatingTrend = dated
     else:
-        related = fleet.trend_over(over, machine, name, **only)
-        shown = next((candidate for candidate in related if candidate.trend.band == row["band"]), related[0])
-        trend, table, limits, text = shown.trend, shown.table, shown.curve, shown.text
-        at, along = table.iloc[:, 0].to_numpy(float), limits.iloc[:, 0].to_numpy(float)
-        x, margin = ("load (N·m)" if over == "load" else "speed (rpm)"), 1e-3 * float(at.max())
-    value = table["value" if is_dated else "adjusted"].to_numpy(float)
-    is_baseline = (table["level"] == "baseline").to_numpy() & (not is_dated)
-    lines = [
-        ChartLine(at[chosen], value[chosen], words, colour, dots=not is_dated)
-        for chosen, words, colour in ((is_baseline, "baseline", 2), (~is_baseline, trend.name, 0))
-        if chosen.any()
-    ]
-    lines, ends = _within_limits(lines, along, limits, value)
-    beyond = table["level"].isin(["warning", "alarm"]).to_numpy() & np.isfinite(value)
-    low, high = float(min(at.min(), along.min())), float(max(at.max(), along.max()))
-    margin = max(0.02 * (high - low), margin)
-    unit = with_minus(with_unit(trend.name, trend.unit))
-    panel = LinePanel(lines, x, unit, ends, x_limits=(low - margin, high + margin))
-    key = f"{over} of {machine} {row['point']} {_series_words(row)}"
-    marked = list(zip(at[beyond], value[beyond], strict=True))
-    show_lines(panel, key, marked=marked, legend=True, dates=is_dated)
-    st.caption(as_typed(text))
-
-
-def _within_limits(
-    lines: list[ChartLine], x: FloatArray, table: DataFrame, value: FloatArray
-) -> tuple[list[ChartLine], tuple[float, float]]:
-    """Return lines in the band of their limits, with that of alarm where there is one, and the ends of their axis."""
-    expected, low, high, alarm = (table[name].to_numpy(float) for name in ("expected", "low", "high", "alarm"))
-    known = np.isfinite(high)
-    if known.any():
-        floor = np.where(np.isfinite(low), low, np.nanmin(value))
-        band = (floor[known], high[known])
-        lines = [ChartLine(x[known], expected[known], "expected, within its limits", QUIET, band=band), *lines]
-    if np.isfinite(alarm).any():
-        lines = [*lines, ChartLine(x, alarm, "alarm", 1, dotted=True)]
-    return lines, padded_limits([value, *([high] if known.any() else [])])
+        related = fleet.trend_over(over, row["machine"], row["name"], **only)
+        shown, changed = next((of for of in related if of.trend.band == row["band"]), related[0]), ""
+    panel, marked = trend_panel(shown)
+    key = f"{over} of {row['machine']} {row['point']} {_series_words(row)}"
+    show_lines(panel, key, marked=marked, legend=True)
+    st.caption(as_typed(shown.text + changed))
 
 
 def _show_recordings(recordings: DataFrame, of: str) -> None:

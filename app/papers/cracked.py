@@ -17,7 +17,7 @@ from app.papers import Paper, PaperFigure, Progress, judged, within_part
 from gearsig import indicators, plot
 from gearsig.checks import FloatArray
 from gearsig.decompose import VmdSettings, vmd
-from gearsig.plot import CurvePanel, ResponseCase, curves_figure
+from gearsig.plot import ResponseCase, curve_panel, panels_figure
 from gearsig.spectra import amplitude_spectrum
 from gearsig.timefreq import UniformSignal, squeezed_cwt_map
 from sims.cracked import Response, eigenfrequencies_hz, respond
@@ -252,10 +252,10 @@ def _friction_inside() -> PaperFigure:
     changes = {name: values / smooth - 1.0 for name, values in shown.items()}
     squared = {r: stiffness_with_friction(r, cycles, squared=True) / 1e8 / smooth - 1.0 for r in ROUGHNESS_UM[1:]}
     printed, change = squared[1.40], changes[rq_name(1.40)]
-    figure = curves_figure(
+    figure = panels_figure(
         [
-            CurvePanel(cycles, {rq_name(0.0): smooth} | shown, "mesh cycles", "stiffness (10⁸ N/m)"),
-            CurvePanel(
+            curve_panel(cycles, {rq_name(0.0): smooth} | shown, "mesh cycles", "stiffness (10⁸ N/m)"),
+            curve_panel(
                 cycles,
                 {name: 100.0 * values for name, values in (changes | {"1.40 µm as printed": printed}).items()},
                 "mesh cycles",
@@ -357,7 +357,7 @@ def _crack_laws() -> PaperFigure:
     laws = compare_crack_laws(ready_gear("z55_m2"), depths)
     n = len(laws.roll_rad)
     panels = [
-        CurvePanel(
+        curve_panel(
             depths,
             {law: 1e10 * values[:, place] for law, values in laws.added_m_per_n.items()},
             "crack length (mm)",
@@ -366,7 +366,7 @@ def _crack_laws() -> PaperFigure:
         )
         for place, title in ((n // 4, "low on the flank"), (n // 2, "halfway"), (3 * n // 4, "high on the flank"))
     ]
-    figure = curves_figure(
+    figure = panels_figure(
         panels, n_columns=3, title="What a crack adds, by law (55 teeth, module 2 mm, width 20 mm)", height_in=2.6
     )
     whole = compare_crack_laws(ready_gear("z55_m2"), np.array([1.0, 2.0, 3.0, 4.0]))
@@ -607,10 +607,10 @@ def _crack_maps() -> tuple[PaperFigure, PaperFigure]:
         rate = 1.0 / run.interval_s / step
         x = kept[round(0.4 * rate) :][: round(0.5 * rate)]
         time = np.arange(len(x)) / rate
-        panels.append(CurvePanel(time, {crack_name(depth): x}, "time (s)", "acceleration (m/s²)", crack_name(depth)))
+        panels.append(curve_panel(time, {crack_name(depth): x}, "time (s)", "acceleration (m/s²)", crack_name(depth)))
         maps[depth] = squeezed_cwt_map(UniformSignal(x, rate, unit="m/s^2", source=crack_name(depth)), lowest=100.0)
         levels.append(x)
-    figure = curves_figure(panels, title="Acceleration of the pinion, 1000 rpm", height_in=1.5)
+    figure = panels_figure(panels, title="Acceleration of the pinion, 1000 rpm", height_in=1.5)
     spread = [float(np.std(x - levels[0])) / float(np.std(levels[0])) for x in levels[1:]]
     times = UniformSignal(levels[2], rate)
     high = maps[4].positions > 2000.0

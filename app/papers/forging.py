@@ -26,7 +26,7 @@ from gearsig.motion import (
     examine_start_stop,
     measure_motion,
 )
-from gearsig.plot import CurvePanel, curves_figure
+from gearsig.plot import curve_panel, panels_figure
 from gearsig.recording import Recording
 from sims import simulate
 from sims.presets import preset
@@ -146,13 +146,13 @@ def _force_figure(estimate: ForceEstimate, mode: str) -> Figure:
     forces = {FROM_TORQUE: measured} | models
     errors = {name: force - measured for name, force in models.items()}
     panels = [
-        CurvePanel(time[shown], {k: 1e-3 * v for k, v in curves.items()}, "time (s)", f"{label} (kN)", title)
+        curve_panel(time[shown], {k: 1e-3 * v for k, v in curves.items()}, "time (s)", f"{label} (kN)", title)
         for curves, label, title in (
             (forces, "force", "total interaction force; the piecewise one lies beneath the first"),
             (errors, "error", "force errors"),
         )
     ]
-    return curves_figure(panels, title=f"Interaction force, {mode} rotation")
+    return panels_figure(panels, title=f"Interaction force, {mode} rotation")
 
 
 PRESSURE_ANGLE_RAD, TEETH_OF_BOTH = np.radians(20.0), (20, 100)
@@ -212,11 +212,11 @@ def _parameters() -> PaperFigure:
         c = estimated("start-stop", name).motion.contact
         force = c.stiffness_n_per_m_lambda * (1e-6 * depth_um) ** c.exponent
         panels.append(
-            CurvePanel(
+            curve_panel(
                 depth_um, {"one pair": 1e-3 * force, "two pairs": 2e-3 * force}, "depth (µm)", "force (kN)", name
             )
         )
-    figure = curves_figure(
+    figure = panels_figure(
         panels, n_columns=2, title="Force of the flanks at rest: the formula's stiffness, and the table's"
     )
     return PaperFigure("parameters", "Table 1", "parameters", figure, claims)

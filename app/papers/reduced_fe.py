@@ -17,7 +17,7 @@ from app.papers import Claim, Paper, PaperFigure, Progress, judged, within_part
 from gearsig import plot
 from gearsig.checks import FloatArray
 from gearsig.formatting import percent
-from gearsig.plot import CurvePanel, curves_figure
+from gearsig.plot import curve_panel, panels_figure
 from sims import fe_gear, reduced_fe
 from sims.machine import Operation
 from sims.reduced_fe import FlexiblePair, ReducedPair
@@ -236,11 +236,11 @@ def _kinematics(pair: FlexiblePair, torque_nm: float, step_s: float) -> PaperFig
     shown = slice(-round(0.006 / run.interval_s), None)
     time = run.time_s[shown]
     panels = [
-        CurvePanel(time, {"displacement": 1e6 * x[shown]}, "time (s)", "displacement (µm)"),
-        CurvePanel(time, {"velocity": 1e3 * speed[shown]}, "time (s)", "velocity (mm/s)"),
-        CurvePanel(time, {"acceleration": acceleration[shown]}, "time (s)", "acceleration (m/s²)"),
+        curve_panel(time, {"displacement": 1e6 * x[shown]}, "time (s)", "displacement (µm)"),
+        curve_panel(time, {"velocity": 1e3 * speed[shown]}, "time (s)", "velocity (mm/s)"),
+        curve_panel(time, {"acceleration": acceleration[shown]}, "time (s)", "acceleration (m/s²)"),
     ]
-    figure = curves_figure(
+    figure = panels_figure(
         panels, title=f"Transmission error and its derivatives, 2000 rpm, {torque_nm:g} N·m", height_in=1.4
     )
     n = round(60.0 / 2000.0 / 50 / run.interval_s)

@@ -129,19 +129,18 @@ def _tracking(prepared: PreparedRecording, channel: str, orders: Sequence[float]
     )
     unit, time_s, speed = tracked[0].unit, tracked[0].time_s, tracked[0].speed_rpm
     panel = plot.tracked_panel(tracked)
-    caption = f"levels of {counted(len(tracked), 'order')} over {panel.x_label.split()[0]}"
+    caption = f"levels of {counted(len(tracked), 'order')} over {panel.x.split()[0]}"
     table: dict[str, Any] = {"time (s)": time_s, "speed (rpm)": speed}
     for t in tracked:
         table[with_unit(f"order {t.order:.6g}, amplitude peak", unit)] = t.amplitude
         table[f"order {t.order:.6g}, phase (rad)"] = t.phase_rad
-    lines = [ChartLine(panel.x, values, name, k) for k, (name, values) in enumerate(panel.curves.items())]
     return MethodAnswer(
         channel,
         caption,
-        lambda: plot.curves_figure([panel], title=f"{channel}: {caption}"),
+        lambda: plot.panels_figure([panel], title=f"{channel}: {caption}"),
         table,
         numbers={"bandwidth_orders": tracked[0].bandwidth_orders, "shaft": tracked[0].shaft},
-        panels=(LinePanel(lines, panel.x_label, panel.y_label),),
+        panels=(panel,),
     )
 
 

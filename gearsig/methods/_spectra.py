@@ -636,8 +636,8 @@ def _indicators(prepared: PreparedRecording, channel: str) -> MethodAnswer:
     level = np.sqrt(np.add.reduceat(np.square(values, dtype=np.float64), np.arange(0, len(values), n)) / n)[:-1]
     time_s = (np.arange(len(level)) + 0.5) * n / prepared.recording.sampling_rate_hz
     caption = f"{len(indicators)} condition indicators; drawn: rms over time"
-    panel = plot.CurvePanel(time_s, {"rms": level}, "time (s)", with_unit("rms", unit_of(prepared, channel)))
-    return MethodAnswer(channel, caption, lambda: plot.curves_figure([panel], title=f"{channel}: {caption}"), table)
+    panel = plot.curve_panel(time_s, {"rms": level}, "time (s)", with_unit("rms", unit_of(prepared, channel)))
+    return MethodAnswer(channel, caption, lambda: plot.panels_figure([panel], title=f"{channel}: {caption}"), table)
 
 
 def _waveform(prepared: PreparedRecording, channel: str) -> MethodAnswer:

@@ -14,7 +14,7 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.plot._average import average_figure
 from gearsig.plot._cursors import Cursor
 from gearsig.plot._maps import coherence_figure, kurtogram_figure, order_map_figure, time_frequency_figure
-from gearsig.plot._panels import ChartLine, LinePanel, curves_figure, panels_figure, tracked_panel
+from gearsig.plot._panels import ChartLine, LinePanel, panels_figure, tracked_panel
 from gearsig.plot._phase import bifurcation_figure, divergence_figure, phase_portrait_figure, recurrence_figure
 from gearsig.plot._spectrum import modes_figure, spectrum_figure, speed_figure, time_figure
 from gearsig.severity import ToothSearch
@@ -49,7 +49,7 @@ def _(result: tuple) -> Figure:  # type: ignore[type-arg]  # the registry knows 
     if not result or not all(isinstance(item, orders.TrackedOrder) for item in result):
         kinds = sorted({type(item).__name__ for item in result})
         raise InputError(f"there is no figure of a tuple of {', '.join(kinds) or 'nothing'}", allowed="TrackedOrder")
-    return curves_figure([tracked_panel(result)], title=result[0].source)
+    return panels_figure([tracked_panel(result)], title=result[0].source)
 
 
 figure_of.register(recording.Recording, time_figure)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from textwrap import wrap
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -293,12 +293,59 @@ BAR = 0.56
 """Height of a bar, of its row."""
 
 
-def _rows(
-    names: Sequence[str], *, left_in: float, right_in: float, row_in: float, top_in: float
-) -> tuple[Figure, Axes]:
-    """Return a panel with a row for each name, at y = 0, 1, … from the top; names in two lines at most."""
-    figure, (axes,) = style.panels((row_in * len(names),), left_in=left_in, right_in=right_in, top_in=top_in)
-    n_max = int((left_in - 0.25) * 13.5)
+def rows_figure(panel: RowPanel) -> Figure:
+    """Draw bars below each other, with their intervals, and what they are compared with.
+
+    Parameters
+    ----------
+    panel : RowPanel
+        Where some of its rows are totals, the others are the steps between these.
+    """
+    marked, names = any(row.mark is not None for row in panel.rows), [row.name for row in panel.rows]
+    left_in = 3.6 if marked else 3.0
+    right_in = 1.6 if any(row.below for row in panel.rows) else 1.15
+    figure, (axes,) = style.panels(
+        (0.45 * len(names),), left_in=left_in, right_in=right_in, top_in=0.66 if marked else 0.4
+    )
+    _name_rows(axes, names, int((left_in - 0.25) * 13.5))
+    if panel.span is not None:
+        axes.axvspan(*panel.span, facecolor=style.FLOOR, alpha=0.16, linewidth=0, zorder=0.5)
+        axes.axvline(panel.span[1], color=style.FLOOR, linewidth=0.9, zorder=1)
+    keys = axes.plot([], [], color=line_colour(panel.rows[0].colour), linewidth=6, label=panel.bar)
+    if marked:
+        looks: dict[str, Any] = {"marker": "D", "linestyle": "none", "markersize": 7, "zorder": 3}
+        looks |= {"markerfacecolor": "white", "markeredgecolor": style.MESH, "markeredgewidth": 1.8}
+        known = [(row.mark, i) for i, row in enumerate(panel.rows) if row.mark is not None]
+        keys += axes.plot(*zip(*known, strict=True), **looks, label=panel.mark)
+        keys += axes.plot([], [], color=style.FLOOR, alpha=0.35, linewidth=9, label=panel.band)
+        axes.axvline(0.0, color=style.QUIET, linewidth=0.9, zorder=1)
+        style.legend_row(figure, keys, left_in=left_in)
+    has_totals = any(row.is_total for row in panel.rows)
+    for i, row in enumerate(panel.rows):
+        if row.band is not None:
+            axes.barh(i, 2 * row.band, left=-row.band, height=0.8, color=style.FLOOR, alpha=0.2, linewidth=0, zorder=1)
+        low, high = sorted((row.start, row.end))
+        looks = {"height": BAR if row.mark is None else 0.6 * BAR, "alpha": 0.8, "linewidth": 0, "zorder": 2}
+        axes.barh(i, high - low, left=low, color=line_colour(row.colour), **looks)
+        if row.interval is not None:
+            wide = [[max(row.end - row.interval[0], 0.0)], [max(row.interval[1] - row.end, 0.0)]]
+            axes.errorbar(
+                [row.end], [i], xerr=wide, fmt="none", ecolor=style.INK, elinewidth=1.1, capsize=3.5, zorder=3
+            )
+        _write_beyond(axes, i, row.beside, row.below, style.INK if row.verdict is None else line_colour(row.verdict))
+        if row.is_total:
+            axes.get_yticklabels()[i].set_fontweight("bold")
+        for x, y in ((row.start, i - 0.5), (row.end, i + 0.5)) if has_totals and not row.is_total else ():
+            ends = [y - 0.5 + BAR / 2, y + 0.5 - BAR / 2]
+            axes.plot([x, x], ends, color=style.QUIET, linewidth=0.8, linestyle=":", zorder=1.5)
+    axes.set_xlim(panel.limits)
+    style.label_axes(axes, panel.x)
+    style.no_offset(axes)
+    return figure
+
+
+def _name_rows(axes: Axes, names: Sequence[str], n_max: int) -> None:
+    """Name the rows y = 0, 1, … from the top, in two lines of so many letters at most."""
     texts = []
     for name in names:  # a longer one is cut in its middle
         lines = wrap(plain(name, 400), n_max)
@@ -310,7 +357,6 @@ def _rows(
     axes.set_ylim(len(names) - 0.5, -0.5)
     axes.grid(visible=False, axis="y")
     axes.grid(visible=True, axis="x", which="major", color=style.RULE, linewidth=0.7)
-    return figure, axes
 
 
 def _write_beyond(axes: Axes, row: int, text: str, below: str = "", colour: str = style.INK) -> None:
@@ -350,49 +396,6 @@ def gap_evidence_panel(evidence: Sequence[Evidence]) -> RowPanel:
     reach = float(np.max(np.abs(ends)))
     limits = float(ends.min()) - 0.06 * reach, 1.08 * reach
     return RowPanel(rows, "change (dB)", "observed", "predicted", "structural floor", limits)
-
-
-def gap_evidence_figure(evidence: Sequence[Evidence], *, title: str = "") -> Figure:
-    """Draw predicted and observed changes, feature by feature, with the floor about zero.
-
-    Parameters
-    ----------
-    evidence : sequence of Evidence
-        See `gap_evidence_panel`.
-    title : str
-
-    Returns
-    -------
-    Figure
-        Grey: within the floor, where a change says nothing.
-
-    Raises
-    ------
-    InputError
-        Without evidence.
-    """
-    panel = gap_evidence_panel(evidence)
-    figure, axes = _rows([row.name for row in panel.rows], left_in=3.6, right_in=1.15, row_in=0.44, top_in=0.66)
-    at = np.arange(len(panel.rows))
-    floors, observed, predicted = np.array([(row.band, row.end, row.mark) for row in panel.rows], dtype=float).T
-    axes.barh(at, 2.0 * floors, left=-floors, height=0.8, color=style.FLOOR, alpha=0.2, linewidth=0, zorder=1)
-    axes.barh(at, observed, height=0.6 * BAR, color=style.MEASURED, alpha=0.85, linewidth=0, zorder=2)
-    keys = axes.plot([], [], color=style.MEASURED, linewidth=6, label=panel.bar)
-    for i, row in enumerate(panel.rows):
-        key = axes.plot(
-            [predicted[i]], [i], "D", markersize=7, markerfacecolor="white", markeredgecolor=style.MESH,
-            markeredgewidth=1.8, zorder=3, label=panel.mark,
-        )  # fmt: skip
-        keys += key if not i else []
-        _write_beyond(axes, i, row.beside, colour=line_colour(row.verdict or 0))
-    keys += axes.plot([], [], color=style.FLOOR, alpha=0.35, linewidth=9, label=panel.band)
-    axes.axvline(0.0, color=style.QUIET, linewidth=0.9, zorder=1)
-    axes.set_xlim(panel.limits)
-    style.label_axes(axes, panel.x)
-    style.no_offset(axes)
-    style.head(figure, title)
-    style.legend_row(figure, keys, left_in=3.6)
-    return figure
 
 
 def gap_waterfall_panel(steps: Sequence[GapStep], *, held_out: str = "") -> RowPanel:
@@ -436,55 +439,6 @@ def gap_waterfall_panel(steps: Sequence[GapStep], *, held_out: str = "") -> RowP
 def _total(name: str, residual: Interval, colour: int) -> ChartRow:
     ends = (residual.low, residual.high)
     return ChartRow(name, 0.0, residual.value, colour, residual.text, residual.words(), interval=ends, is_total=True)
-
-
-def gap_waterfall_figure(steps: Sequence[GapStep], *, held_out: str = "", title: str = "") -> Figure:
-    """Draw the gap before, what each effect takes away, and what is left, with 90 % intervals.
-
-    Parameters
-    ----------
-    steps : sequence of GapStep
-    held_out : str
-        See `gap_waterfall_panel`.
-    title : str
-
-    Returns
-    -------
-    Figure
-        The shaded band is the structural floor: healthy machines are in it.
-
-    Raises
-    ------
-    InputError
-        Without steps.
-    """
-    panel = gap_waterfall_panel(steps, held_out=held_out)
-    figure, axes = _rows([row.name for row in panel.rows], left_in=3.0, right_in=1.6, row_in=0.46, top_in=0.4)
-    axes.axvspan(0.0, 1.0, facecolor=style.FLOOR, alpha=0.16, linewidth=0, zorder=0.5)
-    axes.axvline(1.0, color=style.FLOOR, linewidth=0.9, zorder=1)
-    for i, row in enumerate(panel.rows):
-        colour = line_colour(row.colour)
-        _draw_bar(axes, i, row, colour)
-        _write_beyond(axes, i, row.beside, row.below, colour)
-        if row.is_total:
-            axes.get_yticklabels()[i].set_fontweight("bold")
-            continue
-        for x, y in ((row.start, i - 0.5), (row.end, i + 0.5)):
-            ends = [y - 0.5 + BAR / 2, y + 0.5 - BAR / 2]
-            axes.plot([x, x], ends, color=style.QUIET, linewidth=0.8, linestyle=":", zorder=1.5)
-    axes.set_xlim(panel.limits)
-    style.label_axes(axes, panel.x, "", title)
-    style.no_offset(axes)
-    return figure
-
-
-def _draw_bar(axes: Axes, at: int, row: ChartRow, colour: str) -> None:
-    """Draw a bar up to what is left, and its interval."""
-    low, high = sorted((row.start, row.end))
-    bottom, top = row.interval or (row.end, row.end)
-    wide = [[max(row.end - bottom, 0.0)], [max(top - row.end, 0.0)]]
-    axes.barh(at, high - low, left=low, height=BAR, color=colour, alpha=0.8, linewidth=0, zorder=2)
-    axes.errorbar([row.end], [at], xerr=wide, fmt="none", ecolor=style.INK, elinewidth=1.1, capsize=3.5, zorder=3)
 
 
 # --------------------

@@ -455,27 +455,6 @@ def frequency_curves_figure(
     return figure
 
 
-def contact_spreading_figure(
-    mesh_cycles: FloatArray, frequency_hz: Mapping[str, FloatArray], *, title: str = ""
-) -> Figure:
-    """Draw one natural frequency over the mesh angle, by how contact forces reach the nodes of the mesh.
-
-    Parameters
-    ----------
-    mesh_cycles : array, (n_c,)
-    frequency_hz : mapping
-        Name of the way, e.g. "line of nodes" → array, (n_c,).
-    title : str
-    """
-    x = style.checked_axis(mesh_cycles, "mesh_cycles")
-    curves = style.checked_curves(frequency_hz, len(x), "frequency_hz")
-    figure, (axes,) = style.panels((2.2,), top_in=0.85)
-    lines = style.plot_curves(axes, x, curves)
-    style.label_axes(axes, style.CYCLES, "torsional mode (Hz)")
-    style.head(figure, title, lines)
-    return figure
-
-
 # --------------------
 # How a gear answers: time signal, spectrum, phase portrait and Poincaré section of several cases below each other.
 # --------------------

@@ -78,6 +78,8 @@ class LinePanel:
         Whether `x` need not ascend.
     title : str
         What the panel shows, where that is not plain.
+    dates : bool
+        Whether x is days since 1970.
     """
 
     lines: Sequence[ChartLine]
@@ -90,6 +92,7 @@ class LinePanel:
     spans: Sequence[tuple[float, float, str]] = ()
     is_plane: bool = False
     title: str = ""
+    dates: bool = False
 
 
 @dataclass(frozen=True)
@@ -251,13 +254,74 @@ def pooled_levels(
     return np.fmax.reduceat(pooled, columns, axis=1), rows
 
 
-def panels_figure(panels: Sequence[LinePanel | LevelPanel], *, title: str = "") -> Figure:
-    """Draw panels below each other.
+def curve_panel(
+    x: FloatArray,
+    curves: Mapping[str, FloatArray],
+    x_label: str = "",
+    y_label: str = "",
+    title: str = "",
+    *,
+    log_y: bool = False,
+) -> LinePanel:
+    """Return a panel of curves over one axis, coloured by their order.
+
+    Parameters
+    ----------
+    x : array, (n,)
+    curves : mapping
+        Name → array, (n,); one to eight.
+    x_label, y_label, title : str
+    log_y : bool
+
+    Raises
+    ------
+    InputError
+        If a curve's length is not that of its axis, or there are more than eight.
+    """
+    style.check_number(len(curves), f"{len(curves)} curves in one panel")
+    for name, values in curves.items():
+        if len(values) != len(x):
+            raise InputError(f"{name} has {len(values)} points, its axis {len(x)}", allowed="equal lengths")
+    lines = [ChartLine(x, values, name, colour) for name, values, colour in style.coloured(curves)]
+    return LinePanel(lines, x_label, y_label, logarithmic=log_y, title=title)
+
+
+def tracked_panel(tracked: Sequence[TrackedOrder]) -> LinePanel:
+    """Return the panel of tracked orders: peak amplitudes over speed where it changes by more than 5 %, else over time.
+
+    Parameters
+    ----------
+    tracked : sequence of TrackedOrder
+        At least one, of one channel and the same blocks.
+    """
+    first = tracked[0]
+    sweeps = float(np.ptp(first.speed_rpm)) > 0.05 * float(np.mean(first.speed_rpm))
+    x, label = (first.speed_rpm, "speed (rpm)") if sweeps else (first.time_s, "time (s)")
+    rising = np.argsort(x, kind="stable")
+    lines = [ChartLine(x[rising], t.amplitude[rising], f"order {t.order:.6g}", k) for k, t in enumerate(tracked)]
+    return LinePanel(lines, label, style.with_unit("amplitude peak", first.unit))
+
+
+def panels_figure(
+    panels: Sequence[LinePanel | LevelPanel],
+    *,
+    n_columns: int = 1,
+    title: str = "",
+    heading: str = "",
+    height_in: float | None = None,
+) -> Figure:
+    """Draw panels in rows; names stand above all where every panel has the same ones, else above each.
 
     Parameters
     ----------
     panels : sequence of LinePanel or LevelPanel
+        Row by row.
+    n_columns : int
     title : str
+    heading : str
+        Before the names, e.g. "roughness".
+    height_in : float or None
+        Of a row; None: what lines, or levels, take.
 
     Raises
     ------
@@ -266,39 +330,52 @@ def panels_figure(panels: Sequence[LinePanel | LevelPanel], *, title: str = "") 
     """
     if not panels:
         raise InputError("no panel is given", allowed="at least 1")
-    heights = tuple(3.2 if isinstance(panel, LevelPanel) else 2.2 for panel in panels)
-    right_in = 1.0 if any(isinstance(panel, LevelPanel) for panel in panels) else 0.2
-    figure, axes = style.panels(heights, right_in=right_in, top_in=0.45, row_gap_in=0.62)
-    for place, panel in zip(axes, panels, strict=True):
-        if isinstance(panel, LevelPanel):
-            if panel.logarithmic:
-                place.set_yscale("log")
-                style.number_decades(place.yaxis)
-            draw_level_map(place, panel.at, panel.positions, panel.levels, panel.unit)
-        elif panel.logarithmic:
-            place.set_yscale("log")
-        for line in panel.lines:
-            _draw(place, line, thinned=isinstance(panel, LinePanel))
-        for cursor in panel.cursors:
-            place.axvline(cursor.position, color=style.QUIET, lw=0.7, ls=":", zorder=1)
-        if isinstance(panel, LinePanel):
-            if panel.limits is not None:
-                place.set_ylim(*panel.limits)
-            ends = [end for line in panel.lines for end in (float(line.x[0]), float(line.x[-1]))]
-            place.set_xlim(min(ends), max(ends))
-            if len(panel.lines) > 1:
-                place.legend(  # above the panel: it never covers data
-                    fontsize=style.SMALL_PT,
-                    frameon=False,
-                    labelcolor=style.INK,
-                    loc="lower right",
-                    bbox_to_anchor=(1.0, 1.0),
-                    ncols=len(panel.lines),
-                    borderaxespad=0.0,
-                )
-        style.label_axes(place, panel.x, panel.y)
-    style.head(figure, title)
+    rows = [panels[i : i + n_columns] for i in range(0, len(panels), n_columns)]
+    of_levels = any(isinstance(panel, LevelPanel) for panel in panels)
+    names = {tuple(line.name for line in panel.lines) for panel in panels if isinstance(panel, LinePanel)}
+    is_named = not of_levels and len(names) == 1 and (len(next(iter(names))) > 1 or bool(heading))
+    figure, axes = style.panels(
+        [height_in or (3.2 if any(isinstance(panel, LevelPanel) for panel in row) else 2.2) for row in rows],
+        (1.0,) * n_columns,
+        right_in=1.0 if of_levels else 0.2,
+        top_in=0.45 + (0.25 if is_named else 0.0) + (0.2 if panels[0].title else 0.0),
+        row_gap_in=0.62 if is_named and not any(panel.title for panel in panels) else 0.78,
+    )
+    lines: list[Line2D] = []
+    for place, panel in zip(axes, panels, strict=False):
+        lines = _draw_panel(place, panel)
+        if not is_named and isinstance(panel, LinePanel) and len(lines) > 1:
+            place.legend(  # above the panel: it never covers data
+                fontsize=style.SMALL_PT,
+                frameon=False,
+                labelcolor=style.INK,
+                loc="lower right",
+                bbox_to_anchor=(1.0, 1.0),
+                ncols=len(lines),
+                borderaxespad=0.0,
+            )
+        style.label_axes(place, panel.x, panel.y, panel.title)
+    for unused in axes[len(panels) :]:
+        unused.set_visible(False)
+    style.head(figure, title, lines if is_named else (), heading)
     return figure
+
+
+def _draw_panel(axes: Axes, panel: LinePanel | LevelPanel) -> list[Line2D]:
+    """Draw a panel; return its lines."""
+    if panel.logarithmic:
+        axes.set_yscale("log")
+    if isinstance(panel, LevelPanel):
+        draw_level_map(axes, panel.at, panel.positions, panel.levels, panel.unit)
+    lines = [_draw(axes, line, thinned=isinstance(panel, LinePanel)) for line in panel.lines]
+    for cursor in panel.cursors:
+        axes.axvline(cursor.position, color=style.QUIET, lw=0.7, ls=":", zorder=1)
+    if isinstance(panel, LinePanel):
+        if panel.limits is not None:
+            axes.set_ylim(*panel.limits)
+        ends = [end for line in panel.lines for end in (float(line.x[0]), float(line.x[-1]))]
+        axes.set_xlim(min(ends), max(ends))
+    return lines
 
 
 _CYCLE = (style.MEASURED, style.FAULT, style.MESH, style.BEARING, style.SHAFT)
@@ -311,7 +388,7 @@ def line_colour(colour: int | str) -> str:
     return style.QUIET if colour < 0 else _CYCLE[colour % len(_CYCLE)]
 
 
-def _draw(axes: Axes, line: ChartLine, *, thinned: bool) -> None:
+def _draw(axes: Axes, line: ChartLine, *, thinned: bool) -> Line2D:
     colour = line_colour(line.colour)
     if line.peaks and _has_many_ascending(line.x):
         x, _, y = style.envelope(line.x, line.y, style.N_POINTS // 2)
@@ -319,7 +396,7 @@ def _draw(axes: Axes, line: ChartLine, *, thinned: bool) -> None:
         x, y = _thinned(line.x, line.y) if thinned else (line.x, line.y)
     if line.band is not None:
         axes.fill_between(line.x, *line.band, color=colour, alpha=0.2, linewidth=0)
-    axes.plot(x, y, color=colour, lw=1.0, ls=":" if line.dotted else "-", label=line.name)
+    return axes.plot(x, y, color=colour, lw=1.1, ls=":" if line.dotted else "-", label=line.name)[0]
 
 
 # --------------------
@@ -613,108 +690,6 @@ def _drawn_series(axes: Axes) -> Iterator[_Series]:
         repeated = np.repeat(level_of_cell, [len(places) for places in corners])
         joined = np.concatenate([np.empty((0, 2)), *corners])
         yield row(name, joined[:, 0], joined[:, 1], repeated)
-
-
-# --------------------
-# Panels of curves over any axis, in rows and columns, coloured by their order: for print.
-# --------------------
-
-
-@dataclass(frozen=True)
-class CurvePanel:
-    """One panel.
-
-    Parameters
-    ----------
-    x : array, (n,)
-    curves : mapping
-        Name → array, (n,); one to eight.
-    x_label, y_label, title : str
-    log_y : bool
-    """
-
-    x: FloatArray
-    curves: Mapping[str, FloatArray]
-    x_label: str = ""
-    y_label: str = ""
-    title: str = ""
-    log_y: bool = False
-
-
-def tracked_panel(tracked: Sequence[TrackedOrder]) -> CurvePanel:
-    """Return the panel of tracked orders: peak amplitudes over speed where it changes by more than 5 %, else over time.
-
-    Parameters
-    ----------
-    tracked : sequence of TrackedOrder
-        At least one, of one channel and the same blocks.
-    """
-    first = tracked[0]
-    sweeps = float(np.ptp(first.speed_rpm)) > 0.05 * float(np.mean(first.speed_rpm))
-    x, label = (first.speed_rpm, "speed (rpm)") if sweeps else (first.time_s, "time (s)")
-    rising = np.argsort(x, kind="stable")
-    curves = {f"order {t.order:.6g}": t.amplitude[rising] for t in tracked}
-    return CurvePanel(x[rising], curves, label, style.with_unit("amplitude peak", first.unit))
-
-
-def curves_figure(
-    panels: Sequence[CurvePanel], *, n_columns: int = 1, title: str = "", heading: str = "", height_in: float = 2.2
-) -> Figure:
-    """Draw panels of curves; the names stand above them, where all panels have the same ones in one row.
-
-    Parameters
-    ----------
-    panels : sequence of CurvePanel
-        Row by row.
-    n_columns : int
-    title : str
-    heading : str
-        Before the names, e.g. "roughness".
-    height_in : float
-        Of a row.
-
-    Returns
-    -------
-    Figure
-
-    Raises
-    ------
-    InputError
-        If there is no panel, a curve's length is not that of its axis, or one panel has more than eight curves.
-    """
-    if not panels:
-        raise InputError("no panel is given", allowed="at least 1")
-    n_rows = -(-len(panels) // n_columns)
-    shared = len({tuple(panel.curves) for panel in panels}) == 1
-    named = shared and (len(panels[0].curves) > 1 or bool(heading))
-    figure, axes = style.panels(
-        (height_in,) * n_rows,
-        (1.0,) * n_columns,
-        top_in=0.42 + (0.25 if named else 0.0) + (0.2 if panels[0].title else 0.0),
-        row_gap_in=0.78 if any(panel.title for panel in panels) else 0.6,
-    )
-    lines: list[Line2D] = []
-    # a curve has the same colour in a panel that shows some of another's
-    fullest = max(panels, key=lambda panel: len(panel.curves)).curves
-    colours = {name: colour for name, _, colour in style.coloured(fullest)}
-    for place, panel in zip(axes, panels, strict=False):
-        style.check_number(len(panel.curves), f"{len(panel.curves)} curves in one panel")
-        lines = []
-        some = panel.curves.keys() <= colours.keys()
-        for k, (name, values, series_colour) in enumerate(style.coloured(panel.curves)):
-            colour = colours[name] if some else series_colour
-            if len(values) != len(panel.x):
-                raise InputError(f"{name} has {len(values)} points, its axis {len(panel.x)}", allowed="equal lengths")
-            lines += place.plot(*_thinned(panel.x, values), color=colour, lw=1.3, label=name, zorder=3 - 0.01 * k)
-        if panel.log_y:
-            place.set_yscale("log")
-        style.label_axes(place, panel.x_label, panel.y_label, panel.title)
-        if not shared and len(panel.curves) > 1:
-            place.legend(fontsize=style.SMALL_PT, frameon=False, labelcolor=style.INK)
-    for unused in axes[len(panels) :]:
-        unused.set_visible(False)
-    style.head(figure, title, lines if named else (), heading)
-    return figure
 
 
 def _thinned(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:

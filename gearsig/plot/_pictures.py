@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gearsig.checks import FloatArray
-from gearsig.fleet import Trend
-from gearsig.formatting import readable, unit_text
+from gearsig.fleet import OperatingTrend, Trend
+from gearsig.formatting import unit_text
 from gearsig.orders import SynchronousAverage
 from gearsig.plot import _style as style
 from gearsig.plot._cursors import AngleMark, Cursor
@@ -194,7 +194,9 @@ def svg_panel(
     names, names_height = _names(panel.lines, width) if len(panel.lines) > 1 else ([], 0)
     top, height = 8 + ROW * n_rows + names_height, height or 170
     frame = _Panel(LEFT, top, width - LEFT - RIGHT, height, limits, (low, high), panel.logarithmic)
-    parts = [frame.axes(panel.x, panel.y), frame.cursors(panel.cursors, labels)]
+    parts = [frame.span(*span) for span in panel.spans]
+    parts += [frame.axes(panel.x, panel.y, dates=panel.dates), frame.cursors(panel.cursors, labels)]
+    parts += [frame.band(line, limits) for line in panel.lines if line.band is not None]
     parts += [frame.line(line, *places) for line, places in zip(panel.lines, shown, strict=True)]
     parts += [
         f'<circle cx="{frame.across(at):.1f}" cy="{frame.up(value):.1f}" r="6" fill="none" stroke="{style.FAULT}" '
@@ -363,10 +365,22 @@ class _Panel:
 
     def line(self, line: ChartLine, x: FloatArray, y: FloatArray) -> str:
         """Draw the points of a line that are shown."""
-        stroke = line_colour(line.colour)
-        return f'<path d="{self.path(x, y)}" fill="none" stroke="{stroke}" stroke-width="1.1"/>'
+        stroke, dash = line_colour(line.colour), ' stroke-dasharray="2 4"' if line.dotted else ""
+        return f'<path d="{self.path(x, y)}" fill="none" stroke="{stroke}" stroke-width="1.1"{dash}/>'
 
-    def axes(self, x: str, y: str, *, grid: bool = True) -> str:
+    def band(self, line: ChartLine, limits: tuple[float, float]) -> str:
+        """Draw the pale band behind a line."""
+        low, high = (_columns(ChartLine(line.x, edge), limits) for edge in line.band or ())
+        x, y = np.concatenate([low[0], high[0][::-1]]), np.concatenate([low[1], high[1][::-1]])
+        return f'<path d="{self.path(x, y)}Z" fill="{line_colour(line.colour)}" fill-opacity="0.2"/>'
+
+    def span(self, low: float, high: float, colour: str) -> str:
+        """Shade a part of the x axis."""
+        left, right = (float(self.across(end)) for end in (low, high))
+        place = f'x="{left:.1f}" y="{self.top}" width="{max(right - left, 2.0):.1f}" height="{self.height}"'
+        return f'<rect {place} fill="{colour}" fill-opacity="0.5"/>'
+
+    def axes(self, x: str, y: str, *, grid: bool = True, dates: bool = False) -> str:
         bottom, right = self.top + self.height, self.left + self.width
         n = max(3, round(self.height / 45))
         values = _decades(*self.y, self.height / 16) if self.logarithmic else _ticks(*self.y, n)
@@ -379,11 +393,11 @@ class _Panel:
             parts.append(
                 f'{line}<text x="{self.left - 6}" y="{at + 3.5:.1f}" text-anchor="end">{_number(value)}</text>'
             )
-        for value in _ticks(*self.x, 8):
-            at = float(self.across(value))
+        for value in _days(*self.x) if dates else _ticks(*self.x, 8):
+            at, text = float(self.across(value)), str(np.datetime64(int(value), "D")) if dates else _number(value)
             parts.append(
                 f'<path d="M{at:.1f} {bottom}v4" stroke="currentColor" stroke-opacity="0.5"/>'
-                f'<text x="{at:.1f}" y="{bottom + 15}" text-anchor="middle">{_number(value)}</text>'
+                f'<text x="{at:.1f}" y="{bottom + 15}" text-anchor="middle">{text}</text>'
             )
         middle, x, y = self.top + self.height / 2, escape(style.cut(x, 90)), escape(style.cut(y, 40))
         return (
@@ -482,6 +496,12 @@ def _ticks(low: float, high: float, n: int) -> list[float]:
     return [k * step for k in range(ceil(low / step - 1e-9), floor(high / step + 1e-9) + 1)]
 
 
+def _days(low: float, high: float) -> list[float]:
+    """Return up to six days at equal distances, whole ones."""
+    first, last = ceil(low), floor(high)
+    return [float(day) for day in range(first, last + 1, max(ceil((last - first) / 5), 1))]
+
+
 def _decades(low: float, high: float, n_max: float = 8) -> list[float]:
     """Return round numbers of a logarithmic axis: powers of ten, and two between each as far as there is room."""
     steps = [m * 10.0**k for k in range(floor(log10(low)), ceil(log10(high)) + 1) for m in (1, 2, 5)]
@@ -510,82 +530,69 @@ def _svg(width: float, height: float, parts: Sequence[str], *, ink: str = "") ->
 
 
 # --------------------
-# An indicator over months with its limits: a fleet's report holds many.
+# An indicator over months, load or speed with its limits: a fleet's report holds many.
 # --------------------
 
 
 N_SHOWN = 1500
-"""Recordings that are drawn, the latest: more than there are columns."""
-
-LEVEL_COLOURS = {"ok": style.MEASURED, "warning": style.SIMULATED, "alarm": style.FAULT}
+"""Recordings that are drawn over time, the latest: more than there are columns."""
 
 
-def fleet_trend_picture(trend: Trend) -> Picture:
-    """Draw values, expected value, limits and baseline of a trend over its dates.
+def trend_panel(trend: Trend | OperatingTrend) -> tuple[LinePanel, list[tuple[float, float]]]:
+    """Return an indicator in the band of its limits, over dates, load or speed, and its points beyond them.
 
     On a logarithmic axis where all values are above zero: a rise is then as high wherever it begins.
+
+    Parameters
+    ----------
+    trend : Trend or OperatingTrend
     """
-    table = trend.table.tail(N_SHOWN)
-    days = table["date"].to_numpy("datetime64[s]").astype(np.float64) / 86400.0
-    values, expected, high, alarm = (
-        table[name].to_numpy(np.float64) for name in ("value", "expected", "high", "alarm")
+    if isinstance(trend, Trend):
+        table = limits = trend.table.tail(N_SHOWN)
+        at = along = table["date"].to_numpy("datetime64[s]").astype(np.float64) / 86400.0
+        series, value, x, margin = trend, table["value"].to_numpy(np.float64), "date", 0.5
+        lines = [ChartLine(at, value, series.name)]
+    else:
+        series, table, limits = trend.trend, trend.table, trend.curve
+        at, along = table.iloc[:, 0].to_numpy(np.float64), limits.iloc[:, 0].to_numpy(np.float64)
+        value, margin = table["adjusted"].to_numpy(np.float64), 1e-3 * float(at.max())
+        x = "load (N·m)" if trend.over == "load" else "speed (rpm)"
+        is_baseline = (table["level"] == "baseline").to_numpy()
+        lines = [
+            ChartLine(at[chosen], value[chosen], words, colour, dots=True)
+            for chosen, words, colour in ((is_baseline, "baseline", 2), (~is_baseline, series.name, 0))
+            if chosen.any()
+        ]
+    expected, low, high, alarm = (limits[name].to_numpy(np.float64) for name in ("expected", "low", "high", "alarm"))
+    known = np.isfinite(high)
+    shown = np.concatenate([value[np.isfinite(value)], expected[known], high[known]])
+    is_log = bool((shown > 0.0).all())
+    ends = _trend_range(shown, is_log=is_log)
+    if known.any():
+        band = np.where(np.isfinite(low), np.maximum(low, ends[0]), ends[0])[known], high[known]
+        lines = [ChartLine(along[known], expected[known], "expected, within its limits", -1, band=band), *lines]
+    if np.isfinite(alarm).any():
+        lines = [*lines, ChartLine(along, alarm, "alarm", 1, dotted=True)]
+    beyond = table["level"].isin(["warning", "alarm"]).to_numpy() & np.isfinite(value)
+    first, last = float(min(at.min(), along.min())), float(max(at.max(), along.max()))
+    margin = max(0.02 * (last - first), margin)
+    baseline, cursors = at[:0], []
+    if isinstance(trend, Trend):
+        baseline = at[table["in_baseline"].to_numpy(np.bool_)]
+        changed = np.nan if trend.changed is None else np.datetime64(trend.changed, "s").astype(np.float64) / 86400.0
+        cursors = [Cursor(float(changed), "finding", "changed", 0)] if first <= changed <= last else []
+    panel = LinePanel(
+        lines,
+        x,
+        style.with_unit(series.name, series.unit),
+        ends,
+        is_log,
+        cursors,
+        x_limits=(first - margin, last + margin),
+        spans=[(float(baseline[0]), float(baseline[-1]), style.RULE)] if len(baseline) else (),
+        dates=isinstance(trend, Trend),
     )
-    shown = np.concatenate([values, *(part[np.isfinite(part)] for part in (expected, high))])
-    is_log = bool(values.min() > 0)
-    low_x, high_x = days.min(), max(days.max(), days.min() + 1e-3)
-    frame = _Panel(64, 10, 824, 154, (low_x, high_x), _trend_range(shown, is_log=is_log), is_log)
-    left, right, bottom = frame.left, frame.left + frame.width, frame.top + frame.height
-
-    def line(y: FloatArray, colour: str, more: str = "") -> str:
-        known = np.isfinite(y)
-        return f'<path d="{frame.path(days[known], y[known])}" fill="none" stroke="{colour}" {more}/>'
-
-    parts = []
-    baseline = days[table["in_baseline"].to_numpy(np.bool_)]
-    if len(baseline):
-        a, b = frame.across(baseline[[0, -1]])
-        parts.append(
-            f'<rect x="{a:.1f}" y="{frame.top}" width="{max(b - a, 2):.1f}" height="{frame.height}" '
-            f'fill="{style.RULE}" fill-opacity="0.5"/>'
-        )
-    for tick in _trend_ticks(*frame.y, is_log=is_log):
-        y = float(frame.up(tick))
-        parts.append(f'<path d="M{left} {y:.1f}H{right}" stroke="{style.RULE}"/>')
-        parts.append(_text(left - 6, y + 4, readable(tick, 3), "end"))
-    parts += [
-        line(expected, style.QUIET, 'stroke-dasharray="2 4"'),
-        line(high, style.SIMULATED, 'stroke-dasharray="6 3"'),
-        line(alarm, style.FAULT, 'stroke-dasharray="6 3"') if np.nanmin(alarm, initial=np.inf) <= frame.y[1] else "",
-        line(values, style.MEASURED, 'stroke-width="1.2"'),
-    ]
-    for x, y, level in zip(frame.across(days), frame.up(values), table["level"], strict=True):
-        if level != "ok":
-            parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3" fill="{LEVEL_COLOURS[level]}"/>')
-    if trend.changed is not None:
-        moment = np.datetime64(trend.changed, "s").astype(np.float64) / 86400.0
-        if low_x <= moment <= high_x:
-            x = float(frame.across(moment))
-            parts.append(f'<path d="M{x:.1f} {frame.top}V{bottom}" stroke="{style.INK}" stroke-dasharray="1 3"/>')
-    first, last = (f"{date:%Y-%m-%d}" for date in (table["date"].iloc[0], table["date"].iloc[-1]))
-    parts += [_text(left, bottom + 18, first, "start"), _text(right, bottom + 18, last, "end")]
-    width, height = 900, 190
-    drawing = (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" height="{height}" '
-        f'font-family="sans-serif" font-size="12"><rect width="100%" height="100%" fill="#fff"/>{"".join(parts)}</svg>'
-    )
-    unit = f" in {unit_text(trend.unit)}" if trend.unit else ""
-    of = ", ".join(part for part in (trend.place, trend.channel, trend.computed_on, trend.band) if part)
-    return Picture(
-        "data:image/svg+xml;base64," + b64encode(drawing.encode()).decode("ascii"),
-        width,
-        height,
-        f"{trend.name}{unit} ({of}). Dotted: expected; dashed: limits ({trend.basis}); grey: baseline.",
-        f"{trend.name} of {trend.machine} {trend.point} from {first} to {last}: {trend.level}.",
-    )
-
-
-def _text(x: float, y: float, text: str, anchor: str) -> str:
-    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{style.QUIET}">{escape(text)}</text>'
+    return panel, list(zip(at[beyond].tolist(), value[beyond].tolist(), strict=True))
 
 
 def _trend_range(shown: FloatArray, *, is_log: bool) -> tuple[float, float]:
@@ -594,9 +601,3 @@ def _trend_range(shown: FloatArray, *, is_log: bool) -> tuple[float, float]:
         return low / 1.15, high * 1.15
     margin = 0.08 * (high - low) or 0.1 * abs(high) or 1.0
     return low - margin, high + margin
-
-
-def _trend_ticks(low: float, high: float, *, is_log: bool) -> list[float]:
-    """Return three to six round numbers."""
-    ticks = _decades(low, high) if is_log and high > 8 * low else _ticks(low, high, 5)
-    return [tick for tick in ticks if low <= tick <= high]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import isfinite
 from typing import TYPE_CHECKING, get_args
 
@@ -15,7 +16,7 @@ from gearsig.errors import InputError
 from gearsig.formatting import axis_unit, unit_text
 from gearsig.plot import _style as style
 from gearsig.plot._cursors import ROW_IN, Cursor, draw, n_rows, place
-from gearsig.plot._panels import UNDER_A_LINE, ChartLine, LinePanel
+from gearsig.plot._panels import UNDER_A_LINE, ChartLine, LinePanel, panels_figure
 from gearsig.plot._style import N_POINTS, Scale, above_zero, decibel_text, decibels, envelope, plain, thin, with_unit
 from gearsig.recording import Recording
 from gearsig.spectra import Scaling, Spectrum
@@ -228,12 +229,9 @@ def speed_figure(shaft_angle: ShaftAngle) -> Figure:
     -------
     Figure
     """
-    figure, (axes,) = style.panels((1.4,), top_in=0.35)
-    panel = speed_panel(shaft_angle)
-    axes.plot(*thin(panel.lines[0].x, panel.lines[0].y), color=style.MEASURED, linewidth=1.2)
-    axes.set(xlim=panel.x_limits, ylim=panel.limits)
     name = f"speed of {shaft_angle.shaft}" if shaft_angle.shaft else "shaft speed"
-    style.label_axes(axes, panel.x, panel.y, name)
+    figure = panels_figure([replace(speed_panel(shaft_angle), title=name)], height_in=1.4)
+    (axes,) = figure.axes
     uncertainty = shaft_angle.relative_speed_uncertainty
     known = f", mean ± {100 * uncertainty:.2g} %" if isfinite(uncertainty) else ""
     style.note(axes, METHODS[shaft_angle.method] + known)

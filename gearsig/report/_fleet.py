@@ -10,9 +10,9 @@ from typing import Any
 from gearsig import __version__
 from gearsig.cache import write_text
 from gearsig.errors import InputError
-from gearsig.fleet import AlarmChange, Fleet, FleetChanges, change_text, counts_text, fleet_changes, trends_text
+from gearsig.fleet import AlarmChange, Fleet, FleetChanges, Trend, change_text, counts_text, fleet_changes, trends_text
 from gearsig.formatting import moment_text, readable, unit_text
-from gearsig.plot import Picture, fleet_trend_picture
+from gearsig.plot import Picture, svg_panel, trend_panel
 from gearsig.report._files import compiled, date_text, render, write_pdf
 
 LEVEL_CLASSES = {"alarm": "fault", "warning": "suspicion", "unknown": "cannot-tell", "ok": "no-fault"}
@@ -116,7 +116,7 @@ def _row(change: AlarmChange) -> dict[str, str]:
 def _shift(row: Mapping[Any, Any]) -> dict[str, str]:
     return {
         **_series(row),
-        "since": moment_text(row['changed']),
+        "since": moment_text(row["changed"]),
         "by": change_text(row["changed_by"], in_db=bool(row["in_db"])),
     }
 
@@ -140,5 +140,17 @@ def _pictures(fleet: Fleet, raised: Sequence[AlarmChange]) -> list[tuple[str, Pi
         except InputError:  # a file was set aside meanwhile
             continue
         heading = " · ".join(part for part in (change.machine, change.point) if part)
-        result.append((heading, fleet_trend_picture(trends[0])))
+        result.append((heading, _picture(trends[0])))
     return result
+
+
+def _picture(trend: Trend) -> Picture:
+    panel, marked = trend_panel(trend)
+    of = ", ".join(part for part in (trend.place, trend.channel, trend.computed_on, trend.band) if part)
+    first, last = (f"{date:%Y-%m-%d}" for date in (trend.table["date"].iloc[0], trend.table["date"].iloc[-1]))
+    return Picture.of_svg(
+        svg_panel(panel, marked=marked, width=900, height=154),
+        f"{trend.name} ({of}). Pale band: within the limits ({trend.basis}); dotted: alarm; grey: baseline; circled: "
+        "beyond the limits.",
+        f"{trend.name} of {trend.machine} {trend.point} from {first} to {last}: {trend.level}.",
+    )

@@ -552,15 +552,16 @@ def _evidence(report: GapReport) -> Iterator[GapFigure]:
     for cause in detailed_causes(report):
         evidence = [item for item in cause.evidence if is_finite(item)]
         if evidence:
+            panel = plot.gap_evidence_panel(evidence)
             yield GapFigure(
                 "which",
-                plot.gap_evidence_figure(evidence),
+                plot.rows_figure(panel),
                 "Where a bar ends at its diamond, the effect explains sign and size; “further” marks one that went the "
                 "predicted way, but beyond. Grey: what a healthy machine may change by.",
                 f"Predicted and observed changes of the features of {cause.title}.",
                 of=cause.name,
                 vector=True,
-                data=plot.gap_evidence_panel(evidence),
+                data=panel,
             )
 
 
@@ -568,13 +569,14 @@ def _waterfall(report: GapReport) -> Iterator[GapFigure]:
     if len(report.steps) > 1 and all(is_finite(step) for step in report.steps):
         shrinkage = report.causes[0].shrinkage if report.causes else None
         held_out = shrinkage.held_out if shrinkage is not None else ""
+        panel = plot.gap_waterfall_panel(report.steps, held_out=held_out)
         yield GapFigure(
             "how far",
-            plot.gap_waterfall_figure(report.steps, held_out=held_out),
+            plot.rows_figure(panel),
             "What each effect takes away. Within the shaded structural floor there is nothing left to explain.",
             "The gap before, what each added effect takes away, and what is left.",
             vector=True,
-            data=plot.gap_waterfall_panel(report.steps, held_out=held_out),
+            data=panel,
         )
 
 

@@ -131,8 +131,8 @@ def test_the_form_of_the_machine_makes_the_rig_of_its_file() -> None:
     page = opened(tab="Machine")
     assert not [b for b in page.button if b.label.startswith("Analyse")]
     next(w for w in page.main.selectbox if w.label == "Speed from").set_value("constant").run()
-    next(w for w in page.number_input if w.label == "Speed (rpm)").set_value(1497.0).run()
     press(page, "Analyse with this machine")
+    labelled(page, "number_input", "Constant speed (rpm)").set_value(1497.0).run()
     assert not page.error
     page.session_state[state.TAB] = "Speed"
     assert "from tachometer pulses" not in shown_text(page.run())
@@ -244,9 +244,21 @@ def test_a_shaft_without_a_name_and_a_mark_is_explained() -> None:
 
 
 def test_a_speed_that_nobody_stated_is_not_made_up() -> None:
-    page = opened_file("a.csv.gz", SAMPLES["damaged_tooth"].recording.read_bytes(), tab="Machine")
-    labelled(page, "selectbox", "Speed from").set_value("constant").run()
+    content = SAMPLES["damaged_tooth"].recording.read_bytes()
+    page = opened_file("a.csv.gz", content, '[speed]\nsource = "constant"\n', tab="Machine")
     assert "Speed (rpm) must be given" in shown_text(page)
+    assert labelled(page, "number_input", "Constant speed (rpm)").value is None
+
+
+def test_a_speed_is_stated_in_one_place_of_the_form() -> None:
+    """What measures it takes the place of a constant one that was stated, and that of one in the rig file."""
+    page = opened_file("a.csv.gz", SAMPLES["damaged_tooth"].recording.read_bytes(), tab="Machine")
+    assert labelled(page, "selectbox", "Speed from").value == "constant"
+    labelled(page, "number_input", "Constant speed (rpm)").set_value(1497.0).run()
+    assert page.session_state["chosen"].request.speed_rpm == 1497.0
+    labelled(page, "selectbox", "Speed from").set_value("tachometer").run()
+    assert page.session_state["chosen"].request.speed_rpm is None
+    assert not [field for field in page.main.number_input if field.label == "Constant speed (rpm)"]
 
 
 def test_a_machine_without_a_name_is_described_all_the_same() -> None:

@@ -13,12 +13,10 @@ import pytest
 from streamlit.testing.v1 import AppTest
 
 from app.dashboard import state
-from app.dashboard.widgets import crack
 from app.dashboard.widgets.method import OVER_TIME, table_csv, waveforms_file
 from gearsig.methods import METHODS, TRANSFORMS, Waveforms, by_centre
 from gearsig.recording import read_recording
 from tests.app.pages import (
-    SAMPLES,
     choose,
     curves,
     figures,
@@ -173,7 +171,7 @@ def test_the_depth_of_a_crack_against_the_healthy_sample_at_the_torque_that_is_s
     page = opened_at("Crack severity", "root_crack_3mm")
     next(w for w in page.sidebar.selectbox if w.label.startswith("Compared")).set_value("None").run()
     assert "give a reference" in shown_text(page)
-    choose(page, "Reference", "Sample")
+    next(w for w in page.sidebar.selectbox if w.label.startswith("Compared")).set_value("No crack").run()
     assert len(page.error) == 1
     at_110 = page.error[0].value
     assert "tooth 21" in at_110
@@ -432,20 +430,6 @@ def test_wavelet_packets_share_the_energy_and_add_up_to_the_signal() -> None:
     np.testing.assert_allclose(whole, shown["signal"], atol=1e-9)
     labelled(page, "multiselect", "Waveform of the nodes").set_value(["99"]).run()
     assert len(page.error) == 1
-
-
-def test_the_reference_may_be_an_own_file_of_a_rate_that_is_stated(monkeypatch: pytest.MonkeyPatch) -> None:
-    page = choose(opened_at("Crack severity", "root_crack_3mm"), "Reference", "Own file")
-    healthy = SAMPLES["root_crack_0mm"].recording
-    uploader = next(w for w in page.file_uploader if w.label == "Recording of the healthy gears")
-    uploader.upload(healthy.name, healthy.read_bytes())
-    page.run()
-    assert "tooth 21" in page.error[0].value
-    asked = []
-    read = crack.recorded
-    monkeypatch.setattr(crack, "recorded", lambda request, *more: asked.append(request) or read(request, *more))
-    labelled(page, "number_input", "Its sampling rate (Hz)").set_value(20480.0).run()
-    assert [request.sampling_rate_hz for request in asked] == [20480.0]
 
 
 @pytest.mark.slow

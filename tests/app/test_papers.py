@@ -7,7 +7,7 @@ import pytest
 
 from app.papers import Paper, PaperFigure, judged, paper, within_part, write_paper
 from gearsig.errors import InputError
-from gearsig.plot import CurvePanel, curves_figure
+from gearsig.plot import curve_panel, panels_figure
 from sims.fe_gear import (
     CyclicGear,
     GearBlank,
@@ -34,8 +34,8 @@ def test_a_number_is_judged_by_how_far_it_lies_from_the_published_one(found: flo
 
 
 def test_the_page_and_the_table_hold_every_statement(tmp_path) -> None:
-    panel = CurvePanel(np.arange(5.0), {"one": np.arange(5.0), "two": np.arange(5.0) ** 2}, "x", "y", "title")
-    figure = curves_figure([panel, panel], n_columns=2, title="two panels")
+    panel = curve_panel(np.arange(5.0), {"one": np.arange(5.0), "two": np.arange(5.0) ** 2}, "x", "y", "title")
+    figure = panels_figure([panel, panel], n_columns=2, title="two panels")
     claims = (
         judged("<b>it grows</b>", "by 2", agrees=True),
         judged("it falls", "no", agrees=False, because="it grows"),
@@ -55,7 +55,7 @@ def test_the_page_and_the_table_hold_every_statement(tmp_path) -> None:
 
 def test_curves_of_unlike_lengths_and_unknown_papers_are_refused() -> None:
     with pytest.raises(InputError, match="points"):
-        curves_figure([CurvePanel(np.arange(5.0), {"one": np.arange(4.0)})])
+        panels_figure([curve_panel(np.arange(5.0), {"one": np.arange(4.0)})])
     with pytest.raises(InputError, match="forging"):
         paper("forgin")
 

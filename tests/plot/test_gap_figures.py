@@ -14,13 +14,12 @@ from gearsig.plot import (
     OUTER,
     AngleMark,
     gap_averages_figure,
-    gap_evidence_figure,
     gap_evidence_panel,
     gap_lines_figure,
     gap_orders_figure,
     gap_teeth_figure,
-    gap_waterfall_figure,
     gap_waterfall_panel,
+    rows_figure,
 )
 from tests.gap.example_report import effect_report, gearless_report
 
@@ -62,8 +61,8 @@ def bars(figure: "Figure") -> list[float]:
 
 
 MADE: dict[str, Callable[[], Any]] = {
-    "waterfall": lambda: gap_waterfall_figure(REPORT.steps, held_out="another operating condition", title="How far"),
-    "evidence": lambda: gap_evidence_figure(REPORT.causes[0].evidence, title="Predicted against observed"),
+    "waterfall": lambda: rows_figure(gap_waterfall_panel(REPORT.steps, held_out="another operating condition")),
+    "evidence": lambda: rows_figure(gap_evidence_panel(REPORT.causes[0].evidence)),
     "averages": lambda: gap_averages_figure(REPORT.averages[0], mark=AngleMark(134.2, "tooth 21")),
     "orders": lambda: gap_orders_figure(REPORT.spectra[0]),
     "lines": lambda: gap_lines_figure(gearless_report().spectra[0], 3.21),
@@ -77,11 +76,11 @@ def test_nothing_is_cut(name: str) -> None:
 
 
 def test_the_waterfall_goes_from_before_to_what_is_left() -> None:
-    figure = gap_waterfall_figure(REPORT.steps)
+    figure = rows_figure(gap_waterfall_panel(REPORT.steps))
     lengths = bars(figure)[-4:]  # the floor's shading comes first
     assert lengths == pytest.approx([7.9, 2.3, 4.0, 1.6])
     assert {"what is left", "−2.3", "−71 % of the gap", "1.2 to 2.1"} <= set(texts(figure))
-    grown = gap_waterfall_figure((GapStep("a", Interval(1, 1, 1)), GapStep("b", Interval(1.5, 1, 2))))
+    grown = rows_figure(gap_waterfall_panel((GapStep("a", Interval(1, 1, 1)), GapStep("b", Interval(1.5, 1, 2)))))
     assert "+0.5" in texts(grown)
     assert "+50 % of the gap" in texts(grown)
 
@@ -99,9 +98,9 @@ def test_panels_say_what_the_figures_draw() -> None:
 
 
 def test_evidence_stands_beside_its_prediction() -> None:
-    figure = gap_evidence_figure(REPORT.causes[0].evidence)
+    figure = rows_figure(gap_evidence_panel(REPORT.causes[0].evidence))
     axes = figure.axes[0]
-    diamonds = [float(np.asarray(line.get_xdata())[0]) for line in axes.lines if line.get_marker() == "D"]
+    (diamonds,) = (list(np.asarray(line.get_xdata())) for line in axes.lines if line.get_marker() == "D")
     assert diamonds == pytest.approx([one.predicted_db for one in REPORT.causes[0].evidence])
     assert [t for t in texts(figure) if t in STANCES] == ["for", "for", "for", "further", "against"]
 
@@ -172,7 +171,7 @@ def test_the_polar_picture_is_in_decibels_from_the_median_tooth() -> None:
 
 
 def test_nothing_to_draw_is_an_error() -> None:
-    for draw in (gap_waterfall_figure, gap_evidence_figure):
+    for draw in (gap_waterfall_panel, gap_evidence_panel):
         with pytest.raises(InputError):
             draw([])
     with pytest.raises(InputError, match="points"):

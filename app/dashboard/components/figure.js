@@ -395,10 +395,10 @@ class Figure {
     this.words.replaceChildren();
     if (this.at === null) return;
     const near = 0.004 * (this.view[1] - this.view[0]), value = this.highest(this.at - near, this.at + near);
-    const say = [this.named(this.at)];
+    const [factor, unit] = this.data.per_unit ?? [0, ""];
+    const say = [this.named(this.at) + (factor ? ` (${measure(this.at * factor, unit)})` : "")];
     if (value) say.push(`${figure(value[1])} ${this.data.y_unit}`);
     if (this.tool === "sidebands") say.push(`sidebands every ${figure(this.step)} ${this.data.x_unit}`);
-    if (this.data.per_unit) say.push(measure(this.at * this.data.per_unit[0], this.data.per_unit[1]));
     this.words.textContent = `${TOOLS[this.tool]}: ${say.join(" · ")}`;
   }
 
@@ -656,14 +656,6 @@ function wrapped(words, n, mostLines) {
 }
 
 const cut = (words, n) => (words.length <= n ? words : `${words.slice(0, Math.max(Math.floor(n) - 1, 1))}…`);
-
-function bytes(packed) {
-  return Uint8Array.from(atob(packed ?? ""), (letter) => letter.charCodeAt(0));
-}
-
-function numbers(packed) {
-  return new Float64Array(bytes(packed).buffer);
-}
 
 function lowerBound(x, value) {
   let low = 0, high = x.length;

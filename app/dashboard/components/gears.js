@@ -189,7 +189,3 @@ function value({ x }, y, at) {
   }
   return y[low];
 }
-
-function numbers(packed) {
-  return new Float64Array(Uint8Array.from(atob(packed), (letter) => letter.charCodeAt(0)).buffer);
-}

@@ -33,7 +33,7 @@ class Picture {
   update(data) {
     const isNew = this.data?.svg !== data.svg;
     this.data = data;
-    this.curves = data.ring?.curves.map(({ name, values }) => [name, new Float64Array(Uint8Array.from(atob(values), (letter) => letter.charCodeAt(0)).buffer)]);
+    this.curves = data.ring?.curves.map(({ name, values }) => [name, numbers(values)]);
     this.image.classList.toggle("turned", data.turned);
     this.frame.setAttribute("aria-label", data.words);
     if (isNew) {

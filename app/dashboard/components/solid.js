@@ -131,7 +131,3 @@ class Solid {
     return `rgb(${part(0)},${part(1)},${part(2)})`;
   }
 }
-
-function numbers(packed) {
-  return new Float64Array(Uint8Array.from(atob(packed), (letter) => letter.charCodeAt(0)).buffer);
-}

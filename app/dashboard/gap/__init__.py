@@ -620,5 +620,6 @@ def show() -> None:
             show_checks((True, text) for text in (set_alike(choice) if choice.recordings else ()))
         return
     if finished.key != choice.key:
-        st.info("This is the answer to what was chosen before. Diagnose again for what is chosen now.")
+        now = "Diagnose again for what is chosen now" if choice.recordings else "Give recordings on the left"
+        st.info(f"This is the answer to what was chosen before. {now}.")
     show_finished(finished)

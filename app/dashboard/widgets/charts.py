@@ -198,7 +198,6 @@ def show_lines(
     whole: tuple[float, float] | None = None,
     per_unit: tuple[float, str] | None = None,
     step: float | None = None,
-    dates: bool = False,
     front_first: bool = False,
     log_x: bool = False,
 ) -> None:
@@ -222,8 +221,6 @@ def show_lines(
         What one unit of the x axis is in another unit, for the readout of cursors.
     step : float or None
         Distance of the sidebands that are offered first.
-    dates : bool
-        Whether x is days since 1970.
     front_first : bool
         Name the line in front first: where later lines lie behind earlier ones to be seen.
     log_x : bool
@@ -233,10 +230,12 @@ def show_lines(
     limits = panel.x_limits or (min(float(line.x.min()) for line in lines), max(float(line.x.max()) for line in lines))
     ends = whole or limits
     shown = zoomed_range(key, ends, limits)
-    data = _described(panel, key, shown, ends, height_px, has_tools=not is_plane) | {
+    data = _described(panel.x, panel.y, key, shown, ends, height_px) | {
+        "has_tools": height_px >= 200 and not is_plane,
+        "log": panel.logarithmic,
         "lines": [_sent(line, None if is_plane else shown, alone=len(lines) == 1) for line in lines],
         "cursors": _cursor_rows(panel.cursors, palette(), lines[-1] if lines and not is_plane else None, shown),
-        "dates": dates,
+        "dates": panel.dates,
         "marked": [[float(x), float(y)] for x, y in marked],
         "legend": legend,
         "front_first": front_first,
@@ -292,7 +291,8 @@ def show_map(
     shades = np.clip(255 * (pooled - low) / (high - low), float(is_blank.any()), 255)
     levels = np.where(is_blank, 0, shades).astype(np.uint8)
     first, last = float(x[start] - half), float(x[min(stop, len(x)) - 1] + half)
-    data = _described(panel, key, span, ends, height_px) | {
+    data = _described(panel.x, panel.y, key, span, ends, height_px) | {
+        "log": panel.logarithmic,
         "lines": [_sent(line, span) for line in panel.lines],
         "cursors": _cursor_rows(panel.cursors, palette()),
         "marked": [],
@@ -352,7 +352,9 @@ def show_rows(panel: RowPanel, key: str, words: str, *, has_names_above: bool = 
         }
         for row in panel.rows
     ]
-    data = {
+    data = _described(panel.x, "", key, shown, whole) | {
+        "x_unit": re.split("[,;]", _unit_of(panel.x))[0],
+        "alternative": one_line(words),
         "rows": rows,
         "above": has_names_above,
         "span": panel.span,
@@ -364,39 +366,26 @@ def show_rows(panel: RowPanel, key: str, words: str, *, has_names_above: bool = 
         "lines": [],
         "cursors": [],
         "marked": [],
-        "x": one_line(panel.x),
-        "y": "",
-        "x_unit": re.split("[,;]", _unit_of(panel.x))[0],
-        "shown": list(shown),
-        "whole": list(whole),
-        "name": file_stem(key),
-        "alternative": one_line(words),
     }
     _figure(key=key, data=data, on_range_change=partial(_take_zoom, key), default={"range": None})
 
 
 def _described(
-    panel: LinePanel | LevelPanel,
-    key: str,
-    shown: tuple[float, float],
-    whole: tuple[float, float],
-    height_px: int,
-    *,
-    has_tools: bool = True,
+    x: str, y: str, key: str, shown: tuple[float, float], whole: tuple[float, float], height_px: int = 0
 ) -> dict[str, object]:
+    """Return what the component is told of every figure; one that is tall enough has tools."""
     return {
-        "x": one_line(panel.x),
-        "y": one_line(panel.y),
-        "x_unit": _unit_of(panel.x),
-        "y_unit": _unit_of(panel.y),
-        "log": panel.logarithmic,
+        "x": one_line(x),
+        "y": one_line(y),
+        "x_unit": _unit_of(x),
+        "y_unit": _unit_of(y),
         "shown": list(shown),
         "whole": list(whole),
         "height": height_px,
         "fault": palette().fault,
-        "alternative": one_line(f"{panel.y} over {panel.x}"),
+        "alternative": one_line(f"{y} over {x}"),
         "name": file_stem(key),
-        "has_tools": height_px >= 200 and has_tools,
+        "has_tools": height_px >= 200,
     }
 
 

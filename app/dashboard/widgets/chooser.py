@@ -34,7 +34,7 @@ def sample_file(sample: SampleRecording) -> ChosenFile:
     return ChosenFile(path.name, sha256_of(path), path, rig.name, rig.read_text("utf-8"))
 
 
-def choose_sample(label: str, key: str, *, first: str = "", without: str = "", name: str = "") -> ChosenFile:
+def choose_sample(label: str, key: str, *, first: str = "", name: str = "") -> ChosenFile:
     """Let the user choose a sample.
 
     Parameters
@@ -43,12 +43,10 @@ def choose_sample(label: str, key: str, *, first: str = "", without: str = "", n
         Of the widget.
     first : str
         Stem of the sample that is chosen at first.
-    without : str
-        Name of a recording that is not offered.
     name : str
         In the address; empty where it is kept up elsewhere.
     """
-    offered = [sample for sample in samples() if sample.recording.name != without]
+    offered = samples()
     at_first = next((sample for sample in offered if sample.rig.stem == first), offered[0])
     if name:
         address.begin(key, name, at_first, address.one_of({sample.rig.stem: sample for sample in offered}))

@@ -9,9 +9,7 @@ import numpy as np
 import streamlit as st
 
 from app.dashboard import state
-from app.dashboard.cached import recorded
 from app.dashboard.widgets.charts import show_figure, show_lines
-from app.dashboard.widgets.chooser import choose_file, choose_reference_rate, choose_sample
 from app.dashboard.widgets.method import MethodPage, cached
 from app.dashboard.widgets.texts import as_typed, show_error, show_facts, show_table
 from gearsig.angle import find_shaft_angle, resample_to_angle
@@ -27,7 +25,6 @@ from gearsig.severity import CrackEstimate, NoCrackSeen, ToothSearch, estimate_c
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-NONE, FILE, SAMPLE, SIDEBAR = "None", "Own file", "Sample", "As in the sidebar"
 severity = cached(8, "Looking at every tooth …")(estimate_crack)
 
 
@@ -36,8 +33,8 @@ def show_crack(page: MethodPage) -> None:
     st.caption(
         "How deep a crack in a tooth root is, in mm with an interval; best beside a recording of the healthy gears."
     )
-    reference = _choose_reference(page)
-    recording = page.analysis.recording
+    recording, then = page.analysis.recording, page.analysis.reference
+    reference = None if then is None else then.recording
     channels: tuple[str, ...] = ()
     if sum(c.quantity == "acceleration" for c in recording.channels) > 1:
         which = {"All accelerations": False, "The chosen channel": True}
@@ -45,7 +42,10 @@ def show_crack(page: MethodPage) -> None:
     chosen = state.chosen()
     torque_nm = chosen.request.torque_nm if chosen is not None else None
     torque = _torque_text(page.analysis, torque_nm)
-    st.caption(f"Analysed: 0 to {recording.duration_s:.4g} s, the whole recording. {torque}.")
+    beside = "Without a reference only deep cracks show: choose the healthy machine in the sidebar"
+    if reference is not None:
+        beside = f"Beside {as_typed(reference.provenance.source)}"
+    st.caption(f"Analysed: 0 to {recording.duration_s:.4g} s, the whole recording. {torque}. {beside}.")
     try:
         estimate = severity(recording, reference=reference, torque_nm=torque_nm, channels=channels)
     except RefusalError as refusal:  # which is an answer, too
@@ -77,43 +77,6 @@ def _show_search(page: MethodPage, searched: Sequence[ToothSearch]) -> None:
             "How far each place stands out of the others, all bands and channels together. At the dotted level the "
             "clearest event of the gear would be seen as a crack; one above it that is unlike a crack gets no depth."
         )
-
-
-def _choose_reference(page: MethodPage) -> Recording | None:
-    """Let the user give a healthy recording; it is read with the rig and the numbers of the one that is analysed.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read.
-    """
-    analysis = page.analysis
-    about = "The same gears, sensors, speed and load when they were healthy. Without it only deep cracks show."
-    given = () if analysis.reference is None else (SIDEBAR,)
-    origin = page.choose(st, "Reference", (*given, NONE, FILE, SAMPLE), name="beside", about=about)
-    if origin == SIDEBAR and analysis.reference is not None:
-        return analysis.reference.recording
-    source, rate_hz = None, None
-    with st.container(width=460):
-        if origin == FILE:
-            about = "Read with the rig and the speed of the recording that is analysed."
-            source = choose_file("Recording of the healthy gears", page.key("reference file"), about=about)
-            if source is None:
-                st.caption("Without a reference until a file is given.")
-            else:
-                rate_hz = choose_reference_rate(page.key("reference rate"), name="beside_rate")
-        elif origin == SAMPLE:
-            label, without = "Sample of the healthy gears", analysis.recording.provenance.source
-            source = choose_sample(
-                label, page.key("reference sample"), first="root_crack_0mm", without=without, name="beside_sample"
-            )
-    if source is None:
-        return None
-    chosen = state.chosen()
-    speed_rpm = None
-    if chosen is not None:
-        rate_hz, speed_rpm = rate_hz or chosen.request.sampling_rate_hz, chosen.request.speed_rpm
-    return recorded(source.request(sampling_rate_hz=rate_hz, speed_rpm=speed_rpm), source.content, analysis.rig)
 
 
 def _torque_text(analysis: Analysis, stated_nm: float | None) -> str:

@@ -68,7 +68,7 @@ FACTS: dict[str, tuple[str, ...]] = {
 ABOUT = {
     "bearing": "A name of the catalogue; or number n, diameter d, pitch diameter D and contact angle α of the rolling "
     "elements; or the orders that its maker states, which go before both.",
-    "operating_point": "Guides the search for the true speed, and stands for it where neither a tachometer nor gears "
+    "operating_point": "Guides the search for the true speed; stands for it where neither a tachometer nor gears "
     "tell it: then within ± 6 %.",
     "machine": "For zones A to D of ISO 20816-3: rated power, or of a motor or generator its shaft height.",
 }
@@ -94,7 +94,6 @@ SHAFT_KEYS = ("shaft", "driver", "driven")
 EMPTY = {"speed_tolerance_percent": f"{OperatingPoint.speed_tolerance_percent:g}", "shaft": "reference shaft"}
 """What holds where a field is empty; elsewhere it is not known."""
 SPEED_SOURCES: dict[str, tuple[str, ...]] = {
-    "none": (),
     "constant": ("speed_rpm",),
     "tachometer": ("channel", "pulses_per_revolution"),
     "encoder": ("channel", "units_per_revolution"),
@@ -157,17 +156,15 @@ def show_machine(file: ChosenFile, channels: Sequence[str] = (), *, is_told: boo
         st.info(f"{problem}: mend it as text.", icon=":material/edit:")
         _show_text(file, text, is_open=True)
         return
-    is_unknown = not table.get("shaft")
-    if is_unknown:  # the speed alone says most, and takes one number
-        show_stated(file)
     with st.container(key="machine"):
+        speed = st.container(key="machine-speed")  # alone it says most, and takes one number
         first, follows = st.columns((5, 8), gap="medium")
-        edited = _form(file, table, text, channels, first)
+        edited = _form(file, table, text, channels, first, speed)
         with follows:
             _show_consequences(edited, shown_already=_rig_of(table) if is_told else None)
     described, changed = _rig_of(edited), text if edited == table else tomli_w.dumps(edited)
     if described != _rig_of(table) or (edited != table and isinstance(described, str)):
-        with st.container(horizontal=True):
+        with st.container(horizontal=True, key="take"):
             st.button(
                 "Analyse with this machine",
                 type="primary",
@@ -177,8 +174,6 @@ def show_machine(file: ChosenFile, channels: Sequence[str] = (), *, is_told: boo
                 disabled=isinstance(described, str),  # what is wrong stands beside the form
             )
             st.button("Discard", on_click=_take, args=(file, text))
-    if not is_unknown:
-        show_stated(file)
     _show_text(file, changed)
 
 
@@ -190,23 +185,18 @@ def _rig_of(table: Table) -> Rig | str:
         return str(error)
 
 
-def show_stated(file: ChosenFile) -> None:
-    """Ask for what the file does not state: sampling rate and a constant speed."""
-    left, right = st.columns(2)
-    for place, label, name, about in (
-        (left, "Sampling rate (Hz)", "rate", "Of files that do not state it; it overrides what the file says."),
-        (right, "Constant speed (rpm)", "speed", "Of the reference shaft, if it held still; refined by the signal."),
-    ):
-        place.number_input(
-            label,
-            value=stated(file, name),
-            placeholder="from the file or the machine",
-            format=NUMBER,
-            help=about,
-            key=state.source_key(f"asked {name}", file.sha256),
-            on_change=_state,
-            args=(file, name),
-        )
+def _ask_stated(place: DeltaGenerator, file: ChosenFile, label: str, name: str, about: str) -> None:
+    """Ask for a number that goes before what the file says; it holds as soon as it is typed."""
+    place.number_input(
+        label,
+        value=stated(file, name),
+        placeholder="from the file" if name == "rate" else "from the file or the signal",
+        format=NUMBER,
+        help=about,
+        key=state.source_key(f"asked {name}", file.sha256),
+        on_change=_state,
+        args=(file, name),
+    )
 
 
 def _state(file: ChosenFile, name: str) -> None:
@@ -214,6 +204,13 @@ def _state(file: ChosenFile, name: str) -> None:
         state.source_key(f"asked {name}", file.sha256)
     ]
     st.session_state[_CHANGED] = True
+
+
+def _forget_speed(file: ChosenFile) -> None:
+    """Take back a constant speed that was stated, in favour of what measures it."""
+    if stated(file, "speed") is not None:
+        st.session_state[state.source_key("asked speed", file.sha256)] = None
+        _state(file, "speed")
 
 
 def _key(file: ChosenFile) -> str:
@@ -260,10 +257,17 @@ def _fits_form(table: Table) -> bool:
     )
 
 
-def _form(file: ChosenFile, table: Table, text: str, channels: Sequence[str], first: DeltaGenerator) -> Table:
+def _form(
+    file: ChosenFile,
+    table: Table,
+    text: str,
+    channels: Sequence[str],
+    first: DeltaGenerator,
+    of_speed: DeltaGenerator,
+) -> Table:
     """Return the rig's table with what the form says; keys that the form does not show stay.
 
-    Name and shafts go into the place `first`, the wider tables below it.
+    Sampling rate and speed go into the place `of_speed`, name and shafts into `first`, the wider tables below both.
     """
     version = st.session_state.get(state.source_key("machine version", file.sha256), 0)
 
@@ -278,10 +282,11 @@ def _form(file: ChosenFile, table: Table, text: str, channels: Sequence[str], fi
             st.markdown(f"**{FORM_TABLES[kind]}**", help=ABOUT.get(kind))
             edited[kind] = _edit(kind, list(table.get(kind, [])), edited, key(kind), channels)
     shafts = _shafts(edited)
+    with of_speed:
+        speed = _edit_speed(file, dict(table.get("speed", {})), shafts, key, channels)
     with st.container(key="machine-facts"):
-        speed = _edit_speed(dict(table.get("speed", {})), shafts, key, channels)
         for kind, choices in (("operating_point", shafts), ("machine", MOUNTINGS)):
-            st.markdown(f"**{FORM_TABLES[kind]}**", help=ABOUT[kind])
+            st.markdown(f"**{FORM_TABLES[kind]}** :small[:gray[{ABOUT[kind]}]]")
             edited[kind] = _edit_facts(kind, dict(table.get(kind, {})), choices, key)
     edited = {name: value for name, value in edited.items() if value not in ([], {}) or table.get(name) == value}
     edited.pop("speed", None)
@@ -395,14 +400,27 @@ SPEED_NAMES = re.compile(r"tach|keyphas|trig|enc|speed|rpm", re.IGNORECASE)
 """What channels that tell a speed are usually called."""
 
 
-def _edit_speed(speed: Table, shafts: Sequence[str], key: Callable[[str], str], channels: Sequence[str]) -> Table:
-    source = str(speed.get("source", "none"))
-    columns = st.columns(4)
-    known = list(SPEED_SOURCES)
-    chosen = columns[0].selectbox("Speed from", known, known.index(source) if source in known else 0, key=key("speed"))
+def _edit_speed(
+    file: ChosenFile, speed: Table, shafts: Sequence[str], key: Callable[[str], str], channels: Sequence[str]
+) -> Table:
+    """Ask for the sampling rate and where the speed comes from, and return the table of the latter.
+
+    A constant speed that is typed here holds at once; one of the rig file, which may be of any shaft, is changed there.
+    """
+    row, known, source = st.columns(5), list(SPEED_SOURCES), str(speed.get("source", "none"))
+    about = "Of files that do not state it; it overrides what the file says."
+    _ask_stated(row[0], file, "Sampling rate (Hz)", "rate", about)
+    is_stated = stated(file, "speed") is not None
+    first = "constant" if is_stated or source not in known else source
+    looks: dict[str, Any] = {"key": key("speed"), "on_change": _forget_speed, "args": (file,)}
+    chosen = row[1].selectbox("Speed from", known, known.index(first), **looks)
+    if chosen == "constant" and (is_stated or source != chosen):
+        about = "Of the reference shaft, if it held still; refined by the signal. It overrides what the file says."
+        _ask_stated(row[2], file, "Constant speed (rpm)", "speed", about)
+        return speed if is_stated or source not in known else {}
     edited = dict(speed) if chosen == source else {}
     edited["source"] = chosen
-    for place, name in zip(columns[1:], SPEED_SOURCES[chosen], strict=False):
+    for place, name in zip(row[2:], SPEED_SOURCES[chosen], strict=False):
         if name == "channel":
             likely = sorted(channels, key=lambda channel: not SPEED_NAMES.search(channel))
             offered = list(dict.fromkeys([*([speed["channel"]] if "channel" in speed else []), *likely])) or ["tacho"]
@@ -411,9 +429,10 @@ def _edit_speed(speed: Table, shafts: Sequence[str], key: Callable[[str], str], 
         step = 1 if name == "pulses_per_revolution" else 0.1
         before = edited.get(name, DEFAULTS.get(name))
         value = place.number_input(
-            FORM_LABELS[name],
+            f"Constant {FORM_LABELS[name].lower()}" if chosen == "constant" else FORM_LABELS[name],
             value=None if before is None else type(step)(before),
             step=step,
+            format=NUMBER if step != 1 else None,
             placeholder="not known",
             key=key(f"speed {name}"),
         )
@@ -421,11 +440,9 @@ def _edit_speed(speed: Table, shafts: Sequence[str], key: Callable[[str], str], 
             edited.pop(name, None)
         elif value != before:
             edited[name] = value
-    if chosen != "none":
-        shaft = _choose(columns[3], "shaft", shafts, speed.get("shaft"), key("speed shaft"))
-        edited.pop("shaft", None)
-        edited |= {"shaft": shaft} if shaft is not None else {}
-    return {} if chosen == "none" and "source" not in speed else edited
+    shaft = _choose(row[4], "shaft", shafts, speed.get("shaft"), key("speed shaft"))
+    edited.pop("shaft", None)
+    return edited | ({"shaft": shaft} if shaft is not None else {})
 
 
 # --------------------

@@ -21,8 +21,8 @@ from app.dashboard.widgets.charts import (
 )
 from app.dashboard.widgets.texts import as_typed, capitalised
 from gearsig.checks import FloatArray
-from gearsig.diagnosis import Analysis, ChannelAnalysis
-from gearsig.formatting import readable, unit_text
+from gearsig.diagnosis import Analysis, CannotTell, ChannelAnalysis
+from gearsig.formatting import axis_unit, readable, unit_text
 from gearsig.orders import SynchronousAverage
 from gearsig.plot import (
     AngleMark,
@@ -40,7 +40,7 @@ from gearsig.plot import (
     value_limits,
     with_unit,
 )
-from gearsig.report import circled_text, verdict_picture, zero_text
+from gearsig.report import circled_text, speed_is_constant, verdict_picture, zero_text
 from gearsig.spectra import LARGEST_SLIP, Spectrum
 
 SCALES: dict[str, Scale] = {"Logarithmic": "log", "Linear": "linear", "dB": "decibel"}
@@ -65,7 +65,6 @@ def show_spectrum(
     shown: tuple[float, float] | None = None,
     scale: str = "Logarithmic",
     quantity: str = "",
-    per_unit: tuple[float, str] | None = None,
     plain: bool = False,
 ) -> tuple[float, float]:
     """Show spectra over each other and what can be changed about the view; return the segment that is shown.
@@ -90,8 +89,6 @@ def show_spectrum(
         Chosen at first, one of `SCALES`.
     quantity : str
         Name of the values; empty: by their scaling.
-    per_unit : (float, str) or None
-        Hz of an order, or orders of a Hz, with the name of that unit: for the readout of cursors.
     plain : bool
         The figure alone, beside a verdict.
     """
@@ -138,7 +135,7 @@ def show_spectrum(
         legend=bool(names),
         front_first=True,
         whole=whole,
-        per_unit=per_unit,
+        per_unit=_other_unit(source, first),
         step=min(shafts, default=None),
     )
     if plain:
@@ -152,6 +149,14 @@ def show_spectrum(
         "Drag to zoom, double click for all."
     )
     return low, high
+
+
+def _other_unit(source: Analysis | str, spectrum: Spectrum) -> tuple[float, str] | None:
+    """Return Hz of an order, or orders of a hertz, for the readout of cursors, where the speed holds still."""
+    if isinstance(source, str) or isinstance(source.shaft_angle, CannotTell) or not speed_is_constant(source):
+        return None
+    turns_hz = source.shaft_angle.mean_speed_rpm / 60.0
+    return (turns_hz, "Hz") if spectrum.axis == "order" else (1.0 / turns_hz, axis_unit("order"))
 
 
 def _choose_looks(source: Analysis | str, cursors: Sequence[Cursor], name: str, scale: str) -> tuple[str, list[str]]:
