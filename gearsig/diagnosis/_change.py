@@ -68,6 +68,7 @@ NOISE_QUANTILE = 0.25
 """Of lines: three in four of them may be tones, as between the harmonics of a loose shaft."""
 
 N_HARMONICS, N_MESH_HARMONICS, N_SIDEBANDS = 10, 8, 3
+OVERALL = "overall level"
 SUBHARMONICS = (1 / 2, 3 / 2, 5 / 2, 7 / 2, 1 / 3, 2 / 3)
 OTHER_SPEED = 0.03
 """Relative difference of speed from which levels differ for that alone: forces grow with its square, and resonances
@@ -120,8 +121,8 @@ def level_changes(
     Returns
     -------
     tuple of LevelChange
-        Empty where a speed is not known, a record is shorter than 16 revolutions, or a run-up goes through
-        other speeds.
+        Overall levels alone where a speed is not known or a record is shorter than 16 revolutions; empty where a
+        run-up goes through other speeds, too.
 
     References
     ----------
@@ -138,7 +139,7 @@ def level_changes(
             *_bearing_parts(signals, envelopes, reference, reference_envelopes, block_rev),
         ]
     except RefusalError:
-        return ()
+        quantities = [] if abs(_speed_off(signals, reference)) > OTHER_SPEED else list(_overall(signals, reference))
     probability = signals.settings.false_alarm_probability
     return tuple(_compared(q, len(quantities), probability) for q in quantities)
 
@@ -323,6 +324,15 @@ class _Segments:
         """Return the lower quartile of a band's lines, which tones do not reach."""
         a, b = (int(edge / self.resolution) for edge in (low, high))
         return _Levels(np.quantile(self.power[:, max(a, 1) : b + 1], NOISE_QUANTILE, axis=1))
+
+
+def _overall(signals: AnalysisSignals, reference: AnalysisSignals) -> Iterator[_Quantity]:
+    """Yield each channel's mean square about its mean, by segments of time."""
+    for channel in signals.recording.channels:
+        if channel.name in signals.spectra and channel.name in reference.spectra:
+            values = (s.recording.values(channel.name) for s in (signals, reference))
+            levels = (_Levels(np.array([part.var() for part in np.array_split(v, N_SEGMENTS)])) for v in values)
+            yield _Quantity(OVERALL, "overall", Where((channel.name,)), 0.0, channel.unit, *levels)
 
 
 def _sum(levels: Sequence[_Levels]) -> _Levels:
@@ -615,7 +625,8 @@ def change_findings(
     named : sequence of Finding
         What the recording shows by itself: a bearing's part that is named there is not named again.
     """
-    if not changes:
+    unknown = []
+    if all(c.kind == "overall" for c in changes):
         why = "one of the two is too short"
         if signals.angle is None or reference.angle is None:
             why = "the speed of one of the two is not known"
@@ -623,8 +634,11 @@ def change_findings(
             why = "the two run through other speeds, or one is too short"
         title = f"What has changed since the reference cannot be told by order: {why}."
         surer = "Two recordings with known speed, alike in both, of 16 revolutions or more."
-        return [cannot_tell("change-not-examined", title, surer=surer)]
+        unknown = [cannot_tell("change-not-examined", title, surer=surer)]
+        if not any(c.is_change for c in changes):
+            return unknown
     findings, rest = _gains(changes)
+    findings = [*unknown, *findings]
     changed = [c for c in rest if c.is_change and (c.change_db > 0 or c.kind != "bearing")]  # none heals
     if not changed:
         return [*findings, _unchanged(rest)] if rest else findings
@@ -649,7 +663,9 @@ def change_findings(
         if any(c.kind == "bearing" and c.where.bearing in claimed for c in risen):
             more = "Damage of the bearing that is named explains it: its shocks raise the noise as well."
         headline = replace(headline, evidence=(*headline.evidence, more))
-    return [*findings, headline if risen else replace(headline, kind=Kind.NOTICE), *meanings]
+    is_speed_known = signals.angle is not None and reference.angle is not None
+    is_reason = risen and is_speed_known  # another speed changes every level
+    return [*findings, headline if is_reason else replace(headline, kind=Kind.NOTICE), *meanings]
 
 
 def _left_open(apart: float) -> Finding:
@@ -669,7 +685,7 @@ DEEPEST_DB = 40.0
 
 
 def _matters(change: LevelChange, changes: Sequence[LevelChange]) -> bool:
-    if change.kind in ("bearing", "noise"):
+    if change.kind in ("bearing", "noise", "overall"):
         return True
     strongest_db = max(c.reference_db for c in changes if c.where.channels == change.where.channels)
     return change.level_db >= strongest_db - DEEPEST_DB

@@ -285,7 +285,9 @@ def _mesh_finding(signals: AnalysisSignals, pair: GearPair) -> Finding | None:
     if not line.is_highest:
         near = f"Near harmonic {harmonic} a line stands beside its place: the speed may be off by little, and small "
         near += "errors smear all averages."
-    elsewhere = signals.comb_elsewhere  # at which multiple of the stated speed the mesh lines do lie, if anywhere
+    # At which multiple of the stated speed the mesh lines do lie; where another pair's are at their place, nowhere.
+    others = (clearest_line(signals, order) for p in signals.rig.pairs if (order := signals.rig.mesh_order(p)))
+    elsewhere = None if any(other and _is_clear(other[0]) for other in others) else signals.comb_elsewhere
     title = (
         f"No mesh line of {pair.name} where speed and teeth put it (order {mesh:.6g}, {signals.hertz_text(mesh, 6)})"
     )
@@ -331,10 +333,17 @@ def teeth_are_contradicted(signals: AnalysisSignals, pair: GearPair) -> float | 
     near = max(3.0 * excess.spectrum.resolution for excess in signals.order_excess.values())
     meshes = [other for other in signals.known_mesh_orders.values() if abs(other - mesh) > near]
     others = [h * other for other in meshes for h in range(1, N_HARMONICS + 1)]
+    # A shaft beside the pair that is struck once a turn raises all its multiples; those of slower ones lie everywhere.
+    faster = [
+        turns
+        for shaft, turns in signals.known_shaft_orders.items()
+        if shaft not in (pair.driver, pair.driven) and all(step is None or turns > step for step in steps)
+    ]
     margins: dict[float, float] = {}
     for step in (step for step in steps if step is not None):
         for order in (mesh + d * step for d in (-3, -2, -1, 1, 2, 3)):
-            if order > step and all(abs(other - order) > near for other in others):
+            beside = [*others, *(round(order / turns) * turns for turns in faster)]
+            if order > step and all(abs(other - order) > near for other in beside):
                 by_channel = [_margin_db(excess, mesh, order) for excess in signals.order_excess.values()]
                 seen = [margin for margin in by_channel if margin is not None]
                 if seen:

@@ -7,11 +7,12 @@ import pytest
 
 from gearsig.diagnosis import Analysis, CannotTell, Kind, Outcome, analyze
 from gearsig.errors import InputError
+from gearsig.prepared import refined_angle
 from gearsig.recording import Channel, Recording
 from gearsig.report import analysis_text
-from gearsig.rig import ConstantSpeed, GearPair, OperatingPoint, TachometerChannel
+from gearsig.rig import ConstantSpeed, GearPair, OperatingPoint, Shaft, TachometerChannel
 from sims.measure import Tachometer
-from tests.diagnosis.machines import GOOD, RIG, codes, finding, good_analysis, record
+from tests.diagnosis.machines import GOOD, RIG, SAMPLING_RATE_HZ, codes, finding, good_analysis, record
 from tests.kinematic.model import BearingFault, MeshModulation, ToothDamage
 from tests.kinematic.speed import ConstantProfile, LinearRamp
 
@@ -142,6 +143,19 @@ def test_a_rig_that_disagrees_with_the_sampling_rate() -> None:
     assert "mesh-elsewhere" in codes(analysis, Kind.DATA_PROBLEM)
     assert any("1.66" in text for text in finding(analysis, "mesh-elsewhere").evidence)
     assert "at 1.66" in analysis.verdict
+
+
+def test_multiples_of_a_shaft_that_is_struck_once_a_turn_are_no_mesh_of_other_teeth() -> None:
+    """The twelfth lies where one tooth more would put the second stage's mesh."""
+    pairs = (GearPair("stage", "in", "out", 36, 90), GearPair("second", "out", "slow", 29, 100))
+    rig = replace(RIG, shafts=(*RIG.shafts, Shaft("slow")), pairs=pairs)
+    recording = record(rig=rig, seconds=8.0)
+    turns = refined_angle(recording, rig).revolutions_at(np.arange(recording.n_samples) / SAMPLING_RATE_HZ)
+    samples = np.array(recording.samples)
+    samples[recording.channel_names.index("a1")] += 10.0 * np.exp(-60.0 * (turns % 1))
+    found = codes(analyze(replace(recording, samples=samples)))
+    assert "mesh-absent" in found
+    assert "teeth-disagree" not in found
 
 
 def test_a_mesh_above_half_the_sampling_rate() -> None:

@@ -214,6 +214,15 @@ def test_a_record_too_short_to_compare_says_so() -> None:
     assert "change-not-examined" in codes(analyze(short, reference=rotor(HEALTHY, seed=2)))
 
 
+def test_of_records_too_short_for_orders_the_overall_level_is_compared() -> None:
+    short, healthy = (rotor(HEALTHY, seed=seed).between(0.0, 0.5) for seed in (1, 2))
+    assert "changed-since-reference" not in codes(analyze(short, reference=healthy))
+    louder = analyze(replace(short, samples=4.0 * short.samples), reference=healthy)
+    assert louder.findings[0].code == "changed-since-reference"
+    assert "overall level +1" in louder.findings[0].title
+    assert "change-not-examined" in codes(louder)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("times", [1, 2])
 def test_a_damaged_race_is_what_changed_also_from_a_reference_at_another_rate(times: int) -> None:
