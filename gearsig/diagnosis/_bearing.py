@@ -47,7 +47,7 @@ from gearsig.formatting import enumerated, named, percent, sentence, signed
 from gearsig.prepared import LOG_RATIO_LIMIT, score_needed
 from gearsig.rig import Rig, hunting_tooth_order
 
-CLEAR_MODULATION, USUAL_MODULATION = 0.05, 0.1
+CLEAR_MODULATION, USUAL_MODULATION = 0.05, 0.2
 """Depth of the strongest line of the envelope from which a race is called damaged, not only worth watching: beside a
 reference, which shows what the bearing's waviness and play do; and alone. Of measured bearings, sound ones have lines
 of 3 to 20 %, damaged races of 58 to 80 %, a damaged ball of 12 %."""

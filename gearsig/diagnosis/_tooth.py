@@ -791,11 +791,8 @@ def _withheld(examined: _Examined) -> Finding:
     )
     evidence = (f"Odd and even revolutions {scatter}.", _visible_text(examined))
     surer = "A longer recording, and a tachometer whose pulses the shaft's own torsion does not shift."
-    why = (
-        "but not alike from turn to turn"
-        if place.repeatability < REPEATS
-        else "but other shafts' lines may have made it"
-    )
+    how = "not alike" if place.repeatability < REPEATS else "too uneven"
+    why = f"but {how} from turn to turn"
     return _left_open(examined, why, evidence, surer)
 
 

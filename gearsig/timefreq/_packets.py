@@ -131,8 +131,6 @@ def wavelet_packets(
     Source: R. R. Coifman, M. V. Wickerhauser, *Entropy-based algorithms for best basis selection*, IEEE Transactions on
     Information Theory 38 (1992).
     """
-    import pywt
-
     x = uniform(signal, channel)
     filters = _orthogonal(wavelet)
     count(level, "level", maximum=12)
@@ -146,8 +144,7 @@ def wavelet_packets(
     n_per_band = -(-x.n_samples // (1 << level))
     filled = np.zeros(n_per_band << level)
     filled[: x.n_samples] = x.values
-    nodes = pywt.WaveletPacket(filled, filters, _MODE, level).get_level(level, "freq")
-    values = np.array([node.data for node in nodes])
+    values = _split(filled, filters, level)
     return WaveletPackets(values, x.n_samples, x.rate, x.start, x.axis, x.unit, wavelet, x.source, x.shaft)
 
 
@@ -171,11 +168,20 @@ def packet_inverse(packets: WaveletPackets, bands: list[int] | None = None) -> F
     """
     import pywt
 
-    tree = pywt.WaveletPacket(np.zeros(packets.values.size), packets.wavelet, _MODE, packets.level)
-    for band in range(packets.n_bands) if bands is None else bands:
-        path = node_path(band, packets.level)
-        tree[path] = packets.values[band]
-    result: FloatArray = tree.reconstruct()[: packets.n_samples]
+    kept = np.array(packets.values)
+    if bands is not None:
+        for band in bands:
+            if not 0 <= band < packets.n_bands:
+                raise InputError(f"band {band} does not exist", where="bands", allowed=f"0 to {packets.n_bands - 1}")
+        kept[np.setdiff1d(np.arange(packets.n_bands), bands)] = 0.0
+    rows = list(kept)
+    while len(rows) > 1:
+        merged = []
+        for i in range(0, len(rows), 2):
+            low, high = (rows[i], rows[i + 1]) if (i // 2) % 2 == 0 else (rows[i + 1], rows[i])
+            merged.append(pywt.idwt(low, high, packets.wavelet, _MODE))
+        rows = merged
+    result: FloatArray = rows[0][: packets.n_samples]
     return result
 
 
@@ -238,3 +244,17 @@ def _orthogonal(name: str):  # type: ignore[no-untyped-def]
     if not wavelet.orthogonal:
         raise InputError(f"wavelet {name} is not orthogonal", allowed="dbN, symN, coifN, haar, dmey")
     return wavelet
+
+
+def _split(x: FloatArray, filters: object, level: int) -> FloatArray:
+    """Return the packets of the last level, upwards in frequency: high bands come out mirrored, so they swap halves."""
+    import pywt
+
+    rows = [x]
+    for _ in range(level):
+        halves = []
+        for i, row in enumerate(rows):
+            low, high = pywt.dwt(row, filters, _MODE)
+            halves += [low, high] if i % 2 == 0 else [high, low]
+        rows = halves
+    return np.array(rows)

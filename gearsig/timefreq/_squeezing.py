@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gearsig.checks import FloatArray, one_of
 from gearsig.compiled import njit
 from gearsig.errors import InputError, engine_module
-from gearsig.timefreq._types import ComplexArray, Spacing, UniformSignal
+from gearsig.timefreq._types import Spacing, UniformSignal
 
 MIN_SHARE = 1e-6
 """Coefficients below this share of the signal's rms are rounding: they have no frequency."""
@@ -104,26 +104,24 @@ def squeeze(W, dW, weights, smallest, borders, lookup, T, first):  # type: ignor
             T[line, first + t] += weights[j] * W[j, t]
 
 
-def gather_near(
-    W: ComplexArray,
-    dW: ComplexArray,
-    weight: float,
-    smallest: float,
-    low: FloatArray,
-    high: FloatArray,
-    out: ComplexArray,
-) -> None:
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def gather_near(W, dW, weight, smallest, low, high, out):  # type: ignore[no-untyped-def]
     """out[t] += weight · W[j, t] wherever low[t] <= ω̂ <= high[t]."""
-    power = W.real**2 + W.imag**2
-    with np.errstate(divide="ignore", invalid="ignore"):
-        omega = (dW.imag * W.real - dW.real * W.imag) / power
-    inside = (power > smallest) & (low <= omega) & (omega <= high)
-    out += weight * np.where(inside, W, 0.0).sum(axis=0, dtype=np.complex128)
+    for j in range(W.shape[0]):
+        for t in range(W.shape[1]):
+            a, b = W[j, t].real, W[j, t].imag
+            power = a * a + b * b
+            if power <= smallest:
+                continue
+            omega = (dW[j, t].imag * a - dW[j, t].real * b) / power
+            if low[t] <= omega <= high[t]:
+                out[t] += weight * W[j, t]
 
 
-def gather_lines(
-    W: ComplexArray, omegas: FloatArray, weight: float, low: FloatArray, high: FloatArray, out: ComplexArray
-) -> None:
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def gather_lines(W, omegas, weight, low, high, out):  # type: ignore[no-untyped-def]
     """out[t] += weight · W[j, t] wherever low[t] <= omegas[j] <= high[t]."""
-    inside = (low <= omegas[:, None]) & (omegas[:, None] <= high)
-    out += weight * np.where(inside, W, 0.0).sum(axis=0, dtype=np.complex128)
+    for j in range(W.shape[0]):
+        for t in range(W.shape[1]):
+            if low[t] <= omegas[j] <= high[t]:
+                out[t] += weight * W[j, t]
