@@ -47,10 +47,11 @@ from gearsig.formatting import enumerated, named, percent, sentence, signed
 from gearsig.prepared import LOG_RATIO_LIMIT, score_needed
 from gearsig.rig import Rig, hunting_tooth_order
 
-CLEAR_MODULATION, USUAL_MODULATION = 0.05, 0.2
-"""Depth of the strongest line of the envelope from which a race is called damaged, not only worth watching: beside a
-reference, which shows what the bearing's waviness and play do; and alone. Of measured bearings, sound ones have lines
-of 3 to 20 %, damaged races of 58 to 80 %, a damaged ball of 12 %."""
+CLEAR_MODULATION, USUAL_MODULATION, USUAL_OF_RACES = 0.05, 0.1, 0.2
+"""Depth of the strongest line of the envelope from which a part is called damaged, not only worth watching: beside a
+reference, which shows what the bearing's waviness and play do; and alone, of elements and cages, and of races. Of
+measured bearings, sound ones have lines of 3 to 20 % at the orders of races, damaged races of 58 to 80 %, a damaged
+ball of 12 %."""
 
 MAX_PARTS = 2
 """Parts that may be damaged at once; families at more orders than that have another cause more likely."""
@@ -159,7 +160,8 @@ def _named_finding(signals: AnalysisSignals, candidate: Candidate, n_parts: int)
         is_likely = (candidate.name in RACES or abs(slip) <= USUAL_SLIP) and not is_of_other_speed
         confidence *= WITH_STATED_SPEED if is_likely else AT_ANOTHER_SPEED
     is_open = is_shared or is_smooth or is_of_other_speed
-    depth = CLEAR_MODULATION if signals.has_reference else USUAL_MODULATION
+    alone = USUAL_OF_RACES if candidate.name in RACES else USUAL_MODULATION
+    depth = CLEAR_MODULATION if signals.has_reference else alone
     is_weak = candidate.modulation < depth
     if not signals.has_reference:
         confidence *= float(np.clip(candidate.modulation / USUAL_MODULATION, 0.5, 1.0))
