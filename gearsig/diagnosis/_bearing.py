@@ -265,7 +265,7 @@ def _is_smooth(candidate: Candidate) -> bool:
 def course_of_knocks(
     values: FloatArray, samples_per_interval: float
 ) -> tuple[tuple[float, float], tuple[float, float]] | None:
-    r"""Return how much the course of an envelope between two knocks is one of knocks, whose number nobody counted.
+    r"""Return two measures of whether an envelope's course over the interval of a race is that of knocks.
 
     Knocks rise at once and ring down: the bispectrum of their envelope has phases from 0 (short) to −90° (a saw tooth),
     that of dips between them 180°. With :math:`C_k` the Fourier coefficients of blocks of eight intervals, which slip
