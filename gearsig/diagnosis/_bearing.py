@@ -31,7 +31,7 @@ from gearsig.diagnosis._bearing_families import (
     speed_is_only_stated,
     underlying_impulse_train,
 )
-from gearsig.diagnosis._lines import N_COUNTED, factor_left_open, speed_is_confirmed
+from gearsig.diagnosis._lines import N_COUNTED, factor_left_open, hunting_multiple, speed_is_confirmed
 from gearsig.diagnosis._signals import AnalysisSignals, BandEnvelope, KurtogramBand, without_shafts, witness_text
 from gearsig.diagnosis._types import (
     WITH_ASSUMED_DATA,
@@ -45,7 +45,7 @@ from gearsig.diagnosis._types import (
 )
 from gearsig.formatting import enumerated, named, percent, sentence, signed
 from gearsig.prepared import LOG_RATIO_LIMIT, score_needed
-from gearsig.rig import Rig, hunting_tooth_order
+from gearsig.rig import Rig
 
 CLEAR_MODULATION, USUAL_MODULATION, USUAL_OF_RACES = 0.05, 0.1, 0.2
 """Depth of the strongest line of the envelope from which a part is called damaged, not only worth watching: beside a
@@ -118,6 +118,9 @@ def detect_bearings(
         short = cannot_tell("bearings-not-examined", title, surer="A longer recording.")
         return [short] if signals.rig.bearings else []
     families = find_families(signals, cleaned)
+    families = replace(
+        families, named=tuple(map(_with_course, families.named)), trains=tuple(map(_with_course, families.trains))
+    )
     findings = []
     for candidate in families.named:
         finding = _named_finding(signals, candidate, len(families.named))
@@ -148,8 +151,8 @@ def _named_finding(signals: AnalysisSignals, candidate: Candidate, n_parts: int)
     times = factor_left_open(signals)
     is_shared = candidate.name == "FTF" or candidate.in_train or n_parts > MAX_PARTS
     width = 2.0 * candidate.envelope.excess.spectrum.resolution
-    is_hunting = candidate.name == "FTF" and bool(_hunting_tooth_beside(signals, candidate.comb.fundamental, width))
-    is_smooth = _is_smooth(candidate)
+    is_hunting = candidate.name == "FTF" and hunting_multiple(signals, candidate.comb.fundamental, width) is not None
+    is_smooth = candidate.is_smooth
 
     confidence = from_p_value(candidate.p_value) * candidate.share
     confidence *= WITH_ASSUMED_DATA if signals.rig.assumed else 1.0
@@ -232,24 +235,12 @@ def _other_speed_text(times: int) -> str:
     )
 
 
-def _hunting_tooth_beside(signals: AnalysisSignals, order: float, width: float) -> str:
-    """Return the pair whose hunting-tooth order has a multiple within `width` of an order, and which one; "" if none.
-
-    Teeth that differ meet in turn, and modulate the mesh at multiples of that order: in a short record they are dense.
-    """
-    for pair in signals.rig.pairs:
-        hunting = hunting_tooth_order(signals.rig, pair)
-        if hunting is not None and (k := round(order / hunting)) and abs(order - k * hunting) <= width:
-            return f"{f'{k}× ' if k > 1 else ''}the hunting-tooth order of {named('pair', pair.name)}"
-    return ""
-
-
-def _is_smooth(candidate: Candidate) -> bool:
-    """Whether what modulates at a race's order is no knocking, by more than twice the errors."""
+def _with_course(candidate: Candidate) -> Candidate:
+    """Return a family with whether what modulates at a race's order is no knocking, by more than twice the errors."""
     envelope, over_angle = candidate.envelope, candidate.envelope.over_angle
     order, excess = candidate.comb.fundamental, envelope.excess
     if candidate.name not in RACES or over_angle is None or len(excess.free_lines_at(order * ONE_TO_THREE)) < 3:
-        return False
+        return candidate
     # Shafts' lines, beside the race's or stronger, would be taken for its course.
     values, per_revolution = over_angle.values(envelope.channel), over_angle.samples_per_revolution
     lines = np.fft.rfft(values)
@@ -257,9 +248,10 @@ def _is_smooth(candidate: Candidate) -> bool:
     lines[excess.masked[np.clip(numbers, 0, len(excess.masked) - 1)]] = 0
     course = course_of_knocks(np.fft.irfft(lines, len(values)), per_revolution / order)
     if course is None:
-        return False
+        return candidate
     (moment, moment_error), (later, later_error) = course
-    return moment + 2 * moment_error < KNOCK or later + 2 * later_error < LATER_LINES
+    is_smooth = moment + 2 * moment_error < KNOCK or later + 2 * later_error < LATER_LINES
+    return replace(candidate, is_smooth=is_smooth)
 
 
 def course_of_knocks(
@@ -338,7 +330,8 @@ def _unnamed_finding(signals: AnalysisSignals, candidate: Candidate) -> Finding:
     mains = mains_beside(signals, candidate)
     n_lines = round(max(candidate.comb.positions, default=order) / order)  # that many tell the fundamental better
     width = 2.0 * candidate.envelope.excess.spectrum.resolution / n_lines
-    hunting = "" if mains else _hunting_tooth_beside(signals, order, width)
+    multiple_of = None if mains else hunting_multiple(signals, order, width)
+    hunting = multiple_of[1] if multiple_of is not None else ""
     multiple, shaft = _shaft_as_stated(signals, candidate)
     # A shaft may well turn there; that it is struck every other turn is no better than an unknown part.
     is_shafts = (multiple > 0 and multiple.is_integer()) or bool(near and not speed_is_confirmed(signals))
@@ -547,7 +540,7 @@ def _reasons_to_leave_open(
     named_here = new((*families.named, *(c for c in families.trains if c.bearing is not None)))
     rival = next((r for c in named_here for r in c.rivals), "")
     besides = f"{rival} would show there as well" if rival else "something else explains them as well"
-    if named_here and all(_is_smooth(c) for c in named_here):
+    if named_here and all(c.is_smooth for c in named_here):
         besides = "they rise and fall unlike knocks"
     for seen, but in (
         (named_here, besides),

@@ -187,7 +187,8 @@ class Candidate:
 
     `of_same_order` are other bearings whose same part has the very same order: no envelope tells them apart. `share` is
     the part's, these included, among all that would show at that order. `loudest` is the channel with the largest line.
-    `of_tones` says that it is gone with the steady tones, `of_elements` that elements which differ may be it as well.
+    `of_tones` says that it is gone with the steady tones, `of_elements` that elements which differ may be it as well,
+    `is_smooth` that no knocks make it.
     """
 
     comb: Comb
@@ -203,6 +204,7 @@ class Candidate:
     loudest: str = ""
     of_tones: bool = False
     of_elements: bool = False
+    is_smooth: bool = False
 
     @property
     def strength_db(self) -> float:

@@ -510,7 +510,7 @@ def _unexplained(signals: AnalysisSignals, trains: Sequence[float], named: Seque
         return None
     _, channel, i, excess = best
     line, where = PlacedLine.at(excess, i), signals.where(float(excess.spectrum.positions[i]), channel)
-    hunting = _hunting_multiple(signals, line.position, 1.5 * excess.spectrum.resolution)
+    hunting = hunting_multiple(signals, line.position, 1.5 * excess.spectrum.resolution)
     origin = combination(signals, line.position, excess.spectrum, trains)
     if not origin and hunting is not None and _is_among_multiples(excess, line.position, hunting[0]):
         origin = hunting[1]
@@ -598,7 +598,7 @@ def combination(signals: AnalysisSignals, order: float, spectrum: Spectrum, trai
     return ""
 
 
-def _hunting_multiple(signals: AnalysisSignals, order: float, near: float) -> tuple[float, str] | None:
+def hunting_multiple(signals: AnalysisSignals, order: float, near: float) -> tuple[float, str] | None:
     """Return the hunting-tooth order of which a multiple is near an order, and that multiple in words.
 
     It belongs to both gears together: each pair of teeth has its own meeting.

@@ -289,9 +289,7 @@ def judge(
     recordings = recordings.sort_values(["date", "added"], kind="stable").reset_index(drop=True)
     values, series = _matrix(recordings, indicators)
     baseline = _baseline(recordings, settings, stated)
-    is_ratio = _is_ratio(series)
-    y, is_level = decibels(values, baseline, is_ratio | _is_signed(series))
-    in_db = is_level | is_ratio
+    y, is_level, in_db = _scaled(values, baseline, series)
     x, inside, normalised = regressors(*_conditions(recordings), baseline)
     rate = settings.false_alarm_rate / max(len(series), 1)
     middle, reach = _limits(y, x, baseline, in_db, rate, settings)
@@ -412,10 +410,7 @@ def over_condition(
     rows = (rows_across, rows_along) if over == "load" else (rows_along, rows_across)
     is_baseline = np.concatenate([baseline, np.zeros(n_added, dtype=np.bool_)])
     x, inside, _ = regressors(*rows, is_baseline)
-    series = trends.series.iloc[[column]]
-    is_ratio = _is_ratio(series)
-    y, is_level = decibels(value[:, None], baseline, is_ratio | _is_signed(series))
-    in_db = is_level | is_ratio
+    y, is_level, in_db = _scaled(value[:, None], baseline, trends.series.iloc[[column]])
     y = np.concatenate([y, np.full((n_added, 1), np.nan)])
     expected, reach = _limits(y, x, is_baseline, in_db, trends.false_alarm_rate, settings)
     reach[n : 2 * n] = reach[:n]  # each value keeps the limits of its own place
@@ -465,6 +460,13 @@ def _baseline(recordings: DataFrame, settings: TrendSettings, stated: Baseline |
     healthy = recordings["outcome"].isin(HEALTHY).to_numpy(np.bool_)
     first = healthy & (np.cumsum(healthy) <= settings.n_baseline)
     return first if int(first.sum()) == settings.n_baseline else np.zeros(len(healthy), dtype=np.bool_)
+
+
+def _scaled(values: FloatArray, baseline: BoolArray, series: DataFrame) -> tuple[FloatArray, BoolArray, BoolArray]:
+    """Return the values as they are judged, which series were brought to dB for it, and which are in dB then."""
+    is_ratio = _is_ratio(series)
+    y, is_level = decibels(values, baseline, is_ratio | _is_signed(series))
+    return y, is_level, is_level | is_ratio
 
 
 def _is_ratio(series: DataFrame) -> BoolArray:

@@ -16,7 +16,7 @@ from gearsig import __version__
 from gearsig.cache import write_text
 from gearsig.diagnosis import Analysis, Outcome
 from gearsig.fleet import date_in_name
-from gearsig.formatting import csv_rows, percent, readable, spreadsheet_cell, unit_text
+from gearsig.formatting import csv_rows, moment_text, percent, readable, spreadsheet_cell, unit_text
 from gearsig.indicators import Indicator
 from gearsig.plot import with_unit
 from gearsig.report._files import compiled, date_text, render, write_pdf
@@ -154,7 +154,7 @@ def index_of(ordered: Sequence[Entry], failures: Sequence[Failure] = ()) -> dict
             "entry": replace(entry, indicators=(), ratio_db=None),  # what is shown of these are texts
             "css_class": css_class(entry.outcome),
             "href": quote(entry.page),
-            "date": f"{entry.date:%Y-%m-%d %H:%M}".removesuffix(" 00:00") if entry.date is not None else "",
+            "date": moment_text(entry.date) if entry.date is not None else "",
             "confidence": percent(entry.confidence) if entry.confidence is not None else "",
             "ratio": _size_text(entry),
             "cells": [cells[i] for _, cells in columns],
