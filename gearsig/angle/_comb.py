@@ -212,10 +212,9 @@ def _interval_heights(x: FloatArray) -> FloatArray:
 
 def _mean_power(x: FloatArray, n_segment: int) -> FloatArray:
     from scipy.fft import rfft
-    from scipy.signal.windows import hann
 
     precision = np.result_type(x.dtype, np.float32)
-    window = hann(n_segment, sym=False).astype(precision)
+    window = 0.5 - 0.5 * np.cos(np.arange(n_segment, dtype=precision) * precision.type(2 * np.pi / n_segment))  # Hann
     step = max(1, n_segment // 2)
     power = np.zeros(n_segment // 2 + 1)
     for start in range(0, len(x) - n_segment + 1, step):

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import log
+from math import ceil, floor, log
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,10 +74,9 @@ class LinesOverFloor:
         reach = max(half_width, FOOT_LINES * self.spectrum.resolution)
         if fundamental < 4 * reach:
             return self
-        positions = self.spectrum.positions
-        offset = (positions - start) / fundamental
-        near = np.abs(offset - np.rint(offset)) * fundamental <= np.maximum(reach, skirt * positions)
-        return replace(self, masked=self.masked | near)
+        masked = self.masked.copy()
+        _mask_multiples(masked, self.spectrum.positions, self.spectrum.resolution, fundamental, start, reach, skirt)
+        return replace(self, masked=masked)
 
     def line_numbers(self, places: FloatArray) -> NDArray[np.int64]:
         """Return the numbers of the lines nearest to some places of the axis, which may lie beyond its ends."""
@@ -250,7 +249,17 @@ def best_comb(
     candidates, totals, n_terms = _highest(excess, origins, factors, low, step, n_candidates)
     if n_terms == 0:
         return None
-    best = _sharpest(excess, origins, factors, candidates)
+    spectrum = excess.spectrum
+    best = _sharpest(
+        spectrum.values,
+        excess.floor,
+        excess.masked,
+        candidates,
+        origins,
+        factors,
+        spectrum.positions[0],
+        spectrum.resolution,
+    )
     score = float(totals[best])
     single = tail_probability(excess, n_terms, score)
     p_value = chance_of_any(single, independent_trials(n_candidates))
@@ -347,6 +356,29 @@ def _highest(
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _mask_multiples(
+    masked: NDArray[np.bool_],
+    positions: FloatArray,
+    resolution: float,
+    fundamental: float,
+    start: float,
+    reach: float,
+    skirt: float,
+) -> None:
+    """Mask the lines within `reach`, or `skirt` times their position, of the nearest start ± k·fundamental."""
+    n = len(positions)
+    for k in range(round((positions[0] - start) / fundamental), round((positions[-1] - start) / fundamental) + 1):
+        centre = start + k * fundamental
+        low = max(min(centre - reach, centre / (1 + skirt)), centre - fundamental / 2)
+        high = min(max(centre + reach, centre / (1 - skirt)), centre + fundamental / 2)
+        first, last = floor((low - positions[0]) / resolution), ceil((high - positions[0]) / resolution)
+        for i in range(max(0, first), min(n, last + 1)):
+            offset = (positions[i] - start) / fundamental
+            if abs(offset - round(offset)) * fundamental <= max(reach, skirt * positions[i]):
+                masked[i] = True
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _comb_totals(scores, candidates, origins, factors, first, resolution, inside_once):  # type: ignore[no-untyped-def]
     """Sum the scores nearest to origin + factor · candidate; note which terms met the spectrum at all."""
     total = np.zeros(len(candidates))
@@ -359,15 +391,17 @@ def _comb_totals(scores, candidates, origins, factors, first, resolution, inside
     return total
 
 
-def _sharpest(excess: LinesOverFloor, origins: FloatArray, factors: NDArray[np.int_], candidates: FloatArray) -> int:
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _sharpest(values, floor, masked, candidates, origins, factors, first, resolution):  # type: ignore[no-untyped-def]
     """Return the candidate whose harmonics meet the peaks best: ln(A/A₀) of each by itself, not cut at any limit."""
-    values, sums = excess.spectrum.values, np.zeros(len(candidates))
-    for origin, factor in zip(origins, factors, strict=True):
-        lines = np.clip(excess.line_numbers(origin + factor * candidates), 0, len(values) - 1)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            heights = np.minimum(np.log(values[lines] / excess.floor[lines]), 40.0)  # over a floor of nothing
-        sums += np.where(excess.masked[lines] | ~(values[lines] > 0.0), 0.0, heights)
-    return int(np.argmax(sums))
+    sums = np.zeros(len(candidates))
+    for i in range(len(factors)):
+        for j in range(len(candidates)):
+            line = int(np.rint((origins[i] + factors[i] * candidates[j] - first) / resolution))
+            line = min(max(line, 0), len(values) - 1)
+            if values[line] > 0.0 and not masked[line]:  # over a floor of nothing it is cut
+                sums[j] += min(log(values[line] / floor[line]), 40.0) if floor[line] > 0.0 else 40.0
+    return np.argmax(sums)
 
 
 def tail_probability(excess: LinesOverFloor, n_terms: int, score: float) -> float:
