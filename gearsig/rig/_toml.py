@@ -215,7 +215,7 @@ def from_table(kind: type, table: Any, where: str, **ready: Any) -> Any:
     hints = type_hints_of(kind)
     values = {}
     for key, value in table.items():
-        known_name(key, known, f"there is no key {key!r}", where=where)
+        known_name(key, known, f"there is no key {key!r}", where=where, remedy=_elsewhere(key))
         values[key] = _typed(value, hints[key], f"{where}: {key}")
     missing = [
         n for n, f in known.items() if f.default is MISSING and f.default_factory is MISSING and n not in values | ready
@@ -227,6 +227,14 @@ def from_table(kind: type, table: Any, where: str, **ready: Any) -> Any:
     except InputError as error:
         place = f"{where}: {error.where}" if error.where and error.where != "rig" else where
         raise InputError(error.what, where=place, allowed=error.allowed, remedy=error.remedy) from None
+
+
+def _elsewhere(key: str) -> str:
+    """Say in which other tables of a rig file a key belongs; nothing where in none."""
+    tables = {f"[[{name}]]": kind for name, kind in _LISTS.items()}
+    tables |= {"[operating_point]": OperatingPoint, "[contact]": ToothContact, "[machine]": MachineSize}
+    places = [table for table, kind in tables.items() if any(f.name == key for f in fields(kind))]
+    return f"it belongs in {' or '.join(places)}" if places else ""
 
 
 def _typed(value: Any, hint: Any, where: str) -> Any:

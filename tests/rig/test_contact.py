@@ -50,6 +50,7 @@ def test_a_contact_of_a_pair_that_is_not_there() -> None:
         ("restitution = 1.2", "restitution"),
         ('damping_law = "flore"', "did you mean flores"),
         ("stifness = 2", "there is no key 'stifness'"),
+        ("speed_rpm = 2", r"it belongs in \[operating_point\]"),
         ("exponent = 'x'", "a number"),
     ],
 )
