@@ -322,6 +322,9 @@ SAME_FAMILY = 5e-3
 FOUR_IN_FIVE = 0.8
 """Of a family's lines: another may stand where one of them would be."""
 
+PEAK_ERROR = 0.02
+"""By which a parabola misses a peak between lines, of their distance."""
+
 SECOND_DB = 12.0
 """A family so much weaker than another, in its own envelope or in the clearest one, is a by-product of it: sums and
 differences with the shaft and the cage, and the other bearing's sensor."""
@@ -341,24 +344,39 @@ def _is_sideband(signals: AnalysisSignals, candidate: Candidate, carrier: Candid
     """Whether a family is the sidebands of a race's: k (f - n s) is the sideband number k n of multiple k.
 
     An inner race turns through the load, so that it has them a shaft's order apart; an outer race where the load turns,
-    weaker than its own lines. Elements and cages have them a cage's order apart.
+    weaker than its own lines. Elements and cages have them a cage's order apart. Elements pass both races together as
+    often a turn as they are many: an inner and an outer race that are struck nearly a whole number of times are each
+    other's sidebands. The true one is that on whose sidebands the other's lines lie better, weighed by their slips.
     """
     shaft = signals.rig.ratio(carrier.bearing.shaft) if carrier.bearing is not None else None
+    if not shaft:
+        return False
+    there, back = (_off_sidebands(*two, shaft) for two in ((candidate, carrier), (carrier, candidate)))
+    resolution = candidate.envelope.excess.spectrum.resolution
+    lies_there, lies_back = (float(np.mean(off <= resolution)) >= FOUR_IN_FIVE for off in (there, back))
+    if {candidate.name, carrier.name} == set(RACES) and (lies_there or lies_back):
+        # Of n lines that scatter normally about where they belong, the likelihood goes with 1/scatter^n.
+        n_lines = min(len(there), len(back))
+        odds = [
+            _own_weight(signals, one) / float(np.mean(off / resolution) + PEAK_ERROR) ** n_lines
+            for one, off in ((carrier, there), (candidate, back))
+        ]
+        return odds[0] > odds[1]
     turns = carrier.name == "BPFI" and candidate.name != "BPFI"
     is_stronger = carrier.name in RACES and carrier.strength_db > candidate.strength_db
-    if not shaft or not (turns or is_stronger):
+    if not (turns or is_stronger):
         return False
-    if turns and _lies_on_sidebands(candidate, carrier, shaft):
+    if turns and lies_there:
         return True
-    if candidate.name == "BPFI" and _lies_on_sidebands(carrier, candidate, shaft):
+    if candidate.name == "BPFI" and lies_back:
         return False  # and not the other way about
     distance = abs(candidate.comb.fundamental - carrier.comb.fundamental)
     n = round(distance / shaft)
-    return 1 <= n <= 3 and abs(distance - n * shaft) <= 2 * candidate.envelope.excess.spectrum.resolution
+    return 1 <= n <= 3 and abs(distance - n * shaft) <= 2 * resolution
 
 
-def _lies_on_sidebands(candidate: Candidate, carrier: Candidate, shaft: float) -> bool:
-    """Whether the peaks of a family are where another's multiples have up to three sidebands, four in five of them.
+def _off_sidebands(candidate: Candidate, carrier: Candidate, shaft: float) -> FloatArray:
+    """Return how far the peaks of a family are from another's multiples and from up to three sidebands of those.
 
     Of a race that is struck nearly a whole number of times a turn they lie about the multiples of many an order, but
     not on them.
@@ -366,8 +384,8 @@ def _lies_on_sidebands(candidate: Candidate, carrier: Candidate, shaft: float) -
     peaks, fundamental = np.array(candidate.comb.positions), carrier.comb.fundamental
     sidebands = shaft * np.arange(-3, 4)
     numbers = np.maximum(np.rint((peaks[:, None] - sidebands) / fundamental), 1)
-    beside = np.abs(peaks[:, None] - numbers * fundamental - sidebands).min(axis=1)
-    return len(peaks) > 0 and float(np.mean(beside <= candidate.envelope.excess.spectrum.resolution)) >= FOUR_IN_FIVE
+    beside: FloatArray = np.abs(peaks[:, None] - numbers * fundamental - sidebands).min(axis=1)
+    return beside
 
 
 def _strength_in(envelope: BandEnvelope, fundamental: float) -> float:
