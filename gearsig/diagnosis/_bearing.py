@@ -32,6 +32,7 @@ from gearsig.diagnosis._bearing_families import (
     underlying_impulse_train,
 )
 from gearsig.diagnosis._lines import N_COUNTED, factor_left_open, hunting_multiple, speed_is_confirmed
+from gearsig.diagnosis._rotor import half_speed_left_open
 from gearsig.diagnosis._signals import AnalysisSignals, BandEnvelope, KurtogramBand, without_shafts, witness_text
 from gearsig.diagnosis._types import (
     WITH_ASSUMED_DATA,
@@ -537,6 +538,8 @@ def _reasons_to_leave_open(
         if (times := factor_left_open(signals)) > 1:
             why = _other_speed_text(times)
         yield why, f"A tachometer, or a sensor nearer to the {'gears' if signals.rig.pairs else 'bearings'}."
+    if why := half_speed_left_open(signals):
+        yield f"{why}: every part has another order then", "Check the stated speed and the sampling rate."
     named_here = new((*families.named, *(c for c in families.trains if c.bearing is not None)))
     rival = next((r for c in named_here for r in c.rivals), "")
     besides = f"{rival} would show there as well" if rival else "something else explains them as well"
