@@ -354,7 +354,10 @@ def _is_sideband(signals: AnalysisSignals, candidate: Candidate, carrier: Candid
     there, back = (_off_sidebands(*two, shaft) for two in ((candidate, carrier), (carrier, candidate)))
     resolution = candidate.envelope.excess.spectrum.resolution
     lies_there, lies_back = (float(np.mean(off <= resolution)) >= FOUR_IN_FIVE for off in (there, back))
-    if {candidate.name, carrier.name} == set(RACES) and (lies_there or lies_back):
+    distance = abs(candidate.comb.fundamental - carrier.comb.fundamental)
+    n = round(distance / shaft)
+    is_apart = 1 <= n <= 3 and abs(distance - n * shaft) <= 2 * resolution
+    if {candidate.name, carrier.name} == set(RACES) and (is_apart or lies_there or lies_back):
         # Of n lines that scatter normally about where they belong, the likelihood goes with 1/scatter^n.
         n_lines = min(len(there), len(back))
         odds = [
@@ -362,17 +365,9 @@ def _is_sideband(signals: AnalysisSignals, candidate: Candidate, carrier: Candid
             for one, off in ((carrier, there), (candidate, back))
         ]
         return odds[0] > odds[1]
-    turns = carrier.name == "BPFI" and candidate.name != "BPFI"
-    is_stronger = carrier.name in RACES and carrier.strength_db > candidate.strength_db
-    if not (turns or is_stronger):
-        return False
-    if turns and lies_there:
-        return True
-    if candidate.name == "BPFI" and lies_back:
-        return False  # and not the other way about
-    distance = abs(candidate.comb.fundamental - carrier.comb.fundamental)
-    n = round(distance / shaft)
-    return 1 <= n <= 3 and abs(distance - n * shaft) <= 2 * resolution
+    if carrier.name == "BPFI" and candidate.name != "BPFI":
+        return lies_there or is_apart
+    return carrier.name in RACES and carrier.strength_db > candidate.strength_db and is_apart
 
 
 def _off_sidebands(candidate: Candidate, carrier: Candidate, shaft: float) -> FloatArray:

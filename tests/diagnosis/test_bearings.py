@@ -550,6 +550,16 @@ def test_an_outer_race_under_a_load_that_turns_is_not_explained_away_by_its_own_
     assert NAMED & set(codes(analysis, Kind.FAULT, Kind.SUSPICION)) == {"bearing-outer-race"}
 
 
+def test_two_races_do_not_explain_each_other_away() -> None:
+    """Tones of an inverter, 2.02 turns apart, beat at 3.03: there an outer race has a family, two turns below 5.03."""
+    recording = at_sensors(5.03, (2.0,), turning=True, uneven=0.008, seconds=5.0)
+    t = np.arange(recording.n_samples) / recording.sampling_rate_hz
+    tones = sum(2.0 * np.cos(2 * np.pi * (4000 + k * 2.02 * 29.0) * t + k**2) for k in (-2, -1, 1, 2))
+    bearing = Bearing("drive end", "motor", 8, 7.145, 28.519)
+    analysis = analyze(with_bearings(replace(recording, samples=recording.samples + tones), bearing))
+    assert NAMED & set(codes(analysis, Kind.FAULT, Kind.SUSPICION)) == {"bearing-inner-race"}
+
+
 def test_a_race_that_chance_hardly_explains_is_not_called_sound() -> None:
     undecided = finding(analyze(at_sensors(3.57, (1.0,), uneven=0.03, seconds=3.0)), "bearings-undecided")
     assert "lines stand at the order of the outer race of drive end, and the chance" in undecided.title
