@@ -26,6 +26,7 @@ from gearsig.diagnosis._bearing_families import (
     mains_beside,
     part_text,
     parts_on_shaft,
+    races_beside_shaft,
     races_in_vibration,
     slip_of,
     speed_is_only_stated,
@@ -564,6 +565,9 @@ def _reasons_to_leave_open(
         lines = f"{len(comb.positions)} multiples of the order of the {race} stand in {channel} itself"
         why = f"{lines}, whose first ones a shaft's hide from the envelopes"
         yield why, "A recording at another load: slip parts a bearing from the shaft."
+    for race, (k, shaft) in races_beside_shaft(signals, envelopes).items():
+        beside = f"lines stand beside {k} times a turn of {named('shaft', shaft)}, all to one side"
+        yield f"{beside}, as those of the {race} may", longer
     for (k, shaft), on_shaft in parts_on_shaft(signals, envelopes).items():
         races = f"the order of the {' or '.join(on_shaft)} within its slip"
         why = f"impacts come {k} times a turn of {named('shaft', shaft)}, which is {races}"

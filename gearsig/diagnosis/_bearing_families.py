@@ -826,6 +826,46 @@ def _amplitude_beside(spectrum: Spectrum, place: float, strong: float) -> float:
     return float(spectrum.values[near].max(initial=0.0))
 
 
+BESIDE_DB, ONE_SIDED_DB = 12.0, 6.0
+"""Heights, over the floor and over the place as far on the other side, from which lines beside multiples of a shaft are
+not what smears those."""
+
+
+def races_beside_shaft(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> dict[str, tuple[int, str]]:
+    """Return inner races of which one line and its sidebands may stand: a multiple of the shaft beside it, the shaft.
+
+    Where a race rings longer than from knock to knock, there are no further multiples; slip may also take the first so
+    near to a whole number of turns that it is taken for the shaft's. It and the two sidebands then lie as far from the
+    shaft's multiples, to one side: a speed that wanders spreads these to both, the more the higher. What is a multiple
+    of another shaft is that one's.
+    """
+    races = {}
+    for bearing, name, order in expected_parts(signals):
+        shaft = signals.rig.ratio(bearing.shaft)
+        k = round(order / shaft) if shaft else 0
+        if name != "BPFI" or k < 2 or not shaft:
+            continue
+        low, high = (order * (1 + side * slip_of(signals)) - k * shaft for side in (-1, 1))
+        others = [turns for turns in signals.known_shaft_orders.values() if turns != shaft]
+        for excess in (envelope.excess for envelope in envelopes):
+            values, width = excess.spectrum.values, excess.spectrum.resolution
+            off = np.arange(ceil(low / width), int(high / width) + 1) * width
+            places = k * shaft + off
+            is_free = np.all(
+                [np.abs(places - np.rint(places / turns) * turns) >= 2 * width for turns in others], axis=0
+            )
+            off = off[is_free & (np.abs(off) >= 2 * width), None]
+            multiples = np.arange(k - 1, k + 2) * shaft
+            here, there = (excess.line_numbers(multiples + side) for side in (off, -off))
+            if here.max(initial=0) + 1 >= len(values) or there.max(initial=0) >= len(values):
+                continue
+            is_peak = values[here] >= np.maximum(values[here - 1], values[here + 1])
+            least = np.maximum(10 ** (BESIDE_DB / 20) * excess.floor[here], 10 ** (ONE_SIDED_DB / 20) * values[there])
+            if np.any(np.all(is_peak & (values[here] >= least), axis=1)):
+                races[part_text(name, bearing.name)] = k, bearing.shaft
+    return races
+
+
 def parts_on_shaft(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> dict[tuple[int, str], list[str]]:
     """Name the races that impacts so many times a turn of a shaft may be of: within its slip, the order is whole.
 

@@ -560,6 +560,21 @@ def test_two_races_do_not_explain_each_other_away() -> None:
     assert NAMED & set(codes(analysis, Kind.FAULT, Kind.SUSPICION)) == {"bearing-inner-race"}
 
 
+@pytest.mark.parametrize(("strikes", "is_race"), [(4.982, True), (5.0, False)])
+def test_a_race_whose_only_lines_are_beside_those_of_its_shaft_is_not_called_sound(
+    strikes: float, *, is_race: bool
+) -> None:
+    """It rings longer than from knock to knock, and passes the load once a turn."""
+    recording = at_sensors(3.3, (0.0,))
+    turns = 29.0 * np.arange(recording.n_samples) / recording.sampling_rate_hz
+    ringing = np.random.default_rng(9).standard_normal(len(turns)) * (1 + np.cos(2 * np.pi * strikes * turns))
+    samples = recording.samples + 0.6 * ringing * np.clip(np.cos(2 * np.pi * turns), 0.0, None)
+    assert recording.rig is not None
+    analysis = analyze(with_bearings(replace(recording, samples=samples), recording.rig.bearings[1]))
+    why = "lines stand beside 5 times a turn of shaft motor, all to one side"
+    assert any(why in f.title for f in analysis.findings) is is_race
+
+
 def test_a_race_that_chance_hardly_explains_is_not_called_sound() -> None:
     undecided = finding(analyze(at_sensors(3.57, (1.0,), uneven=0.03, seconds=3.0)), "bearings-undecided")
     assert "lines stand at the order of the outer race of drive end, and the chance" in undecided.title
