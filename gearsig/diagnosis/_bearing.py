@@ -27,12 +27,14 @@ from gearsig.diagnosis._bearing_families import (
     mains_beside,
     part_text,
     parts_on_shaft,
+    races_beside_shaft,
     races_in_vibration,
     slip_of,
     speed_is_only_stated,
     underlying_impulse_train,
 )
 from gearsig.diagnosis._lines import N_COUNTED, factor_left_open, hunting_multiple, speed_is_confirmed
+from gearsig.diagnosis._rotor import half_speed_left_open
 from gearsig.diagnosis._signals import AnalysisSignals, BandEnvelope, KurtogramBand, without_shafts, witness_text
 from gearsig.diagnosis._types import (
     WITH_ASSUMED_DATA,
@@ -541,6 +543,8 @@ def _reasons_to_leave_open(
         if (times := factor_left_open(signals)) > 1:
             why = _other_speed_text(times)
         yield why, f"A tachometer, or a sensor nearer to the {'gears' if signals.rig.pairs else 'bearings'}."
+    if why := half_speed_left_open(signals):
+        yield f"{why}: every part has another order then", "Check the stated speed and the sampling rate."
     named_here = new((*families.named, *(c for c in families.trains if c.bearing is not None)))
     rival = next((r for c in named_here for r in c.rivals), "")
     besides = f"{rival} would show there as well" if rival else "something else explains them as well"
@@ -565,6 +569,9 @@ def _reasons_to_leave_open(
         lines = f"{len(comb.positions)} multiples of the order of the {race} stand in {channel} itself"
         why = f"{lines}, whose first ones a shaft's hide from the envelopes"
         yield why, "A recording at another load: slip parts a bearing from the shaft."
+    for race, (k, shaft) in races_beside_shaft(signals, envelopes).items():
+        beside = f"lines stand beside {k} times a turn of {named('shaft', shaft)}, all to one side"
+        yield f"{beside}, as those of the {race} may", longer
     for (k, shaft), on_shaft in parts_on_shaft(signals, envelopes).items():
         races = f"the order of the {' or '.join(on_shaft)} within its slip"
         why = f"impacts come {k} times a turn of {named('shaft', shaft)}, which is {races}"

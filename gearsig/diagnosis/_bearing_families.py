@@ -322,6 +322,9 @@ SAME_FAMILY = 5e-3
 FOUR_IN_FIVE = 0.8
 """Of a family's lines: another may stand where one of them would be."""
 
+PEAK_ERROR = 0.02
+"""By which a parabola misses a peak between lines, of their distance."""
+
 SECOND_DB = 12.0
 """A family so much weaker than another, in its own envelope or in the clearest one, is a by-product of it: sums and
 differences with the shaft and the cage, and the other bearing's sensor."""
@@ -341,24 +344,34 @@ def _is_sideband(signals: AnalysisSignals, candidate: Candidate, carrier: Candid
     """Whether a family is the sidebands of a race's: k (f - n s) is the sideband number k n of multiple k.
 
     An inner race turns through the load, so that it has them a shaft's order apart; an outer race where the load turns,
-    weaker than its own lines. Elements and cages have them a cage's order apart.
+    weaker than its own lines. Elements and cages have them a cage's order apart. Elements pass both races together as
+    often a turn as they are many: an inner and an outer race that are struck nearly a whole number of times are each
+    other's sidebands. The true one is that on whose sidebands the other's lines lie better, weighed by their slips.
     """
     shaft = signals.rig.ratio(carrier.bearing.shaft) if carrier.bearing is not None else None
-    turns = carrier.name == "BPFI" and candidate.name != "BPFI"
-    is_stronger = carrier.name in RACES and carrier.strength_db > candidate.strength_db
-    if not shaft or not (turns or is_stronger):
+    if not shaft:
         return False
-    if turns and _lies_on_sidebands(candidate, carrier, shaft):
-        return True
-    if candidate.name == "BPFI" and _lies_on_sidebands(carrier, candidate, shaft):
-        return False  # and not the other way about
+    there, back = (_off_sidebands(*two, shaft) for two in ((candidate, carrier), (carrier, candidate)))
+    resolution = candidate.envelope.excess.spectrum.resolution
+    lies_there, lies_back = (float(np.mean(off <= resolution)) >= FOUR_IN_FIVE for off in (there, back))
     distance = abs(candidate.comb.fundamental - carrier.comb.fundamental)
     n = round(distance / shaft)
-    return 1 <= n <= 3 and abs(distance - n * shaft) <= 2 * candidate.envelope.excess.spectrum.resolution
+    is_apart = 1 <= n <= 3 and abs(distance - n * shaft) <= 2 * resolution
+    if {candidate.name, carrier.name} == set(RACES) and (is_apart or lies_there or lies_back):
+        # Of n lines that scatter normally about where they belong, the likelihood goes with 1/scatter^n.
+        n_lines = min(len(there), len(back))
+        odds = [
+            _own_weight(signals, one) / float(np.mean(off / resolution) + PEAK_ERROR) ** n_lines
+            for one, off in ((carrier, there), (candidate, back))
+        ]
+        return odds[0] > odds[1]
+    if carrier.name == "BPFI" and candidate.name != "BPFI":
+        return lies_there or is_apart
+    return carrier.name in RACES and carrier.strength_db > candidate.strength_db and is_apart
 
 
-def _lies_on_sidebands(candidate: Candidate, carrier: Candidate, shaft: float) -> bool:
-    """Whether the peaks of a family are where another's multiples have up to three sidebands, four in five of them.
+def _off_sidebands(candidate: Candidate, carrier: Candidate, shaft: float) -> FloatArray:
+    """Return how far the peaks of a family are from another's multiples and from up to three sidebands of those.
 
     Of a race that is struck nearly a whole number of times a turn they lie about the multiples of many an order, but
     not on them.
@@ -366,8 +379,8 @@ def _lies_on_sidebands(candidate: Candidate, carrier: Candidate, shaft: float) -
     peaks, fundamental = np.array(candidate.comb.positions), carrier.comb.fundamental
     sidebands = shaft * np.arange(-3, 4)
     numbers = np.maximum(np.rint((peaks[:, None] - sidebands) / fundamental), 1)
-    beside = np.abs(peaks[:, None] - numbers * fundamental - sidebands).min(axis=1)
-    return len(peaks) > 0 and float(np.mean(beside <= candidate.envelope.excess.spectrum.resolution)) >= FOUR_IN_FIVE
+    beside: FloatArray = np.abs(peaks[:, None] - numbers * fundamental - sidebands).min(axis=1)
+    return beside
 
 
 def _strength_in(envelope: BandEnvelope, fundamental: float) -> float:
@@ -811,6 +824,46 @@ def _amplitude_beside(spectrum: Spectrum, place: float, strong: float) -> float:
         return spectrum.largest_near(strong, reach)[1]
     near = (np.abs(spectrum.positions - place) <= reach) & (np.abs(spectrum.positions - strong) > 1.25 * reach)
     return float(spectrum.values[near].max(initial=0.0))
+
+
+BESIDE_DB, ONE_SIDED_DB = 12.0, 6.0
+"""Heights, over the floor and over the place as far on the other side, from which lines beside multiples of a shaft are
+not what smears those."""
+
+
+def races_beside_shaft(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> dict[str, tuple[int, str]]:
+    """Return inner races of which one line and its sidebands may stand: a multiple of the shaft beside it, the shaft.
+
+    Where a race rings longer than from knock to knock, there are no further multiples; slip may also take the first so
+    near to a whole number of turns that it is taken for the shaft's. It and the two sidebands then lie as far from the
+    shaft's multiples, to one side: a speed that wanders spreads these to both, the more the higher. What is a multiple
+    of another shaft is that one's.
+    """
+    races = {}
+    for bearing, name, order in expected_parts(signals):
+        shaft = signals.rig.ratio(bearing.shaft)
+        k = round(order / shaft) if shaft else 0
+        if name != "BPFI" or k < 2 or not shaft:
+            continue
+        low, high = (order * (1 + side * slip_of(signals)) - k * shaft for side in (-1, 1))
+        others = [turns for turns in signals.known_shaft_orders.values() if turns != shaft]
+        for excess in (envelope.excess for envelope in envelopes):
+            values, width = excess.spectrum.values, excess.spectrum.resolution
+            off = np.arange(ceil(low / width), int(high / width) + 1) * width
+            places = k * shaft + off
+            is_free = np.all(
+                [np.abs(places - np.rint(places / turns) * turns) >= 2 * width for turns in others], axis=0
+            )
+            off = off[is_free & (np.abs(off) >= 2 * width), None]
+            multiples = np.arange(k - 1, k + 2) * shaft
+            here, there = (excess.line_numbers(multiples + side) for side in (off, -off))
+            if here.max(initial=0) + 1 >= len(values) or there.max(initial=0) >= len(values):
+                continue
+            is_peak = values[here] >= np.maximum(values[here - 1], values[here + 1])
+            least = np.maximum(10 ** (BESIDE_DB / 20) * excess.floor[here], 10 ** (ONE_SIDED_DB / 20) * values[there])
+            if np.any(np.all(is_peak & (values[here] >= least), axis=1)):
+                races[part_text(name, bearing.name)] = k, bearing.shaft
+    return races
 
 
 def parts_on_shaft(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> dict[tuple[int, str], list[str]]:

@@ -857,7 +857,8 @@ def _of_shaft(
     Unbalance adds 1× alone; misalignment 2×, of half of 1× or more; a bent shaft both; looseness many harmonics and
     halves; a rub halves, thirds and noise. A force that turns with the shaft makes no 2× but through a stiffness that
     bends, and shakes little in axial direction, where a bent shaft shakes most. Without a sensor there unbalance and a
-    bent shaft are one finding, as nothing tells them apart. Oil that whirls adds a line a little below half.
+    bent shaft are one finding, as nothing tells them apart, and so are looseness and a rub where halves or thirds come
+    without noise. Oil that whirls adds a line a little below half.
     """
     of_shaft = [c for c in risen if c.where.shaft == shaft and c.kind in ("shaft", "subharmonic")]
     added = {c.harmonic: _velocity(c, signals, since=True) for c in of_shaft}
@@ -898,7 +899,9 @@ def _of_shaft(
         f"{percent(power / total)} is at {c.label}" for c in of_shaft if (power := added[c.harmonic]) >= 0.01 * total
     )
     evidence = (f"{text}.", *_mains_at(max(of_shaft, key=lambda c: added[c.harmonic]), signals))
-    for causes in _told_apart(weights, are_told=bool(axial)):
+    alike: list[AbstractSet[str]] = [] if axial else [{"unbalance", "bent-shaft"}]
+    alike += [{"looseness", "rub"}] if fractions and not noise else []
+    for causes in _told_apart(weights, alike):
         share = sum(weights[cause] for cause in causes) / whole
         if share >= 0.1:
             titles, confirms = zip(*(SHAFT_CAUSES[cause] for cause in causes), strict=True)
@@ -920,14 +923,13 @@ def _mains_at(change: LevelChange, signals: AnalysisSignals) -> Iterator[str]:
             yield f"{place_hz:g} Hz of the mains is there, too, as far as this record tells: hum stays at standstill."
 
 
-def _told_apart(weights: Mapping[str, float], *, are_told: bool) -> list[list[str]]:
-    """Return the causes, likeliest first; unbalance and a bent shaft in one where nothing tells them apart."""
-    causes = sorted(weights, key=lambda cause: -weights[cause])
-    if are_told:
-        return [[cause] for cause in causes]
-    of_one_turn = [cause for cause in causes if cause in ("unbalance", "bent-shaft")]
-    groups = [of_one_turn, *([cause] for cause in causes if cause not in of_one_turn)]
-    return sorted(groups, key=lambda group: -sum(weights[cause] for cause in group))
+def _told_apart(weights: Mapping[str, float], alike: Sequence[AbstractSet[str]]) -> list[list[str]]:
+    """Return the causes, likeliest first; those that nothing tells apart in one."""
+    groups: dict[str, list[str]] = {}
+    for cause in sorted(weights, key=lambda cause: -weights[cause]):
+        first = next((first for first in groups if any({first, cause} <= causes for causes in alike)), cause)
+        groups.setdefault(first, []).append(cause)
+    return sorted(groups.values(), key=lambda group: -sum(weights[cause] for cause in group))
 
 
 def _is_axial(change: LevelChange, signals: AnalysisSignals) -> bool:

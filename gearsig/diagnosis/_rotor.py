@@ -61,19 +61,54 @@ def detect_between_orders(signals: AnalysisSignals) -> Iterator[Finding]:
 
     Healthy rotors have neither. A gear train has shafts at all ratios, and a run-up's lines pass resonances.
     """
-    angle = signals.angle
-    if signals.rig.pairs or not signals.order_excess or angle is None or not angle.is_steady(UNSTEADY):
+    if not _may_be_examined(signals):
         return
-    for shaft, order in signals.known_shaft_orders.items():
-        seen = [_at_fractions(signals, channel, order, of) for of in FRACTIONS for channel in signals.order_excess]
-        fractions = max((one for one in seen if one is not None), key=lambda one: one.size, default=None)
-        if fractions is not None:
-            yield _fractions(signals, shaft, fractions)
+    for shaft, fractions in _largest_fractions(signals):
+        yield _fractions(signals, shaft, fractions)
     for shaft, order in shafts_of_whirl(signals).items():
         whirls = [_whirl(signals, channel, order) for channel in signals.order_excess]
         whirl = max((one for one in whirls if one is not None), key=lambda one: one.size, default=None)
         if whirl is not None:
             yield _oil_whirl(signals, shaft, order, whirl)
+
+
+def _may_be_examined(signals: AnalysisSignals) -> bool:
+    angle = signals.angle
+    return bool(signals.order_excess) and not signals.rig.pairs and angle is not None and angle.is_steady(UNSTEADY)
+
+
+def _largest_fractions(signals: AnalysisSignals) -> Iterator[tuple[str, _Between]]:
+    """Yield each shaft at whose halves or thirds lines stand, with the largest of all channels."""
+    for shaft, order in signals.known_shaft_orders.items():
+        seen = [_at_fractions(signals, channel, order, of) for of in FRACTIONS for channel in signals.order_excess]
+        fractions = max((one for one in seen if one is not None), key=lambda one: one.size, default=None)
+        if fractions is not None:
+            yield shaft, fractions
+
+
+def half_speed_left_open(signals: AnalysisSignals) -> str:
+    """Say of which shaft a line at a half of its order exceeds all its multiples, and what does it; empty if of none.
+
+    Not a sentence yet.
+    """
+    seen = _largest_fractions(signals) if _may_be_examined(signals) else ()
+    return next((_half_speed_text(shaft) for shaft, one in seen if _may_be_of_half_speed(signals, one)), "")
+
+
+def _may_be_of_half_speed(signals: AnalysisSignals, fractions: _Between) -> bool:
+    """Whether a shaft may turn half as fast as stated: the largest line of most rotors is once a turn.
+
+    Not where its speed is measured. Rubs, too, may make the largest line at a half.
+    """
+    is_stated = signals.angle is not None and signals.angle.method == "constant"
+    return is_stated and fractions.kind == FRACTIONS[2] and fractions.size >= 1.0
+
+
+def _half_speed_text(shaft: str) -> str:
+    return (
+        f"a line at half of the order of {named('shaft', shaft) or 'the shaft'} exceeds all its multiples, as if it "
+        "turned half as fast as stated, or the sampling rate were twice the stated one"
+    )
 
 
 def shafts_of_whirl(signals: AnalysisSignals) -> dict[str, float]:
@@ -179,16 +214,21 @@ _BASIS = "how well the textbook's signs fit, one recording alone; not calibrated
 
 
 def _fractions(signals: AnalysisSignals, shaft: str, fractions: _Between) -> Finding:
-    count, name = len(fractions.places), named("shaft", shaft) if shaft else "the shaft"
+    count, name = len(fractions.places), named("shaft", shaft) or "the shaft"
     orders = ", ".join(f"{place:.4g}" for place in fractions.places)
     chance = f"chance of so many {p_text(fractions.p_value)}"
     other = "A shaft at exactly a third of the speed"
     if fractions.kind == FRACTIONS[2]:
         other = "A four-stroke engine, or a shaft at exactly half the speed,"
+    title = f"Perhaps looseness or a rub of {name}: lines stand at {fractions.kind} of its order."
+    surer = "Bolts, feet and fits of the bearings; seals for marks; an earlier recording of the machine."
+    if _may_be_of_half_speed(signals, fractions):
+        title = f"Perhaps a wrong speed or sampling rate, else looseness or a rub: {_half_speed_text(shaft)}."
+        surer = f"Check the stated speed and the sampling rate first. {surer}"
     return Finding(
         HALF_ORDERS,
         Kind.SUSPICION if fractions.size >= OF_SOME_SIZE else Kind.NOTICE,
-        f"Perhaps looseness or a rub of {name}: lines stand at {fractions.kind} of its order.",
+        title,
         signals.where(fractions.largest.position, fractions.channel, shaft=shaft),
         fractions.largest.strength("noise floor"),
         0.5,
@@ -198,7 +238,7 @@ def _fractions(signals: AnalysisSignals, shaft: str, fractions: _Between) -> Fin
             f"The largest has {percent(fractions.size)} of the velocity of the shaft's largest multiple.",
             f"{other} would show the same.",
         ),
-        "Bolts, feet and fits of the bearings; seals for marks; an earlier recording of the machine.",
+        surer,
     )
 
 

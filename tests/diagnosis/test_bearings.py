@@ -346,10 +346,12 @@ def at_sensors(
     uneven: float = 0.003,
     seconds: float = SECONDS,
     turning: bool = False,
+    unbalance: float = 0.0,
 ) -> Recording:
     """Return a motor's drive and fan end, with impacts at an order of its shaft, every second `odd` times as high.
 
-    Distances of the impacts scatter by `uneven` of their mean; a part that is `turning` passes the load with the shaft.
+    Distances of the impacts scatter by `uneven` of their mean; a part that is `turning` passes the load with the shaft,
+    and a share `unbalance` of the load turns.
     """
     rng, fs_hz, shaft_hz = np.random.default_rng(seed), 12_000.0, 29.0
     n = int(seconds * fs_hz)
@@ -359,6 +361,7 @@ def at_sensors(
     impacts[hits] = np.where(np.arange(len(hits)) % 2, odd, 1.0)
     if turning:
         impacts *= np.clip(np.cos(2 * np.pi * turns), 0.0, None) ** 1.5
+    impacts *= np.clip(1 + unbalance * np.cos(2 * np.pi * turns), 0.0, None)
     ring = np.convolve(impacts, np.exp(-k / 25) * np.sin(1.6 * k))[:n]
     shaft = sum(0.5 / h * np.cos(2 * np.pi * h * turns + rng.uniform(0, 6.28)) for h in range(1, 9))
     samples = np.stack([height * ring + shaft + rng.standard_normal(n) for height in heights])
@@ -537,6 +540,39 @@ def test_sidebands_of_an_inner_race_are_no_second_part() -> None:
     recording = at_sensors(4.97, (4.0,), uneven=0.01, seconds=3.0, turning=True)
     bearing = Bearing("drive end", "motor", bpfo_order=3.05, bpfi_order=4.99, bsf_order=1.989)
     assert NAMED & set(codes(analyze(with_bearings(recording, bearing)))) == {"bearing-inner-race"}
+
+
+def test_an_outer_race_under_a_load_that_turns_is_not_explained_away_by_its_own_sidebands() -> None:
+    """They fall on the inner race's order, as eight balls strike the races together nearly eight times a turn."""
+    recording = at_sensors(3.02, (8.0,), seconds=4.0, unbalance=1.0)
+    assert recording.rig is not None
+    analysis = analyze(with_bearings(recording, recording.rig.bearings[1]))
+    assert NAMED & set(codes(analysis, Kind.FAULT, Kind.SUSPICION)) == {"bearing-outer-race"}
+
+
+def test_two_races_do_not_explain_each_other_away() -> None:
+    """Tones of an inverter, 2.02 turns apart, beat at 3.03: there an outer race has a family, two turns below 5.03."""
+    recording = at_sensors(5.03, (2.0,), turning=True, uneven=0.008, seconds=5.0)
+    t = np.arange(recording.n_samples) / recording.sampling_rate_hz
+    tones = sum(2.0 * np.cos(2 * np.pi * (4000 + k * 2.02 * 29.0) * t + k**2) for k in (-2, -1, 1, 2))
+    bearing = Bearing("drive end", "motor", 8, 7.145, 28.519)
+    analysis = analyze(with_bearings(replace(recording, samples=recording.samples + tones), bearing))
+    assert NAMED & set(codes(analysis, Kind.FAULT, Kind.SUSPICION)) == {"bearing-inner-race"}
+
+
+@pytest.mark.parametrize(("strikes", "is_race"), [(4.982, True), (5.0, False)])
+def test_a_race_whose_only_lines_are_beside_those_of_its_shaft_is_not_called_sound(
+    strikes: float, *, is_race: bool
+) -> None:
+    """It rings longer than from knock to knock, and passes the load once a turn."""
+    recording = at_sensors(3.3, (0.0,))
+    turns = 29.0 * np.arange(recording.n_samples) / recording.sampling_rate_hz
+    ringing = np.random.default_rng(9).standard_normal(len(turns)) * (1 + np.cos(2 * np.pi * strikes * turns))
+    samples = recording.samples + 0.6 * ringing * np.clip(np.cos(2 * np.pi * turns), 0.0, None)
+    assert recording.rig is not None
+    analysis = analyze(with_bearings(replace(recording, samples=samples), recording.rig.bearings[1]))
+    why = "lines stand beside 5 times a turn of shaft motor, all to one side"
+    assert any(why in f.title for f in analysis.findings) is is_race
 
 
 def test_a_race_that_chance_hardly_explains_is_not_called_sound() -> None:
