@@ -264,6 +264,8 @@ def test_what_is_chosen_can_be_read_in_a_small_window(page: playwright.Page, add
             .map((part) => part.value || part.textContent)"""
     )
     assert not cut
+    how = "fields => fields.map(field => getComputedStyle(field, '::placeholder').textOverflow)"
+    assert set(page.locator("input[placeholder]").evaluate_all(how)) <= {"ellipsis"}  # where it must be shortened
 
 
 def test_own_files(page: playwright.Page) -> None:

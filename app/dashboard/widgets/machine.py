@@ -209,7 +209,7 @@ def _ask_stated(place: DeltaGenerator, file: ChosenFile, label: str, name: str, 
     place.number_input(
         label,
         value=stated(file, name),
-        placeholder="from the file" if name == "rate" else "from the file or the signal",
+        placeholder="from the file" if name == "rate" else "as found",
         format=NUMBER,
         help=about,
         key=state.source_key(f"asked {name}", file.sha256),
@@ -442,7 +442,7 @@ def _config(kind: str, rows: Sequence[Table], rig: Table, channels: Sequence[str
         texts = [str(row[name]) for row in rows if name in row]
         looks: dict[str, Any] = {"label": label, "width": _width_px(label, texts)}
         looks |= {"help": whole} if name in SHORT_LABELS else {}
-        looks |= {"pinned": True} if (kind, name) == ("bearing", "name") else {}  # the widest table, which scrolls
+        looks |= {"pinned": True} if name == COLUMNS[kind][0] else {}  # where a small window scrolls a wide table
         if name in choices:  # and what the file says besides, such as a bearing with its maker's name
             made[name] = column.SelectboxColumn(**looks, options=list(dict.fromkeys([*choices[name], *texts])))
         elif name.endswith(("_teeth", "elements")):
@@ -481,7 +481,10 @@ def _edit_speed(
     looks: dict[str, Any] = {"key": key("speed"), "on_change": _forget_speed, "args": (file,)}
     chosen = row[1].selectbox("Speed from", known, known.index(first), **looks)
     if chosen == "constant" and (is_stated or source != chosen):
-        about = "Of the reference shaft, if it held still; refined by the signal. It overrides what the file says."
+        about = (
+            "Of the reference shaft, if it held still; refined by the signal. It overrides what the file says; without "
+            "it the speed is the file's, or found in the signal."
+        )
         _ask_stated(row[2], file, "Constant speed (rpm)", "speed", about)
         return speed if is_stated or source not in known else {}
     if chosen == PULSE_TIMES:

@@ -127,6 +127,7 @@ _PLACES = {
     "[machine] in the rig file": "size and mounting under Machine",
     "[machine] of the rig file": "size and mounting under Machine",
     "operating_point.": "nominal ",
+    "the teeth in a rig file": "the teeth under Machine",
     "Give the bearings in the rig file": "Describe the bearings under Machine",
     "/s^2": "/s²",
 }
