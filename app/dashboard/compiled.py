@@ -35,7 +35,7 @@ def is_being_made() -> bool:
 
 def _compile_and_load(mark: Path) -> None:
     # not a pool: the server would wait for that at its end
-    process = get_context("spawn").Process(target=_compile, daemon=True)
+    process = get_context("spawn").Process(target=compile_all, daemon=True)
     process.start()
     process.join()
     if process.exitcode == 0:
@@ -44,7 +44,7 @@ def _compile_and_load(mark: Path) -> None:
     # else the first simulation compiles it, and says what is wrong
 
 
-def _compile() -> None:
+def compile_all() -> None:
     """Do what the start page offers first, an analysis, then what takes longer to compile."""
     from app.samples import samples
     from gearsig.diagnosis import analyze_file
@@ -53,7 +53,8 @@ def _compile() -> None:
 
     first = samples()[0]
     rig = read_rig(first.rig)
-    analyze_file(first.recording, rig, reference=first.reference and read_recording(first.reference, rig=rig))
+    reference = None if first.reference is None else read_recording(first.reference, rig=rig)
+    analyze_file(first.recording, rig, reference=reference)
     run_every_model()
 
 

@@ -10,7 +10,7 @@ import pytest
 from streamlit.dataframe_util import convert_arrow_bytes_to_pandas_df
 from streamlit.testing.v1 import AppTest
 
-from app.dashboard import state
+from app.dashboard import compiled, state
 from app.dashboard.analysis import VIEWS
 from app.dashboard.cached import command_of
 from app.dashboard.state import ChosenFile
@@ -48,6 +48,14 @@ def test_a_sample_is_open_at_the_start() -> None:
     assert not page.exception
     assert "tooth" in page.subheader[0].value
     assert page.subheader[0].value.startswith("Fault")
+
+
+def test_what_the_start_page_offers_first_is_compiled_first(monkeypatch) -> None:
+    done = []
+    monkeypatch.setattr("gearsig.diagnosis.analyze_file", lambda path, *_, **__: done.append(path.name))
+    monkeypatch.setattr(compiled, "run_every_model", lambda: done.append("models"))
+    compiled.compile_all()
+    assert done == [SAMPLES["damaged_tooth"].recording.name, "models"]
 
 
 @pytest.mark.slow
