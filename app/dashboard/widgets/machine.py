@@ -442,7 +442,8 @@ def _config(kind: str, rows: Sequence[Table], rig: Table, channels: Sequence[str
         texts = [str(row[name]) for row in rows if name in row]
         looks: dict[str, Any] = {"label": label, "width": _width_px(label, texts)}
         looks |= {"help": whole} if name in SHORT_LABELS else {}
-        looks |= {"pinned": True} if name == COLUMNS[kind][0] else {}  # where a small window scrolls a wide table
+        if name == COLUMNS[kind][0] and kind != "shaft":  # a small window scrolls the wide tables
+            looks["pinned"] = True
         if name in choices:  # and what the file says besides, such as a bearing with its maker's name
             made[name] = column.SelectboxColumn(**looks, options=list(dict.fromkeys([*choices[name], *texts])))
         elif name.endswith(("_teeth", "elements")):
