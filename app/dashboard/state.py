@@ -109,7 +109,8 @@ class ChosenFile:
 
     def request(self, *, sampling_rate_hz: float | None = None, speed_rpm: float | None = None) -> AnalysisRequest:
         """Return the request to read it, with what the file does not state."""
-        return AnalysisRequest(self.name, self.sha256, self.rig_name, self.rig_text, sampling_rate_hz, speed_rpm)
+        known = self.name, self.sha256, self.rig_name, self.rig_text
+        return AnalysisRequest(*known, sampling_rate_hz, speed_rpm, pulses=self.pulses)
 
 
 def pages() -> dict[str, StreamlitPage]:

@@ -141,7 +141,8 @@ def choose_with_rig(label: str, key: str, *, about: str = KINDS) -> tuple[Chosen
             raise InputError(
                 f"{len(files)} {kind} are given: {', '.join(file.name for file in files)}",
                 allowed="one recording, and one rig file that describes its machine",
-                remedy="remove the others; `gearsig report FOLDER` makes pages of many",
+                remedy="remove the others; times of tachometer pulses are given afterwards, under Machine, and "
+                "`gearsig report FOLDER` makes pages of many",
             )
     if not recordings:
         return None, bool(rigs)
@@ -301,10 +302,9 @@ def simulated_file(made: Chosen) -> ChosenFile:
 def _described(file: ChosenFile, with_reference: bool) -> Chosen:
     """Add the machine as it stands in this session, what the file does not state, and a reference."""
     text = machine_text(file)
-    request = replace(file, rig_text=text).request(
+    request = replace(file, rig_text=text, pulses=stated_pulses(file)).request(
         sampling_rate_hz=stated(file, "rate"), speed_rpm=stated(file, "speed")
     )
-    request = replace(request, pulses=stated_pulses(file))
     if not with_reference:
         return Chosen(request, file.content)
     reference, rate_hz = _choose_reference(file)
