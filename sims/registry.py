@@ -12,7 +12,7 @@ import numpy as np
 from gearsig.checks import count, known_name
 from gearsig.gap import DriveSimulator, GapSimulator
 from gearsig.recording import Recording
-from sims.effects import EffectSetting
+from sims.effects import EffectSetting, effects
 from sims.machine import Operation, Profile
 from sims.presets import preset
 from sims.simulator import ParameterValue, SimulationSetup
@@ -23,9 +23,14 @@ if TYPE_CHECKING:
     from sims.reduced_fe import ReducedPair
 
 
-@cache
 def simulators() -> dict[str, CrackedPair | ReducedPair | ForgingManipulator]:
     """Return every simulator by its name."""
+    return _simulators(tuple(effects()))
+
+
+@cache
+def _simulators(_: tuple[str, ...]) -> dict[str, CrackedPair | ReducedPair | ForgingManipulator]:
+    """Return the simulators that know these effects: others once a user's own is added."""
     from sims.cracked import CrackedPair
     from sims.forging import ForgingManipulator
     from sims.reduced_fe import ReducedPair

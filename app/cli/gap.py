@@ -100,7 +100,8 @@ def gap(
     """Say where recordings differ from the simulation of their rig, which effect causes it, how far it shrinks then.
 
     Give recordings at several speeds and loads if there are any, and recordings of the same rig when it was healthy:
-    both make the answer much surer. It takes up to a minute on two cores; the rig's simulations are kept for the next.
+    both make the answer much surer. The first answer for a rig takes about a minute on two free cores; its simulations
+    are kept, and the next answer at the same speed and load takes a quarter of that.
 
     Example: gearsig gap slow.h5 fast.h5 --rig gearbox.toml --reference healthy.h5 -o gap
     """

@@ -632,6 +632,7 @@ def analysed(file: ChosenFile, chosen: Chosen) -> Analysis | None:
         return analysis_of(chosen.request, chosen.content, chosen.reference)
     except GearsigError as error:
         show_error(error)
-        if machine_text(file) or in_page_words(str(error)) != str(error):  # which speaks of the form
+        speaks_of_form = in_page_words(str(error)) != str(error)
+        if machine_text(file) or chosen.request.pulses is not None or speaks_of_form:
             show_machine(file, is_told=True)
         return None

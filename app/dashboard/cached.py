@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import streamlit as st
 
@@ -22,7 +22,7 @@ from gearsig.errors import options_named
 if TYPE_CHECKING:
     from gearsig.diagnosis import Analysis
     from gearsig.recording import ChannelProblem, Recording
-    from gearsig.rig import ConstantSpeed, Rig
+    from gearsig.rig import ConstantSpeed, Rig, SpeedSource
 
 
 # --------------------
@@ -60,7 +60,7 @@ def read_rig_text(text: str, name: str = "rig.toml") -> Rig | None:
 
 
 def read_content(
-    content: bytes | Content, name: str, *, rig: Rig | None, sampling_rate_hz: float | None, speed_rpm: float | None
+    content: bytes | Content, name: str, *, rig: Rig | None, sampling_rate_hz: float | None, speed: SpeedSource | None
 ) -> Recording:
     """Read a recording from a file of this machine, e.g. a sample, or from the bytes of a file called `name`.
 
@@ -70,7 +70,8 @@ def read_content(
     name : str
         As the browser gave it; never trusted as a path.
     rig : Rig or None
-    sampling_rate_hz, speed_rpm : float or None
+    sampling_rate_hz : float or None
+    speed : SpeedSource or None
         Of files that do not state them.
 
     Raises
@@ -81,7 +82,7 @@ def read_content(
     from gearsig.diagnosis import read_whole
 
     with _as_file(content, name) as path:
-        recording = read_whole(path, rig, sampling_rate_hz=sampling_rate_hz, speed=_constant(speed_rpm))
+        recording = read_whole(path, rig, sampling_rate_hz=sampling_rate_hz, speed=speed)
     return recording if isinstance(content, Path) else _named(recording, name)
 
 
@@ -108,6 +109,17 @@ def _constant(speed_rpm: float | None) -> ConstantSpeed | None:
     return None if speed_rpm is None else ConstantSpeed(speed_rpm)
 
 
+def _stated_speed(request: AnalysisRequest) -> SpeedSource | None:
+    """Return what the user states of the speed: times of pulses, else a constant one."""
+    from gearsig.recording import read_pulse_times
+
+    pulses = request.pulses
+    if pulses is None:
+        return _constant(request.speed_rpm)
+    with _as_file(pulses.content, pulses.name) as path:
+        return read_pulse_times(path, pulses.pulses_per_revolution)
+
+
 @kept(6, "Reading …", key=lambda request, _, rig=None: (request, rig and rig.key()))
 def recorded(request: AnalysisRequest, content: Content, rig: Rig | None = None) -> Recording:
     """Return a recording as requested; `rig` is for files without a rig file of their own.
@@ -119,7 +131,7 @@ def recorded(request: AnalysisRequest, content: Content, rig: Rig | None = None)
     """
     own_rig = read_rig_text(request.rig_text, request.rig_name)
     rig, rate_hz = own_rig if own_rig is not None else rig, request.sampling_rate_hz
-    return read_content(content, request.name, rig=rig, sampling_rate_hz=rate_hz, speed_rpm=request.speed_rpm)
+    return read_content(content, request.name, rig=rig, sampling_rate_hz=rate_hz, speed=_stated_speed(request))
 
 
 def analysis_of(request: AnalysisRequest, content: Content, reference: Content | None = None) -> Analysis:
@@ -135,8 +147,8 @@ def analysis_of(request: AnalysisRequest, content: Content, reference: Content |
 
 
 # Each holds its recording and several spectra, a few times the size of the file: of large ones fewer are kept.
-def _size(content: Content) -> int:
-    return content.stat().st_size if isinstance(content, Path) else content.nbytes
+def _size(content: bytes | Content) -> int:
+    return content.stat().st_size if isinstance(content, Path) else len(content)
 
 
 def read_and_analyze(request: AnalysisRequest, content: Content, reference: Content | None = None) -> Analysis:
@@ -150,18 +162,21 @@ def read_and_analyze(request: AnalysisRequest, content: Content, reference: Cont
     )
 
     rig = read_rig_text(request.rig_text, request.rig_name)
-    given: dict[str, Any] = {"sampling_rate_hz": request.sampling_rate_hz, "speed": _constant(request.speed_rpm)}
+    rate_hz, speed = request.sampling_rate_hz, _stated_speed(request)
     then = None
     if reference is not None:
         with _as_file(reference, request.reference_name) as path, options_named(REFERENCE_OPTIONS):
             # A sample's machine may have been mended in the form.
-            its_rig, rate_hz = rig_and_rate_of_reference(
-                path, rig, request.sampling_rate_hz, request.reference_rate_hz, is_same_machine=True
+            its_rig, its_rate_hz = rig_and_rate_of_reference(
+                path, rig, rate_hz, request.reference_rate_hz, is_same_machine=True
             )
-            read = read_usual_part(path, its_rig, **{**given, "sampling_rate_hz": rate_hz})
+            # pulse times belong to the other recording
+            read = read_usual_part(path, its_rig, sampling_rate_hz=its_rate_hz, speed=_constant(request.speed_rpm))
             then = _named(read, request.reference_name)
     with _as_file(content, request.name) as path:
-        result = analyze_file(path, rig, reference=then, torque_nm=request.torque_nm, **given)
+        result = analyze_file(
+            path, rig, reference=then, torque_nm=request.torque_nm, sampling_rate_hz=rate_hz, speed=speed
+        )
     analysis = result.as_one() if isinstance(result, LongAnalysis) else result
     return replace(analysis, recording=_named(analysis.recording, request.name, request.sha256))
 
@@ -209,8 +224,12 @@ def remember_file(token: str, file: ChosenFile) -> None:
     files = _recent()
     files.pop(token, None)
     files[token] = file
-    while len(files) > 1 and (len(files) > N_RECENT or sum(_size(f.content) for f in files.values()) > RECENT_BYTES):
+    while len(files) > 1 and (len(files) > N_RECENT or sum(map(_kept_size, files.values())) > RECENT_BYTES):
         del files[next(iter(files))]
+
+
+def _kept_size(file: ChosenFile) -> int:
+    return _size(file.content) + (0 if file.pulses is None else _size(file.pulses.content))
 
 
 def kept_file(token: str) -> ChosenFile | None:
@@ -232,4 +251,7 @@ def stated_options(request: AnalysisRequest) -> list[str]:
     """Return the options of the command line for the rig file, and for what the recording does not state."""
     words = ["--rig", request.rig_name] if request.rig_text.strip() else []
     words += ["--fs", f"{request.sampling_rate_hz:.15g}"] if request.sampling_rate_hz is not None else []
-    return words + (["--speed-rpm", f"{request.speed_rpm:.15g}"] if request.speed_rpm is not None else [])
+    words += ["--speed-rpm", f"{request.speed_rpm:.15g}"] if request.speed_rpm is not None else []
+    if (pulses := request.pulses) is not None:
+        words += ["--tach-times", pulses.name, "--pulses-per-revolution", str(pulses.pulses_per_revolution)]
+    return words

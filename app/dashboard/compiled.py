@@ -1,4 +1,4 @@
-"""The simulators' compiled code, made ahead of the first look: once an installation, beside the dashboard."""
+"""Compiled code, made ahead of the first look: once an installation, beside the dashboard."""
 
 from __future__ import annotations
 
@@ -35,13 +35,27 @@ def is_being_made() -> bool:
 
 def _compile_and_load(mark: Path) -> None:
     # not a pool: the server would wait for that at its end
-    process = get_context("spawn").Process(target=run_every_model, daemon=True)
+    process = get_context("spawn").Process(target=compile_all, daemon=True)
     process.start()
     process.join()
     if process.exitcode == 0:
         keep(mark, lambda file: file.write(b"compiled\n"))
         run_every_model()
     # else the first simulation compiles it, and says what is wrong
+
+
+def compile_all() -> None:
+    """Do what the start page offers first, an analysis, then what takes longer to compile."""
+    from app.samples import samples
+    from gearsig.diagnosis import analyze_file
+    from gearsig.recording import read_recording
+    from gearsig.rig import read_rig
+
+    first = samples()[0]
+    rig = read_rig(first.rig)
+    reference = None if first.reference is None else read_recording(first.reference, rig=rig)
+    analyze_file(first.recording, rig, reference=reference)
+    run_every_model()
 
 
 def _load(_: Path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import secrets
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,6 +22,24 @@ _CHOSEN, _SIMULATED, _FILES, _OPENED, _TOKENS = "chosen", "simulated", "kept fil
 _GAP_STARTS, _PAGES = "gap starts", "pages"
 Content = Path | memoryview
 """Of a file: on this machine, or in memory."""
+
+
+@dataclass(frozen=True)
+class PulseFile:
+    """Times of tachometer pulses that the user gives beside a recording.
+
+    Parameters
+    ----------
+    name, sha256 : str
+    content : bytes
+        Of the file, which `gearsig.recording.read_pulse_times` reads.
+    pulses_per_revolution : int
+    """
+
+    name: str
+    sha256: str
+    content: bytes = field(repr=False, compare=False)
+    pulses_per_revolution: int = 1
 
 
 @dataclass(frozen=True)
@@ -44,6 +62,8 @@ class AnalysisRequest:
         What the user states where the rig does not.
     reference_rate_hz : float or None
         Sampling rate that the user states of the reference, where it is another one than the recording's.
+    pulses : PulseFile or None
+        What tells the speed, in place of what the rig or the file says.
     """
 
     name: str
@@ -56,6 +76,7 @@ class AnalysisRequest:
     reference_sha256: str = ""
     torque_nm: float | None = None
     reference_rate_hz: float | None = None
+    pulses: PulseFile | None = None
 
 
 @dataclass(frozen=True)
@@ -76,6 +97,7 @@ class ChosenFile:
     name, sha256 : str
     content : Path or memoryview
     rig_name, rig_text : str
+    pulses : PulseFile or None
     """
 
     name: str
@@ -83,10 +105,12 @@ class ChosenFile:
     content: Content
     rig_name: str = "rig.toml"
     rig_text: str = ""
+    pulses: PulseFile | None = None
 
     def request(self, *, sampling_rate_hz: float | None = None, speed_rpm: float | None = None) -> AnalysisRequest:
         """Return the request to read it, with what the file does not state."""
-        return AnalysisRequest(self.name, self.sha256, self.rig_name, self.rig_text, sampling_rate_hz, speed_rpm)
+        known = self.name, self.sha256, self.rig_name, self.rig_text
+        return AnalysisRequest(*known, sampling_rate_hz, speed_rpm, pulses=self.pulses)
 
 
 def pages() -> dict[str, StreamlitPage]:

@@ -201,7 +201,7 @@ def find_roles(recording: Recording, pair: GearPair, assigned: Mapping[str, str]
             raise InputError(
                 f"channels {', '.join(map(repr, fitting))} may all be the {role}",
                 where=recording.provenance.source or "recording",
-                remedy=f'say which, e.g. --use "{role}={fitting[0]}", or give positions in their [[sensor]] tables',
+                remedy=f'give positions in their [[sensor]] tables, or say which to use as "{role}"',
             )
         if role not in chosen and fitting:
             chosen[role] = fitting[0]
@@ -618,8 +618,8 @@ class _Reader:
         if angle_role not in self.roles and speed_role not in self.roles:
             raise RefusalError(
                 f"neither angle nor speed of the {side} gear was measured: how far the flanks are apart is not known",
-                remedy=f'name the channel, e.g. --use "{angle_role}=CHANNEL", or give it quantity = "angle" and the '
-                "shaft's name as position in its [[sensor]] table; an acceleration alone drifts away",
+                remedy='give its channel quantity = "angle" and the shaft\'s name as position in its [[sensor]] table, '
+                f'or use it as "{angle_role}"; an acceleration alone drifts away',
             )
         speed = self.measured(speed_role) if speed_role in self.roles else None
         if angle_role in self.roles:

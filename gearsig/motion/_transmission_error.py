@@ -268,8 +268,8 @@ def _both_angles(
     if missing:
         raise RefusalError(
             f"the angle of the {missing[0]} gear was not measured: a transmission error takes both",
-            remedy=f'fit an encoder to each shaft; name the channel with --use "{missing[0]} angle=CHANNEL", or give '
-            "its shaft's name as position in its [[sensor]] table",
+            remedy="fit an encoder to each shaft, and give its channel the shaft's name as position in its [[sensor]] "
+            f'table, or use it as "{missing[0]} angle"',
         )
     if not pair.pressure_angle_deg:
         notes.append(f"the pressure angle is not stated: {USUAL_PRESSURE_ANGLE_DEG:g}° is assumed")

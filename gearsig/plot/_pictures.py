@@ -428,9 +428,16 @@ class _Panel:
 
 
 def _path(x: FloatArray, y: FloatArray) -> str:
-    """Return a path in steps of a tenth of a unit, each from the one before: half the letters of places."""
+    """Return a path in steps of a tenth of a unit, each from the one before: half the letters of places.
+
+    Examples
+    --------
+    >>> _path(np.array([1.0, 1.3, 11.0]), np.array([2.0, 1.5, 1.5]))
+    'M1 2l.3-.5 9.7 0'
+    """
     places = np.rint(10 * np.column_stack([x, y])).astype(int)
     steps = " ".join(f"{across / 10:g} {up / 10:g}" for across, up in np.diff(places, axis=0))
+    steps = re.sub(r"\b0\.", ".", steps).replace(" -", "-")  # a fifth of the letters, which say nothing
     return f"M{places[0, 0] / 10:g} {places[0, 1] / 10:g}" + (f"l{steps}" if steps else "")
 
 

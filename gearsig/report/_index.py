@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -37,7 +38,7 @@ class Entry:
     outcome : Outcome
     verdict : str
     conclusion : str
-        The verdict without what has changed: what the index shows.
+        The verdict without what has changed and without its outcome, which stands beside it: what the index shows.
     confidence : float or None
         Of the fault or suspicion in the verdict; None without one.
     sure_of : str
@@ -92,7 +93,7 @@ def entry_of(analysis: Analysis, name: str, page: str) -> Entry:
         page,
         analysis.outcome,
         analysis.verdict,
-        " ".join(headline_of(analysis, with_remedy=True)).strip(),
+        without_outcome(" ".join(headline_of(analysis, with_remedy=True)).strip(), analysis.outcome),
         top.confidence if top is not None else None,
         sure_of(top) if top is not None else "",
         top.strength.ratio_db if top is not None and top.strength is not None else None,
@@ -100,6 +101,19 @@ def entry_of(analysis: Analysis, name: str, page: str) -> Entry:
         crack_mm,
         machine=analysis.rig.name if analysis.rig is not None else "",
     )
+
+
+def without_outcome(text: str, outcome: Outcome) -> str:
+    """Return a verdict without the outcome that it begins with.
+
+    Examples
+    --------
+    >>> without_outcome("Fault: Damage at a tooth.", Outcome.FAULT)
+    'Damage at a tooth.'
+    >>> without_outcome("Cannot tell.", Outcome.CANNOT_TELL)
+    'Cannot tell.'
+    """
+    return re.sub(rf"(?i)^{re.escape(outcome.value)}[:.] +", "", text)
 
 
 def by_severity(entry: Entry) -> tuple[int, float, float, float, str]:

@@ -10,8 +10,9 @@ import pytest
 from streamlit.dataframe_util import convert_arrow_bytes_to_pandas_df
 from streamlit.testing.v1 import AppTest
 
-from app.dashboard import state
+from app.dashboard import compiled, state
 from app.dashboard.analysis import VIEWS
+from app.dashboard.cached import command_of
 from app.dashboard.state import ChosenFile
 from app.dashboard.widgets.texts import in_page_words
 from gearsig.recording import write_recording
@@ -47,6 +48,14 @@ def test_a_sample_is_open_at_the_start() -> None:
     assert not page.exception
     assert "tooth" in page.subheader[0].value
     assert page.subheader[0].value.startswith("Fault")
+
+
+def test_what_the_start_page_offers_first_is_compiled_first(monkeypatch) -> None:
+    done = []
+    monkeypatch.setattr("gearsig.diagnosis.analyze_file", lambda path, *_, **__: done.append(path.name))
+    monkeypatch.setattr(compiled, "run_every_model", lambda: done.append("models"))
+    compiled.compile_all()
+    assert done == [SAMPLES["damaged_tooth"].recording.name, "models"]
 
 
 @pytest.mark.slow
@@ -261,6 +270,28 @@ def test_a_speed_is_stated_in_one_place_of_the_form() -> None:
     assert not [field for field in page.main.number_input if field.label == "Constant speed (rpm)"]
 
 
+def test_a_file_of_pulse_times_tells_the_speed() -> None:
+    """Given beside the recording, in the form; a broken one is one message beside it."""
+    page = opened_file("a.csv.gz", SAMPLES["damaged_tooth"].recording.read_bytes(), tab="Machine")
+    labelled(page, "selectbox", "Speed from").set_value("pulse times").run()
+    times = "".join(f"{0.03 + 0.02 * i:.6f}\n" for i in range(240))
+    next(w for w in page.main.file_uploader if w.label == "File of pulse times").upload("p.txt", times.encode()).run()
+    assert not page.error
+    labelled(page, "number_input", "Pulses per revolution").set_value(2).run()
+    request = page.session_state["chosen"].request
+    assert command_of(request).endswith("--tach-times p.txt --pulses-per-revolution 2")
+    page.session_state[state.TAB] = "Speed"
+    assert "1500" in shown_text(page.run())
+    assert "from tachometer pulses" in shown_text(page)
+    page.session_state[state.TAB] = "Machine"
+    page.run()
+    next(w for w in page.main.file_uploader if w.label == "File of pulse times").upload("p.txt", b"2\n1\n").run()
+    assert "runs backwards" in page.error[0].value
+    labelled(page, "selectbox", "Speed from").set_value("constant").run()
+    assert page.session_state["chosen"].request.pulses is None
+    assert not page.error
+
+
 def test_a_machine_without_a_name_is_described_all_the_same() -> None:
     sample = SAMPLES["damaged_tooth"]
     nameless = sample.rig.read_text("utf-8").partition("\n")[2]
@@ -297,6 +328,9 @@ def test_what_a_recording_lacks_is_said_in_the_words_of_the_form() -> None:
     page = opened_file("bare.csv", b"a1\n" + b"1\n2\n" * 500)
     assert "the sampling rate, below or under Machine" in shown_text(page)
     assert "sampling_rate_hz" not in shown_text(page)
+    page = opened_file("pulses.csv", b"time\n1\n2\n3\n")
+    assert "give them as Speed from pulse times under Machine" in shown_text(page)
+    assert "--tach-times" not in shown_text(page)
 
 
 @pytest.mark.slow

@@ -35,7 +35,7 @@ def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.parametrize("name", ["run.csv", "../../run.csv", "/etc/run.csv", r"C:\data\run.csv", ".. /a b/√.csv"])
 def test_bytes_are_read_whatever_the_name_and_nothing_is_left(name: str, temporary: Path) -> None:
-    recording = read_content(CSV, name, rig=None, sampling_rate_hz=None, speed_rpm=None)
+    recording = read_content(CSV, name, rig=None, sampling_rate_hz=None, speed=None)
     assert recording.n_samples == 2000
     assert recording.sampling_rate_hz == pytest.approx(1000)
     assert recording.provenance.source == name
@@ -44,7 +44,7 @@ def test_bytes_are_read_whatever_the_name_and_nothing_is_left(name: str, tempora
 
 def test_broken_bytes_leave_nothing_either(temporary: Path) -> None:
     with pytest.raises(InputError):
-        read_content(b"\x80\x04pickle", "run.mat", rig=None, sampling_rate_hz=None, speed_rpm=None)
+        read_content(b"\x80\x04pickle", "run.mat", rig=None, sampling_rate_hz=None, speed=None)
     with pytest.raises(InputError, match="TOML"):
         read_rig_text("[[shaft", "../rig.toml")
     assert not list(temporary.iterdir())

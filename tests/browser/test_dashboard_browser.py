@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from app.samples import samples
@@ -99,6 +101,35 @@ def test_zooming_refines_and_cursors_are_dragged(page: playwright.Page) -> None:
     page.keyboard.press("Escape")
     svg.dblclick(position={"x": box["width"] / 2, "y": box["height"] / 2})
     assert soon(page, lambda: near != path.get_attribute("d") and path.get_attribute("d").count("L") > 1000)
+
+
+def test_sidebands_are_pulled_apart_and_stay_so(page: playwright.Page) -> None:
+    """The nearest line is taken; pulled through its carrier it stays apart, and no letters lie over each other."""
+    open_sample(page)
+    view = open_view(page, "Order spectrum")
+    view.get_by_role("button", name="Sidebands", exact=True).click()
+    own, words = view.locator(".figure svg line.own"), view.locator(".figure .words")
+
+    def pull(number: int, pixels: float) -> float:
+        """Pull a line of the family sideways, numbered from the carrier as they are drawn; return the spacing."""
+        box = own.nth(number).bounding_box()
+        page.mouse.move(box["x"], box["y"] + 0.5 * box["height"])
+        page.mouse.down()
+        page.mouse.move(box["x"] + pixels, box["y"] + 0.5 * box["height"], steps=8)
+        page.mouse.up()
+        return float(words.inner_text().partition("every ")[2].split()[0])
+
+    carrier, spacing = words.inner_text().partition(" orders")[0], pull(0, -200.0)
+    assert words.inner_text().partition(" orders")[0] != carrier  # the carrier moved, though sidebands lie close to it
+    box = own.first.bounding_box()
+    right = 1 if own.nth(1).bounding_box()["x"] > box["x"] else 2
+    assert pull(right, 60.0) > 5 * spacing
+    right = 1 if own.nth(1).bounding_box()["x"] > own.first.bounding_box()["x"] else 2
+    assert pull(right, -300.0) > 0.1
+    letters = view.locator(".figure svg text").filter(has_text=re.compile("^(C|[+−][1-5])$"))
+    places = sorted(text.bounding_box()["x"] for text in letters.all())
+    assert places
+    assert min(np.diff(places), default=99.0) > 15.0
 
 
 def test_a_view_can_be_sent_as_its_address_and_an_own_file_survives_a_reload(page: playwright.Page) -> None:
@@ -264,6 +295,8 @@ def test_what_is_chosen_can_be_read_in_a_small_window(page: playwright.Page, add
             .map((part) => part.value || part.textContent)"""
     )
     assert not cut
+    how = "fields => fields.map(field => getComputedStyle(field).textOverflow)"
+    assert set(page.locator("input").evaluate_all(how)) <= {"ellipsis"}  # of what must be shortened
 
 
 def test_own_files(page: playwright.Page) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -48,6 +49,7 @@ def button(page: playwright.Page, name: str) -> playwright.Locator:
 def test_run_look_and_download(gap: playwright.Page, tmp_path: Path) -> None:
     button(gap, "Diagnose").click()
     gap.get_by_role("progressbar").first.wait_for()
+    gap.get_by_text(re.compile(r"… \d+\s+s$")).wait_for()
     gap.get_by_role("tab", name="Which").first.wait_for()
     for tab in TABS:
         gap.get_by_role("tab", name=tab).click()

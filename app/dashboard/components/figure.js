@@ -3,7 +3,7 @@
 // whole and zoomed along both axes. Bars with names stand in rows over the axis.
 
 const NS = "http://www.w3.org/2000/svg";
-const LEFT = 74, RIGHT = 16, SCALE = 76, BOTTOM = 44, ROW = 16, MAX_ROWS = 4, N_HARMONICS = 12, N_SIDEBANDS = 5, N_PEAKS = 12, N_FEW = 300, MOST_SQUARE = 560;
+const LEFT = 74, RIGHT = 16, SCALE = 76, BOTTOM = 44, ROW = 16, MAX_ROWS = 4, N_HARMONICS = 12, N_SIDEBANDS = 5, N_PEAKS = 12, N_FEW = 300, MOST_SQUARE = 560, LABEL = 26;
 const ROW_HEIGHT = 40, NARROW = 460; // of bars in rows
 const SUPERSCRIPTS = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶", 7: "⁷", 8: "⁸", 9: "⁹" };
 const DEGREES = [5, 10, 15, 30, 45, 90, 180];
@@ -152,16 +152,17 @@ class Figure {
   }
 
   held(position) {
-    const near = (7 / this.plotWidth) * (this.view[1] - this.view[0]);
-    const index = this.own().findIndex(([at]) => Math.abs(at - position) < near);
-    if (index < 0) return null;
+    const away = this.own().map(([at]) => Math.abs(this.scale(at) - this.scale(position))), least = Math.min(...away);
+    if (!(least < 7)) return null;
+    const index = away.indexOf(least);
     if (this.tool === "harmonics") return { of: "at", times: index + 1 };
     const k = index - N_SIDEBANDS;
     return this.tool === "sidebands" && k ? { of: "step", times: k } : { of: "at", times: 1 };
   }
 
   moveTo(position, held = { of: "at", times: 1 }) {
-    if (held.of === "step") this.step = Math.max((position - this.at) / held.times, 1e-9);
+    const least = (3 / this.plotWidth) * (this.view[1] - this.view[0]);  // closer than that, they could not be told apart
+    if (held.of === "step") this.step = Math.max((position - this.at) / held.times, least);
     else this.at = position / held.times;
     this.draw();
   }
@@ -386,11 +387,14 @@ class Figure {
   }
 
   drawOwn(inside) {
-    const shown = this.own().filter(([at]) => at >= this.view[0] && at <= this.view[1]);
+    const away = ([at]) => Math.abs(at - this.at), lettered = [];
+    const shown = this.own().filter(([at]) => at >= this.view[0] && at <= this.view[1]).sort((a, b) => away(a) - away(b));
     for (const [at, label] of shown) {
       const x = this.scale(at);
       add(inside, "line", { x1: x, x2: x, y1: this.top, y2: this.top + this.plotHeight, stroke: this.ink, "stroke-width": 1.5, class: "own" });
-      if (label) text(inside, x + 3, this.top + 12, label, { fill: this.ink });
+      if (!label || lettered.some((other) => Math.abs(other - x) < LABEL)) continue;
+      lettered.push(x);
+      text(inside, x + 3, this.top + 12, label, { fill: this.ink });
     }
     this.words.replaceChildren();
     if (this.at === null) return;

@@ -11,6 +11,7 @@ from functools import cache, partial
 from hashlib import sha256
 from math import isfinite
 from pathlib import Path
+from time import monotonic
 from typing import IO
 from zipfile import ZIP_DEFLATED, ZipFile
 
@@ -77,8 +78,9 @@ The page says **where** recordings differ from the simulation of their rig, **wh
 causes it, **how far** the gap shrinks with it, and what to record next. Sizes are in *structural floors*: one floor is
 how far even healthy machines differ, so that a gap below one means nothing.
 
-The answer is surest with recordings at several speeds and loads, and with one of the same rig when it was healthy. It
-takes up to a minute on two free cores; the rig's simulations are kept for the next one.
+The answer is surest with recordings at several speeds and loads, and with one of the same rig when it was healthy. The
+first answer for a rig takes about a minute on two free cores; its simulations are kept, and the next answer at the same
+speed and load takes a quarter of that.
 """
 
 # --------------------
@@ -117,6 +119,7 @@ class _Running:
 
     choice: Choice
     job: Job
+    begun_s: float = field(default_factory=monotonic)
 
 
 def show_running(choice: Choice) -> Finished | None:
@@ -196,7 +199,7 @@ def _show_progress(running: _Running) -> None:
     if not running.job.is_running:
         st.rerun()
     stage, done = running.job.progress
-    st.progress(done, f"{as_typed(stage[:1].upper() + stage[1:])} …")
+    st.progress(done, f"{as_typed(capitalised(stage))} … {monotonic() - running.begun_s:.0f}\u00a0s")
 
 
 def _take(running: _Running) -> None:

@@ -10,7 +10,7 @@ import streamlit as st
 from app.dashboard import address, state
 from app.dashboard.cached import kept_file, remember_file, sha256_of_upload
 from app.dashboard.state import Chosen, ChosenFile
-from app.dashboard.widgets.machine import describe, machine_text, stated, text_as_stated, text_of
+from app.dashboard.widgets.machine import describe, machine_text, stated, stated_pulses, text_as_stated, text_of
 from app.dashboard.widgets.texts import as_typed
 from app.samples import SampleRecording, samples
 from gearsig.errors import InputError
@@ -141,7 +141,8 @@ def choose_with_rig(label: str, key: str, *, about: str = KINDS) -> tuple[Chosen
             raise InputError(
                 f"{len(files)} {kind} are given: {', '.join(file.name for file in files)}",
                 allowed="one recording, and one rig file that describes its machine",
-                remedy="remove the others; `gearsig report FOLDER` makes pages of many",
+                remedy="remove the others; times of tachometer pulses are given afterwards, under Machine, and "
+                "`gearsig report FOLDER` makes pages of many",
             )
     if not recordings:
         return None, bool(rigs)
@@ -250,7 +251,7 @@ def _follow_address() -> None:
         changed = kept_file(address.asked(MACHINE))
         if changed is not None and changed.content == named.recording:
             state.token_of(MACHINE, changed.sha256, address.asked(MACHINE))
-            describe(sample_file(named), changed.rig_text)
+            describe(sample_file(named), changed.rig_text, changed.pulses)
     token = address.asked("file")
     kept = kept_file(token)
     if kept is not None:
@@ -264,7 +265,7 @@ def _keep_address(file: ChosenFile, origin: str) -> None:
     A sample is named as such and its machine where it was changed; an own file, or one of the laboratory, by a token of
     this session.
     """
-    described = replace(file, rig_text=text_as_stated(file))
+    described = replace(file, rig_text=text_as_stated(file), pulses=stated_pulses(file))
     named = {"sample": file.rig_name.removesuffix(".toml")} if origin == SAMPLE else {}
     if origin in (FILE, state.OF_LABORATORY):
         named = {"file": _kept_token(state.RECORDING_FILE, described)}
@@ -301,7 +302,7 @@ def simulated_file(made: Chosen) -> ChosenFile:
 def _described(file: ChosenFile, with_reference: bool) -> Chosen:
     """Add the machine as it stands in this session, what the file does not state, and a reference."""
     text = machine_text(file)
-    request = replace(file, rig_text=text).request(
+    request = replace(file, rig_text=text, pulses=stated_pulses(file)).request(
         sampling_rate_hz=stated(file, "rate"), speed_rpm=stated(file, "speed")
     )
     if not with_reference:

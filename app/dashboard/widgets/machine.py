@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from hashlib import sha256
 from html import escape
 from typing import TYPE_CHECKING, Any
 
@@ -11,10 +13,18 @@ import streamlit as st
 import tomli_w
 
 from app.dashboard import state
-from app.dashboard.state import ChosenFile
+from app.dashboard.state import ChosenFile, PulseFile
 from app.dashboard.theme import palette
 from app.dashboard.widgets.charts import download
-from app.dashboard.widgets.texts import FORM_LABELS, FORM_TABLES, capitalised, one_line, show_error, show_table
+from app.dashboard.widgets.texts import (
+    FORM_LABELS,
+    FORM_TABLES,
+    as_typed,
+    capitalised,
+    one_line,
+    show_error,
+    show_table,
+)
 from gearsig.errors import GearsigError, InputError
 from gearsig.formatting import unit_text
 from gearsig.rig import (
@@ -99,6 +109,9 @@ SPEED_SOURCES: dict[str, tuple[str, ...]] = {
     "encoder": ("channel", "units_per_revolution"),
     "speed channel": ("channel", "rpm_per_unit"),
 }
+PULSE_TIMES = "pulse times"
+"""Source of a speed that belongs to one recording, so that no rig file has it: a file beside the recording."""
+LARGEST_PULSE_FILE_MB = 50
 DEFAULTS: Table = {"pulses_per_revolution": 1, "units_per_revolution": 360.0, "rpm_per_unit": 1.0}
 LARGEST, MOST_ROWS = 2.0**53, 1000
 NUMBER = "%.10g"
@@ -115,6 +128,12 @@ def stated(file: ChosenFile, name: str) -> float | None:
     """Return a number that the user stated of a file, "rate" (Hz) or "speed" (rpm); None without one."""
     value: float | None = st.session_state.get(state.source_key(f"stated {name}", file.sha256))
     return value
+
+
+def stated_pulses(file: ChosenFile) -> PulseFile | None:
+    """Return the times of tachometer pulses that the user gave beside a file, None without any."""
+    given: PulseFile | None = st.session_state.get(_pulses_key(file), file.pulses)
+    return given
 
 
 def text_as_stated(file: ChosenFile) -> str:
@@ -190,7 +209,7 @@ def _ask_stated(place: DeltaGenerator, file: ChosenFile, label: str, name: str, 
     place.number_input(
         label,
         value=stated(file, name),
-        placeholder="from the file" if name == "rate" else "from the file or the signal",
+        placeholder="from the file" if name == "rate" else "as found",
         format=NUMBER,
         help=about,
         key=state.source_key(f"asked {name}", file.sha256),
@@ -207,19 +226,64 @@ def _state(file: ChosenFile, name: str) -> None:
 
 
 def _forget_speed(file: ChosenFile) -> None:
-    """Take back a constant speed that was stated, in favour of what measures it."""
+    """Take back a speed that was stated, in favour of what measures it."""
     if stated(file, "speed") is not None:
         st.session_state[state.source_key("asked speed", file.sha256)] = None
         _state(file, "speed")
+    if stated_pulses(file) is not None:
+        _give_pulses(file, None)
+
+
+def _pulses_key(file: ChosenFile) -> str:
+    return state.source_key("stated pulses", file.sha256)
+
+
+def _give_pulses(file: ChosenFile, pulses: PulseFile | None) -> None:
+    st.session_state[_pulses_key(file)] = pulses
+    st.session_state[_CHANGED] = True
+
+
+def _ask_pulses(place: DeltaGenerator, file: ChosenFile) -> None:
+    """Ask for the file of pulse times, and for the pulses of a revolution in `place`; both hold at once."""
+    known = stated_pulses(file)
+    keys = tuple(state.source_key(f"asked {name}", file.sha256) for name in ("pulse file", "pulses per revolution"))
+    number = 1 if known is None else known.pulses_per_revolution
+    label, number_key = FORM_LABELS["pulses_per_revolution"], keys[1]
+    looks: dict[str, Any] = {"on_change": _count_pulses, "args": (file, number_key)}
+    place.number_input(label, value=number, min_value=1, step=1, key=number_key, **looks)
+    about = (
+        "Text with one time in a line, in seconds unless its heading states another unit, e.g. time [ms]; 0 is where "
+        "the recording begins. The pulses are those of the reference shaft."
+    )
+    looks = {"on_change": _take_pulses, "args": (file, *keys), "max_upload_size": LARGEST_PULSE_FILE_MB}
+    given = st.file_uploader("File of pulse times", key=keys[0], help=about, **looks)
+    if given is None and known is not None:
+        st.caption(f"Still given: {as_typed(known.name)}")
+
+
+def _count_pulses(file: ChosenFile, key: str) -> None:
+    if (known := stated_pulses(file)) is not None:
+        _give_pulses(file, replace(known, pulses_per_revolution=st.session_state[key]))
+
+
+def _take_pulses(file: ChosenFile, key: str, number_key: str) -> None:
+    given, number = st.session_state[key], st.session_state[number_key]
+    if given is None:
+        _give_pulses(file, None)
+    else:
+        content = given.getvalue()
+        _give_pulses(file, PulseFile(given.name, sha256(content).hexdigest(), content, number))
 
 
 def _key(file: ChosenFile) -> str:
     return state.source_key("machine", f"{file.sha256} {file.rig_name}")
 
 
-def describe(file: ChosenFile, text: str) -> None:
-    """Take the text of a rig file for a file's machine in this session."""
+def describe(file: ChosenFile, text: str, pulses: PulseFile | None = None) -> None:
+    """Take the text of a rig file for a file's machine in this session, and times of pulses where they are given."""
     st.session_state[_key(file)] = text
+    if pulses is not None:
+        st.session_state[_pulses_key(file)] = pulses
     # tables of the form begin anew from the text
     version = state.source_key("machine version", file.sha256)
     st.session_state[version] = st.session_state.get(version, 0) + 1
@@ -378,7 +442,8 @@ def _config(kind: str, rows: Sequence[Table], rig: Table, channels: Sequence[str
         texts = [str(row[name]) for row in rows if name in row]
         looks: dict[str, Any] = {"label": label, "width": _width_px(label, texts)}
         looks |= {"help": whole} if name in SHORT_LABELS else {}
-        looks |= {"pinned": True} if (kind, name) == ("bearing", "name") else {}  # the widest table, which scrolls
+        if name == COLUMNS[kind][0] and kind != "shaft":  # a small window scrolls the wide tables
+            looks["pinned"] = True
         if name in choices:  # and what the file says besides, such as a bearing with its maker's name
             made[name] = column.SelectboxColumn(**looks, options=list(dict.fromkeys([*choices[name], *texts])))
         elif name.endswith(("_teeth", "elements")):
@@ -405,19 +470,27 @@ def _edit_speed(
 ) -> Table:
     """Ask for the sampling rate and where the speed comes from, and return the table of the latter.
 
-    A constant speed that is typed here holds at once; one of the rig file, which may be of any shaft, is changed there.
+    A constant speed that is typed here holds at once, as do times of pulses; one of the rig file, which may be of any
+    shaft, is changed there.
     """
-    row, known, source = st.columns(5), list(SPEED_SOURCES), str(speed.get("source", "none"))
+    row, known, source = st.columns(5), [*SPEED_SOURCES, PULSE_TIMES], str(speed.get("source", "none"))
     about = "Of files that do not state it; it overrides what the file says."
     _ask_stated(row[0], file, "Sampling rate (Hz)", "rate", about)
     is_stated = stated(file, "speed") is not None
     first = "constant" if is_stated or source not in known else source
+    first = first if stated_pulses(file) is None else PULSE_TIMES
     looks: dict[str, Any] = {"key": key("speed"), "on_change": _forget_speed, "args": (file,)}
     chosen = row[1].selectbox("Speed from", known, known.index(first), **looks)
     if chosen == "constant" and (is_stated or source != chosen):
-        about = "Of the reference shaft, if it held still; refined by the signal. It overrides what the file says."
+        about = (
+            "Of the reference shaft, if it held still; refined by the signal. It overrides what the file says; without "
+            "it the speed is the file's, or found in the signal."
+        )
         _ask_stated(row[2], file, "Constant speed (rpm)", "speed", about)
         return speed if is_stated or source not in known else {}
+    if chosen == PULSE_TIMES:
+        _ask_pulses(row[2], file)
+        return speed if source in SPEED_SOURCES else {}
     edited = dict(speed) if chosen == source else {}
     edited["source"] = chosen
     for place, name in zip(row[2:], SPEED_SOURCES[chosen], strict=False):

@@ -100,6 +100,10 @@ FORM_LABELS = {
 _PLACES = {
     "--fs or sampling_rate_hz in the rig file": "the sampling rate, below or under Machine",
     "--fs": "the sampling rate, below or under Machine",
+    "gearsig analyze RECORDING --tach-times FILE (in Python speed=gearsig.recording.read_pulse_times(path))": "open "
+    "that one, and give them as Speed from pulse times under Machine",
+    "give them with --tach-times FILE": "choose them as Speed from pulse times under Machine",
+    "--tach-times": "pulse times under Machine",
     "--sim-speed-rpm": "the simulation's speed",
     "--speed-rpm": "the constant speed, below or under Machine",
     "given with --reference": "chosen on the left as healthy machine",
@@ -123,6 +127,7 @@ _PLACES = {
     "[machine] in the rig file": "size and mounting under Machine",
     "[machine] of the rig file": "size and mounting under Machine",
     "operating_point.": "nominal ",
+    "the teeth in a rig file": "the teeth under Machine",
     "Give the bearings in the rig file": "Describe the bearings under Machine",
     "/s^2": "/s²",
 }
@@ -207,7 +212,7 @@ def show_checks(checks: Iterable[tuple[bool, str]]) -> None:
 def show_unknown_speed(reason: CannotTell) -> None:
     """Say why there is no speed and what would give it."""
     remedy = f"\n\nWhat would give it: {as_typed(in_page_words(reason.remedy))}" if reason.remedy else ""
-    hint = "\n\nA constant speed can be given under *Machine*."
+    hint = "\n\nA constant speed, or a file of tachometer pulses' times, can be given under *Machine*."
     st.info(f"The speed is not known: {as_typed(reason.reason)}{remedy}{hint}", icon=":material/help:")
 
 

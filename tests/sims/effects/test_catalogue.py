@@ -28,7 +28,7 @@ from sims.effects import (
     with_effects,
 )
 from sims.machine import Machine
-from sims.registry import gap_simulator
+from sims.registry import gap_simulator, simulator
 from sims.simulator import sources_digest
 from tests.sims.machines import spur_pair_machine
 
@@ -230,6 +230,7 @@ def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 def test_it_takes_its_place_in_the_catalogue_and_changes_machines(file: Path) -> None:
     before, digest = list(effects()), sources_digest()
+    assert simulator("cracked").effects == tuple(before)
     added = add_effect(file)
     assert effects()["hissing_seal"] is effect("hissing_seal")
     assert [name for name in effects() if name != "hissing_seal"] == before
@@ -240,6 +241,7 @@ def test_it_takes_its_place_in_the_catalogue_and_changes_machines(file: Path) ->
         False,
     )
     assert sources_digest() != digest
+    assert "hissing_seal" in simulator("cracked").effects  # though it was asked for before
     machine = with_effects(spur_pair_machine(), [EffectSetting("hissing_seal", 3.0)], np.random.default_rng(0))
     assert {c.background.rms_mps2 for c in machine.chain.channels} == {3.0}
     assert added.title == "seal that hisses"
