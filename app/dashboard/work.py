@@ -20,6 +20,7 @@ import streamlit as st
 from streamlit.runtime.scriptrunner import get_script_run_ctx
 
 from app.dashboard import address
+from app.dashboard.compiled import is_being_made
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -241,7 +242,10 @@ class Kept(Generic[P, R]):
                 break
         else:
             return
-        with st.spinner(self._words, show_time=True):
+        words = self._words
+        if is_being_made():
+            words += " The first answers after an installation wait until their code is compiled."
+        with st.spinner(words, show_time=True):
             place, is_offered = st.empty(), False
             while not work.wait(LOOK_EVERY_S):
                 let_user_act()
