@@ -29,16 +29,19 @@ _FORMS = {
     "%m": r"\d\d",
     "%d": r"\d\d",
     "%H": r"\d\d",
+    "%I": r"\d\d",
     "%M": r"\d\d",
     "%S": r"\d\d",
     "%j": r"\d{3}",
     "%f": r"\d{1,6}",
     "%b": r"[A-Za-z]{3}",
+    "%p": r"[AaPp][Mm]",
     "%%": "%",
 }
 _DATE_IN_NAME = re.compile(
     r"(?<!\d)(?P<day>(?:19|20)\d\d[-_.]?[01]\d[-_.]?[0-3]\d)"
-    r"(?:[-_.T ]?(?P<time>[0-2]\d[-_.:h]?[0-5]\d(?:[-_.:m]?[0-5]\d)?))?(?!\d)"
+    r"(?:[-_.T ]?(?P<time>[0-2]\d[-_.:h]?[0-5]\d(?:[-_.:m]?[0-5]\d)?)"
+    r"(?:[-_ ]?(?P<half>[AaPp][Mm])(?![A-Za-z]))?)?(?!\d)"
 )
 
 
@@ -195,13 +198,18 @@ def date_in_name(name: str) -> datetime | None:
     --------
     >>> [str(date_in_name(name)) for name in ("pump_2026-01-31T1405.csv", "2026.01.31.14.05.12", "run_1234.h5")]
     ['2026-01-31 14:05:00', '2026-01-31 14:05:12', 'None']
+    >>> str(date_in_name("2026-01-31 02-05-12 PM.csv"))
+    '2026-01-31 14:05:12'
     """
     for match in _DATE_IN_NAME.finditer(name):
         digits = re.sub(r"\D", "", match["day"])
-        time = re.sub(r"\D", "", match["time"] or "")
-        for clock in (time, ""):
+        time = re.sub(r"\D", "", match["time"] or "").ljust(6, "0")
+        forms = {"%Y%m%d%H%M%S": time, "%Y%m%d": ""}
+        if match["half"]:
+            forms = {"%Y%m%d%I%M%S%p": time + match["half"], **forms}
+        for form, clock in forms.items():
             try:
-                return datetime.strptime(digits + clock.ljust(6, "0"), "%Y%m%d%H%M%S")  # noqa: DTZ007
+                return datetime.strptime(digits + clock, form)  # noqa: DTZ007
             except ValueError:
                 continue
     return None
