@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
@@ -23,9 +24,11 @@ from gearsig.fleet import (
     date_in_name,
     find_recordings,
     open_fleet,
+    origin_rows,
     origins,
     passed_over_text,
 )
+from gearsig.rig import ConstantSpeed
 from tests.fleet.recordings import PATTERN, write_recording_file
 
 
@@ -142,6 +145,7 @@ def test_an_unreadable_recording_is_kept_as_a_failure_until_it_changes(make_reco
 ADDING = """
 import sys
 from gearsig.fleet import open_fleet
+from gearsig.rig import ConstantSpeed
 from tests.fleet.recordings import PATTERN
 if __name__ == "__main__":
     result = open_fleet(sys.argv[1], create=True).add(sys.argv[2], pattern=PATTERN, n_processes=int(sys.argv[3]))
@@ -330,6 +334,28 @@ def test_a_misspelt_indicator_is_answered_with_the_closest(make_recordings, tmp_
         fleet.trend("pump 1", asked)
     with pytest.raises(InputError, match=r"no rms of channel 'a2' \(allowed: a1\)"):
         fleet.trend("pump 1", "rms", channel="a2")
+
+
+def test_a_speed_in_the_name_is_shown_and_is_the_nominal_one(tmp_path):
+    rng, folder = np.random.default_rng(0), tmp_path / "data" / "pump 1"
+    for name in ("1500rpm_20260101.csv", "n1800_20260102.csv", "n900_20260103.csv", "20260104.csv"):
+        write_recording_file(folder / name, 1.0, rng)
+    (folder / "n900_20260103.toml").write_text('[speed]\nsource = "constant"\nspeed_rpm = 1200\n')
+    found = [
+        *origins([folder / "1500rpm_20260101.csv", folder / "20260104.csv"]),
+        *origins([folder], pattern="n{speed}_{date:%Y%m%d}.csv"),
+    ]
+    expected = {"1500 rpm (file name)", "–", "1800 rpm (pattern)", "900 rpm (pattern)"}
+    assert {row[4] for row in origin_rows(found)} == expected
+    fleet = open_fleet(tmp_path / "store", create=True)
+    assert not fleet.add(found, n_processes=1).failures
+    table = fleet.recordings().sort_values("date")
+    assert list(table["speed_rpm"].fillna(0)) == [1500, 1800, 900, 0]
+    assert list(table["origin"].str.contains("speed: pattern")) == [False, True, True, False]
+    assert fleet.add(found, n_processes=1).n_known == 4
+    stated = [replace(each, speed_rpm=600.0, speed_from="stated") for each in found]
+    fleet.add(stated, speed=ConstantSpeed(600.0), n_processes=1)
+    assert set(fleet.recordings()["speed_rpm"]) == {600}
 
 
 def test_without_a_pattern_folders_rigs_and_names_say_it(tmp_path):

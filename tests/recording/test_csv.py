@@ -7,7 +7,7 @@ import pytest
 
 from gearsig.errors import InputError
 from gearsig.recording import read_recording
-from gearsig.rig import Rig, Sensor, SpeedChannel, TachometerChannel
+from gearsig.rig import ConstantSpeed, OperatingPoint, Rig, Sensor, SpeedChannel, TachometerChannel
 
 FS_HZ = 25600.0
 
@@ -316,6 +316,17 @@ def test_rows_are_counted_before_the_time(tmp_path):
     lines = [f"{i}\t{(i - 1) * 1e-3:.7E}\t{np.sin(i):.6E}" for i in range(1, 51)]
     r = read_text(tmp_path, "\n".join(["X-axis unit:\t s", "Amplitude unit:\t m/s^2", "", *lines]))
     assert described(r) == ([("ch3", "m/s^2")], pytest.approx(1000))
+
+
+def test_a_speed_in_the_name_is_offered_where_nothing_tells_it(tmp_path):
+    text = table(2, ",", ".")
+    read, nominal = read_text(tmp_path, text, "a_1000rpm.csv"), OperatingPoint(speed_rpm=990)
+    assert read.speed_source is None
+    assert [w for w in read.warnings if "--speed-rpm 1000 " in w]
+    for known in ({"speed": ConstantSpeed(990)}, {"rig": Rig(operating_point=nominal)}):
+        read = read_recording(tmp_path / "a_1000rpm.csv", **known)
+        assert read.speed_source == ConstantSpeed(990)
+        assert not [w for w in read.warnings if "1000" in w]
 
 
 def clock(i, hour):
