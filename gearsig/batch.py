@@ -148,8 +148,7 @@ def report_many(
     if pdf:
         check_pdf()
     workers = min(len(files), n_processors()) if n_processes is None else count(n_processes, "n_processes")
-    given = reference if isinstance(reference, Mapping) else dict.fromkeys(files, Path(reference)) if reference else {}
-    find_recordings(set(given.values()))
+    given = _references(reference, files)
     chosen = None if methods is None else tuple(method for method in methods if named_method(method))
     folder = made_folder(Path(output_folder))
     # A recording is not compared with itself: the reference's own page says that it is one.
@@ -202,6 +201,16 @@ def report_many(
         remove_parts(folder)
         made = index()
     return made
+
+
+def _references(given: str | Path | Mapping[Path, Path] | None, files: Sequence[Path]) -> Mapping[Path, Path]:
+    """Return the reference of each recording that has one, after a look whether it can be one."""
+    from gearsig.recording import n_samples_of
+
+    references = given if isinstance(given, Mapping) else dict.fromkeys(files, Path(given)) if given else {}
+    for path in set(references.values()):
+        n_samples_of(path)
+    return references
 
 
 def _made_of() -> Callable[[_Job], str]:

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gearsig.errors import GearsigError, InputError, unexpected_text
-from gearsig.fleet._origin import Origin, PassedOver, find_recordings
+from gearsig.fleet._origin import Origin, PassedOver
 from gearsig.fleet._store import Row, Store
 from gearsig.processes import killed_text, n_processors, run_jobs
 from gearsig.rig import ConstantSpeed, Rig, SpeedSource, read_rig, rig_file_beside, rig_to_dict
@@ -399,12 +399,12 @@ def _nominal_speed_rpm(origin: Origin, options: AnalysisOptions) -> float | None
 
 def _setups(options: AnalysisOptions) -> Callable[[Origin], str]:
     """Return a function that hashes what decides a file's result besides its content."""
-    from gearsig.recording import sha256_of, without_condition
+    from gearsig.recording import n_samples_of, sha256_of, without_condition
 
     reference = ""
     if options.reference is not None:
-        ((path, _),) = find_recordings([options.reference])  # refused here where it is not there
-        file, run = without_condition(path)
+        n_samples_of(options.reference)  # what can be none is refused here
+        file, run = without_condition(options.reference)
         reference = sha256_of(file) + ("" if run is None else f"#{run}")
     shared: list[object] = [reference, options.sampling_rate_hz, options.torque_nm, repr(options.speed)]
     if options.reference_rate_hz is not None:

@@ -82,7 +82,11 @@ def test_a_mistyped_path_is_refused_before_anything_is_written(recordings, tmp_p
 
 
 def test_a_mistyped_reference_or_method_is_refused_before_anything_is_written(recordings, tmp_path):
-    for wrong, message in (({"reference": tmp_path / "on.csv"}, "on.csv: cannot be read"), ({"methods": ["x"]}, "x")):
+    for wrong, message in (
+        ({"reference": tmp_path / "on.csv"}, r"on\.csv: cannot be opened"),
+        ({"reference": tmp_path}, "is a folder"),
+        ({"methods": ["x"]}, "there is no method 'x'"),
+    ):
         with pytest.raises(InputError, match=message):
             report_many(recordings, tmp_path / "out", n_processes=1, **wrong)
         assert not (tmp_path / "out").exists()
