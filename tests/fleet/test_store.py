@@ -408,7 +408,7 @@ def test_settings_are_kept_and_checked(make_recordings, tmp_path):
 def test_a_table_is_exported_in_each_form(make_recordings, tmp_path):
     import pandas as pd
 
-    data = make_recordings("pump 1", [1.0, 1.2])
+    data, before = make_recordings("pump 1", [1.0, 1.2]), multiprocessing.active_children()
     fleet = open_fleet(tmp_path / "store", create=True)
     fleet.add(data, pattern=PATTERN, n_processes=1)
     n = fleet.export(tmp_path / "a.csv", name="rms")
@@ -420,7 +420,7 @@ def test_a_table_is_exported_in_each_form(make_recordings, tmp_path):
     assert json.loads((tmp_path / "s.jsonl").read_text())["machine"] == "pump 1"
     with pytest.raises(InputError, match="ending"):
         fleet.export(tmp_path / "a.xlsx")
-    assert multiprocessing.active_children() == []
+    assert set(multiprocessing.active_children()) <= set(before)  # of other tests, some end late
 
 
 def test_tables_of_reports_and_sweeps_are_no_recordings(tmp_path):
