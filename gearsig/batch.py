@@ -141,22 +141,20 @@ def report_many(
     from gearsig.fleet import AnalysisOptions, find_recordings, no_recordings
     from gearsig.report import Entry, Failure, check_pdf, named_method, page_names, write_index
 
-    # What can be refused is refused before anything is written: no recordings, no typst, a wrong method or folder.
+    # What can be refused is refused before anything is written: no recordings, reference or typst, a wrong method.
     files = [path for path, _ in find_recordings(paths)]
     if not files:
         raise no_recordings(paths)
     if pdf:
         check_pdf()
     workers = min(len(files), n_processors()) if n_processes is None else count(n_processes, "n_processes")
+    given = _references(reference, files)
+    chosen = None if methods is None else tuple(method for method in methods if named_method(method))
     folder = made_folder(Path(output_folder))
     # A recording is not compared with itself: the reference's own page says that it is one.
-    given = reference if isinstance(reference, Mapping) else dict.fromkeys(files, Path(reference)) if reference else {}
     healthy = {file.resolve(): path for file, path in given.items()}
     healthy_files = {path.resolve() for path in healthy.values()}
     names = [file.name for file in files]
-    chosen = None if methods is None else tuple(methods)
-    for method in chosen or ():
-        named_method(method)  # a wrong name stops the report before its first page
     jobs = []
     for file, page in zip(files, page_names(files, folder), strict=True):
         # Files of the same name are told apart by their folders.
@@ -203,6 +201,16 @@ def report_many(
         remove_parts(folder)
         made = index()
     return made
+
+
+def _references(given: str | Path | Mapping[Path, Path] | None, files: Sequence[Path]) -> Mapping[Path, Path]:
+    """Return the reference of each recording that has one, after a look whether it can be one."""
+    from gearsig.recording import n_samples_of
+
+    references = given if isinstance(given, Mapping) else dict.fromkeys(files, Path(given)) if given else {}
+    for path in set(references.values()):
+        n_samples_of(path)
+    return references
 
 
 def _made_of() -> Callable[[_Job], str]:

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from gearsig.cache import part_beside
-from gearsig.errors import InputError
-from gearsig.recording import Recording, recording_target, write_recording
-from gearsig.rig import write_rig
+from gearsig.errors import GearsigError, InputError
+from gearsig.recording import Recording, n_samples_of, read_recording, recording_target, write_recording
+from gearsig.rig import read_rig, write_rig
 
 
 class FileSet(NamedTuple):
@@ -38,7 +38,7 @@ def file_set(path: str | Path, *, replace: bool = False) -> FileSet:
             where=target.name,
             remedy=f"take {target.stem.replace('.', '_')}{target.suffix}",
         )
-    names = FileSet(target, target.with_suffix(".toml"), target.with_name(f"{target.stem}.truth.json"))
+    names = _names(target)
     for name in names:
         if name.is_dir():
             raise InputError("is a folder", where=str(name), remedy="choose another name with -o")
@@ -47,6 +47,32 @@ def file_set(path: str | Path, *, replace: bool = False) -> FileSet:
                 "exists already", where=str(name), remedy="choose another name, or replace it with --force"
             )
     return names
+
+
+def _names(target: Path) -> FileSet:
+    return FileSet(target, target.with_suffix(".toml"), target.with_name(f"{target.stem}.truth.json"))
+
+
+def is_whole(path: Path) -> bool:
+    """Say whether all that belongs to a recording is there, can be read and agrees; of long formats, samples are not.
+
+    Parameters
+    ----------
+    path : Path
+        Of the recording.
+    """
+    names = _names(path)
+    try:
+        part = None if n_samples_of(names.recording) is None else slice(0, 1)
+        recording = read_recording(names.recording, rig=read_rig(names.rig), part=part)
+        truth = json.loads(names.truth.read_text(encoding="utf-8"))
+    except (GearsigError, OSError, ValueError):
+        return False
+    return bool(truth == json.loads(_truth_json(recording)))
+
+
+def _truth_json(recording: Recording) -> str:
+    return json.dumps(dict(recording.truth or {}), indent=2, ensure_ascii=False, default=_plain)
 
 
 def write_set(recording: Recording, names: FileSet) -> None:
@@ -68,8 +94,7 @@ def write_set(recording: Recording, names: FileSet) -> None:
     try:
         write_recording(recording, parts.recording)
         write_rig(recording.rig, parts.rig)
-        truth = json.dumps(dict(recording.truth), indent=2, ensure_ascii=False, default=_plain)
-        parts.truth.write_text(truth + "\n", encoding="utf-8")
+        parts.truth.write_text(_truth_json(recording) + "\n", encoding="utf-8")
         _move(parts, names)
     except OSError as error:
         raise InputError(f"cannot be written ({error})", where=str(names.recording), remedy="check the disk") from error

@@ -19,7 +19,7 @@ from gearsig.processes import killed_text, n_processors, run_jobs
 from gearsig.recording import WRITERS
 from sims.effects import EffectSetting, OptionValue, effect
 from sims.effects import effects as all_effects
-from sims.files import file_set, write_set
+from sims.files import file_set, is_whole, write_set
 from sims.machine import Operation, Profile
 from sims.registry import Simulation, simulator
 from sims.simulator import checked_value, parameter
@@ -239,7 +239,7 @@ def run_sweep(
     workers = n_processors() if n_processes is None else count(n_processes, "n_processes")
     target = claimed(Path(folder), sweep.definition())
     points = sweep.points()
-    missing = [p for p in points if not recording_path(sweep, target, p).exists()]
+    missing = [p for p in points if not is_whole(recording_path(sweep, target, p))]
     n_found = len(points) - len(missing)
     done: dict[int, SweepOutcome] = {}
     try:

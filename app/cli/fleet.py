@@ -42,7 +42,7 @@ PatternOption = Annotated[
     typer.Option(
         "--pattern",
         help="How paths name machine, point and date, from their end: '{machine}/{point}_{date:%Y%m%d}.csv'; "
-        "{number:1min} is a running number, {} is anything.",
+        "{number:1min} is a running number, {speed} a nominal speed in rpm, {} is anything.",
     ),
 ]
 MachineOption = Annotated[str, typer.Option("--machine", help="Name of the machine, for all of these recordings.")]
@@ -73,7 +73,7 @@ def add(
     reference_fs: options.ReferenceRateOption = None,
     torque: options.TorqueOption = None,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Show machine, point and date of each recording; analyse nothing.")
+        bool, typer.Option("--dry-run", help="Show machine, point, date and speed of each recording; analyse nothing.")
     ] = False,
     jobs: options.JobsOption = None,
     cluster: options.ClusterOption = "",
@@ -82,9 +82,9 @@ def add(
 ) -> None:
     """Analyse recordings that are new and keep their results; what is known already is passed over.
 
-    Machine and date are taken from the options, the pattern, sub-folders, rig files and file names, in this order, and
-    shown first. It can be stopped, or killed, at any time: the same command goes on from there. The exit code is 1 if
-    some recordings could not be analysed.
+    Machine, date and speed are taken from the options, the pattern, sub-folders, rig files and file names, in this
+    order, and shown first. It can be stopped, or killed, at any time: the same command goes on from there. The exit
+    code is 1 if some recordings could not be analysed.
 
     Example: gearsig fleet add recordings --pattern '{machine}/{point}_{date:%Y%m%d}.csv'
     """
@@ -92,7 +92,7 @@ def add(
 
     opened = options.open_rig(rig)
     passed_over = list[PassedOver]()
-    stated: dict[str, Any] = {"machine": machine, "point": point, "date": date, "rig": opened}
+    stated: dict[str, Any] = {"machine": machine, "point": point, "date": date, "rig": opened, "speed_rpm": speed_rpm}
     listed = origins(places, pattern=pattern, **stated, on_passed_over=passed_over.append)
     if dry_run and json:
         answer = {
@@ -418,7 +418,7 @@ def _table(
 def _show_origins(listed: list[Origin], n_shown: int, *, err: bool) -> None:
     from gearsig.fleet import origin_rows
 
-    _table(("file", "machine", "point", "date"), origin_rows(listed[:n_shown]), styles={}, err=err)
+    _table(("file", "machine", "point", "date", "speed"), origin_rows(listed[:n_shown]), styles={}, err=err)
     if len(listed) > n_shown:
         typer.echo(f"… and {len(listed) - n_shown} more; --dry-run shows them all", err=err)
 

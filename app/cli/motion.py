@@ -195,12 +195,14 @@ def identify(
     Example: gearsig identify drive.h5 --rig drive.toml -o fitted.toml
     """
     from gearsig.motion import identify as fit
-    from gearsig.report import identify_json, identify_text
+    from gearsig.report import check_writable, identify_json, identify_text
     from gearsig.rig import write_rig
 
-    machine = options.open_rig(rig, recording)
     if output is not None and (output.suffix.lower() != ".toml" or not output.parent.is_dir()):
         raise InputError(f"cannot write {str(output)!r}", allowed="a .toml file in a folder that exists")
+    if output is not None:
+        check_writable(output.parent)
+    machine = options.open_rig(rig, recording)
     opened, motion = options.open_motion(recording, machine, fs, use, bandwidth, unwrap)
     identification = fit(motion)
     known = machine or opened.rig

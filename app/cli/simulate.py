@@ -79,9 +79,11 @@ def simulate(
         return
     from rich.console import Console
 
+    from gearsig.report import check_writable
     from sims.files import file_set, write_set
 
     names = file_set(output, replace=force)
+    check_writable(output.parent)
     with Console(stderr=True).status(f"simulating {request.duration_s:g} s"):
         recording = request.run()
         write_set(recording, names)

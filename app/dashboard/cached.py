@@ -35,16 +35,16 @@ def safe_file_name(name: str) -> str:
 
     Examples
     --------
-    >>> safe_file_name("../../etc/run 1.csv"), safe_file_name(r"C:\data\a.MAT"), safe_file_name("..")
-    ('run-1.csv', 'a.MAT', 'recording')
+    >>> safe_file_name("../../etc/run 1.csv"), safe_file_name(r"C:\data\a.MAT"), safe_file_name("2003.10.22.12.06")
+    ('run-1.csv', 'a.MAT', '2003.10.22.12.06')
     """
-    stem, *endings = re.split(r"[/\\]", name)[-1].split(".")
-    kept = [plain for ending in endings[-2:] if (plain := _plain(ending)[:15])]
-    return ".".join([_plain(stem)[:60] or "recording", *kept])
+    stem, *endings = re.split(r"[/\\]", name)[-1].rsplit(".", 2)
+    kept = [plain for ending in endings if (plain := _plain(ending)[:15])]
+    return ".".join([_plain(stem)[:60].strip("-.") or "recording", *kept])
 
 
 def _plain(text: str) -> str:
-    return re.sub(r"[^\w-]+", "-", text, flags=re.ASCII).strip("-")
+    return re.sub(r"[^\w.-]+", "-", text, flags=re.ASCII).strip("-.")
 
 
 def read_rig_text(text: str, name: str = "rig.toml") -> Rig | None:

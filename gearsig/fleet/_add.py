@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import ExitStack, closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import cache
 from itertools import islice
@@ -19,7 +19,7 @@ from gearsig.errors import GearsigError, InputError, unexpected_text
 from gearsig.fleet._origin import Origin, PassedOver
 from gearsig.fleet._store import Row, Store
 from gearsig.processes import killed_text, n_processors, run_jobs
-from gearsig.rig import Rig, SpeedSource, read_rig, rig_file_beside, rig_to_dict
+from gearsig.rig import ConstantSpeed, Rig, SpeedSource, read_rig, rig_file_beside, rig_to_dict
 
 if TYPE_CHECKING:
     from gearsig.diagnosis import Analysis, LongAnalysis
@@ -63,8 +63,11 @@ class AnalysisOptions:
     memory_bytes: float = 2e9
     reference_rate_hz: float | None = None
 
-    def analyze(self, path: Path) -> Analysis | LongAnalysis:
-        """Analyse a recording, with the reference unless it is that itself; see `gearsig.diagnosis.analyze_file`."""
+    def analyze(self, path: Path, nominal_speed_rpm: float | None = None) -> Analysis | LongAnalysis:
+        """Analyse a recording, with the reference unless it is that itself; see `gearsig.diagnosis.analyze_file`.
+
+        A nominal speed, as a name states it, stands for the rig's nominal and constant speeds.
+        """
         from gearsig.diagnosis import analyze_file, read_reference
 
         rig = self.rig
@@ -75,6 +78,10 @@ class AnalysisOptions:
         healthy = None
         if self.reference is not None and self.reference.resolve() != path.resolve():
             healthy = read_reference(self.reference, rig, reference_rate_hz=self.reference_rate_hz, **reading)
+        if nominal_speed_rpm is not None:
+            rig = rig if rig is not None else Rig()
+            point = replace(rig.operating_point, speed_rpm=nominal_speed_rpm)
+            rig = replace(rig, operating_point=point, speed=None if isinstance(rig.speed, ConstantSpeed) else rig.speed)
         return analyze_file(path, rig, reference=healthy, torque_nm=self.torque_nm, **reading)
 
 
@@ -137,6 +144,7 @@ class _AnalysisJob:
     sha256: str
     setup: str
     replaces: str = ""
+    nominal_speed_rpm: float | None = None
 
 
 def add_recordings(
@@ -154,7 +162,7 @@ def add_recordings(
 
     setups = _setups(options)
     known = _stored_identities(store, recordings, __version__)
-    missing = [origin for origin in recordings if _identity(origin, setups(origin.path)) not in known]
+    missing = [origin for origin in recordings if _identity(origin, setups(origin)) not in known]
     elsewhere: list[Origin] = []
     unseen: list[Origin] = []  # of known content under a new name or date of change
     results: list[AddedRecording] = []
@@ -166,7 +174,7 @@ def add_recordings(
         while batch := list(islice(remaining, 32)):
             held: dict[Origin, str] = {}
             for origin in batch:
-                claim, name = ExitStack(), _digest(_identity(origin, setups(origin.path)))
+                claim, name = ExitStack(), _digest(_identity(origin, setups(origin)))
                 if not claim.enter_context(store.claim(name)):
                     elsewhere.append(origin)
                     continue
@@ -177,13 +185,13 @@ def add_recordings(
                     results.append(AddedRecording(origin, FAILED, f"cannot be read ({error.strerror})"))
             of_content = _of_content(store, held)
             for origin, sha256 in held.items():
-                setup = setups(origin.path)
+                setup = setups(origin)
                 key, *before = of_content.get(origin, ("",))
                 if before == [setup, __version__]:
                     unseen.append(origin)
                     claims.pop(_digest(_identity(origin, setup))).close()
                 else:
-                    yield _AnalysisJob(origin, options, sha256, setup, key)
+                    yield _AnalysisJob(origin, options, sha256, setup, key, _nominal_speed_rpm(origin, options))
 
     running = run_jobs(analyse_file, jobs(), n_workers=max(1, min(workers, 64)), executor=executor, if_killed=_killed)
     try:
@@ -191,7 +199,7 @@ def add_recordings(
             for _, (row, indicators, origin) in running:
                 if row["key"]:
                     store.add(row, indicators)
-                claims.pop(_digest(_identity(origin, setups(origin.path)))).close()
+                claims.pop(_digest(_identity(origin, setups(origin)))).close()
                 results.append(AddedRecording(origin, str(row["outcome"]), str(row["verdict"] or row["reason"])))
                 if on_progress is not None:
                     on_progress(len(results), len(missing), results[-1])
@@ -226,7 +234,7 @@ def analyse_file(job: _AnalysisJob) -> tuple[Row, list[Row], Origin]:
 
     path, began = job.origin.path, time.process_time()
     try:
-        result = job.options.analyze(path)
+        result = job.options.analyze(path, job.nominal_speed_rpm)
         analysis = result.as_one() if isinstance(result, LongAnalysis) else result
         if (analysis.recording.provenance.sha256 or sha256_of(path)) != job.sha256:  # of parts no hash is taken
             return _row(job, outcome=FAILED, reason="it was written while it was read", key=""), [], job.origin
@@ -325,7 +333,8 @@ def _row(job: _AnalysisJob, **facts: Any) -> Row:
         "sha256": job.sha256,
         "n_bytes": origin.n_bytes,
         "mtime_ns": origin.mtime_ns,
-        "origin": f"machine: {origin.machine_from}; point: {origin.point_from}; date: {origin.date_from}",
+        "origin": f"machine: {origin.machine_from}; point: {origin.point_from}; date: {origin.date_from}"
+        + (f"; speed: {origin.speed_from}" if origin.speed_rpm is not None else ""),
         "rig": "",
         "setup": job.setup,
         "version": __version__,
@@ -383,11 +392,20 @@ def _of_content(store: Store, files: Mapping[Origin, str]) -> dict[Origin, tuple
     return result
 
 
-def _setups(options: AnalysisOptions) -> Callable[[Path], str]:
-    """Return a function that hashes what decides a file's result besides its content."""
-    from gearsig.recording import sha256_of
+def _nominal_speed_rpm(origin: Origin, options: AnalysisOptions) -> float | None:
+    """Return the speed that the name states, where none was given."""
+    return origin.speed_rpm if options.speed is None else None
 
-    reference = sha256_of(options.reference) if options.reference is not None else ""
+
+def _setups(options: AnalysisOptions) -> Callable[[Origin], str]:
+    """Return a function that hashes what decides a file's result besides its content."""
+    from gearsig.recording import n_samples_of, sha256_of, without_condition
+
+    reference = ""
+    if options.reference is not None:
+        n_samples_of(options.reference)  # what can be none is refused here
+        file, run = without_condition(options.reference)
+        reference = sha256_of(file) + ("" if run is None else f"#{run}")
     shared: list[object] = [reference, options.sampling_rate_hz, options.torque_nm, repr(options.speed)]
     if options.reference_rate_hz is not None:
         shared.append(options.reference_rate_hz)
@@ -404,10 +422,11 @@ def _setups(options: AnalysisOptions) -> Callable[[Path], str]:
         shared.append(of_rig_file(beside))
 
     @cache
-    def setup(path: Path) -> str:
-        rig_file = rig_file_beside(path) if options.rig is None else None
+    def setup(origin: Origin) -> str:
+        rig_file = rig_file_beside(origin.path) if options.rig is None else None
         rig = rig_to_dict(options.rig) if options.rig is not None else of_rig_file(rig_file) if rig_file else None
-        return _digest([rig, *shared])
+        nominal_rpm = _nominal_speed_rpm(origin, options)
+        return _digest([rig, *shared, *([f"nominal {nominal_rpm:g} rpm"] if nominal_rpm is not None else [])])
 
     return setup
 

@@ -14,7 +14,7 @@ from gearsig.errors import InputError
 from gearsig.formatting import counted, file_label
 from gearsig.rig import Rig, read_rig, rig_file_beside
 
-FIELDS = ("machine", "point", "date", "number")
+FIELDS = ("machine", "point", "date", "number", "speed")
 """What a pattern may name, besides `{}` for what does not matter."""
 
 NUMBERS_BEGIN = datetime(2000, 1, 1)  # noqa: DTZ001 - as all dates here
@@ -29,16 +29,19 @@ _FORMS = {
     "%m": r"\d\d",
     "%d": r"\d\d",
     "%H": r"\d\d",
+    "%I": r"\d\d",
     "%M": r"\d\d",
     "%S": r"\d\d",
     "%j": r"\d{3}",
     "%f": r"\d{1,6}",
     "%b": r"[A-Za-z]{3}",
+    "%p": r"[AaPp][Mm]",
     "%%": "%",
 }
 _DATE_IN_NAME = re.compile(
     r"(?<!\d)(?P<day>(?:19|20)\d\d[-_.]?[01]\d[-_.]?[0-3]\d)"
-    r"(?:[-_.T ]?(?P<time>[0-2]\d[-_.:h]?[0-5]\d(?:[-_.:m]?[0-5]\d)?))?(?!\d)"
+    r"(?:[-_.T ]?(?P<time>[0-2]\d[-_.:h]?[0-5]\d(?:[-_.:m]?[0-5]\d)?)"
+    r"(?:[-_ ]?(?P<half>[AaPp][Mm])(?![A-Za-z]))?)?(?!\d)"
 )
 
 
@@ -58,6 +61,10 @@ class Origin:
         What each rests on: "pattern", "folder", "rig file", "file name", "time of the file", "stated", "none".
     n_bytes, mtime_ns : int
         Of the file, when it was looked at.
+    speed_rpm : float or None
+        That the name or an argument states: nominal, as in a rig file's operating point.
+    speed_from : str
+        What it rests on.
     """
 
     path: Path
@@ -69,6 +76,8 @@ class Origin:
     date_from: str
     n_bytes: int
     mtime_ns: int
+    speed_rpm: float | None = None
+    speed_from: str = "none"
 
 
 @dataclass(frozen=True)
@@ -92,7 +101,8 @@ class FilePattern:
     """A pattern of paths such as "{machine}/{point}_{date:%Y%m%d}.csv", matched from a path's end.
 
     `{machine}` and `{point}` are letters without "/", `{date:…}` has the fields of `strptime`, `{number:10min}` is a
-    running number of recordings that are so far apart, `{}` is anything but "/", `*` likewise, and `**` also "/".
+    running number of recordings that are so far apart, `{speed}` a number of rpm, `{}` is anything but "/", `*`
+    likewise, and `**` also "/".
     """
 
     text: str
@@ -100,7 +110,7 @@ class FilePattern:
     def __post_init__(self) -> None:
         self._compiled()
 
-    def match(self, path: Path, root: Path | None = None) -> dict[str, str | datetime | timedelta] | PassedOver:
+    def match(self, path: Path, root: Path | None = None) -> dict[str, str | float | datetime | timedelta] | PassedOver:
         """Return what the pattern names in a path; for a path of another kind what speaks against it.
 
         Below `root` it is tried on the whole of the path first.
@@ -120,7 +130,11 @@ class FilePattern:
         match = match or expression.search(path.absolute().as_posix())
         if match is None:
             return PassedOver(path.absolute(), "does not match the pattern")
-        result: dict[str, str | datetime | timedelta] = {k: v for k, v in match.groupdict().items() if k != "date"}
+        result: dict[str, str | float | datetime | timedelta] = {
+            k: v for k, v in match.groupdict().items() if k != "date"
+        }
+        if "speed" in result:
+            result["speed"] = float(match["speed"].replace(",", "."))
         if isinstance(form, timedelta):
             result["number"] = int(match["number"]) * form
         elif form:
@@ -158,6 +172,8 @@ def _compile(text: str) -> tuple[re.Pattern[str], str | timedelta]:
         elif name == "number":
             form = _interval(field["form"])
             parts.append(r"(?P<number>\d{1,9})")
+        elif name == "speed":
+            parts.append(r"(?P<speed>\d{1,6}(?:[.,]\d{1,3})?)")
         else:
             parts.append(f"(?P<{name}>[^/]+?)" if name else "[^/]*?")
     parts.append(_literal(text[end:]))
@@ -195,13 +211,18 @@ def date_in_name(name: str) -> datetime | None:
     --------
     >>> [str(date_in_name(name)) for name in ("pump_2026-01-31T1405.csv", "2026.01.31.14.05.12", "run_1234.h5")]
     ['2026-01-31 14:05:00', '2026-01-31 14:05:12', 'None']
+    >>> str(date_in_name("2026-01-31 02-05-12 PM.csv"))
+    '2026-01-31 14:05:12'
     """
     for match in _DATE_IN_NAME.finditer(name):
         digits = re.sub(r"\D", "", match["day"])
-        time = re.sub(r"\D", "", match["time"] or "")
-        for clock in (time, ""):
+        time = re.sub(r"\D", "", match["time"] or "").ljust(6, "0")
+        forms = {"%Y%m%d%H%M%S": time, "%Y%m%d": ""}
+        if match["half"]:
+            forms = {"%Y%m%d%I%M%S%p": time + match["half"], **forms}
+        for form, clock in forms.items():
             try:
-                return datetime.strptime(digits + clock.ljust(6, "0"), "%Y%m%d%H%M%S")  # noqa: DTZ007
+                return datetime.strptime(digits + clock, form)  # noqa: DTZ007
             except ValueError:
                 continue
     return None
@@ -294,6 +315,7 @@ def origins(
     point: str = "",
     date: datetime | None = None,
     rig: Rig | None = None,
+    speed_rpm: float | None = None,
     on_passed_over: Callable[[PassedOver], object] | None = None,
     may_be_none: bool = False,
 ) -> list[Origin]:
@@ -302,7 +324,7 @@ def origins(
     The machine is what is stated, else what the pattern names, else the first sub-folder below the place searched,
     else the name in the rig file, else the folder. The point is stated, in the pattern, or the second sub-folder. The
     date is stated, in the pattern, in the file's name, or when the file was written; running numbers count from what is
-    stated.
+    stated. The speed is stated, in the pattern, or in the file's name ("1000rpm"), or unknown.
 
     Parameters
     ----------
@@ -314,6 +336,8 @@ def origins(
     date : datetime or None
     rig : Rig or None
         Of all; None: the rig file of the same name beside each.
+    speed_rpm : float or None
+        Stated of all.
     on_passed_over : callable or None
         Called with a `PassedOver` for each recording that does not match the pattern.
     may_be_none : bool
@@ -324,6 +348,8 @@ def origins(
     InputError
         If a file is missing, the pattern is no pattern, or nothing is found.
     """
+    from gearsig.recording import speed_in_name
+
     searched, passed_over = list(places), list[PassedOver]()
     file_pattern = FilePattern(pattern) if pattern else None
     recordings = find_recordings(searched)
@@ -361,6 +387,11 @@ def origins(
             ("file name", date_in_name(path.name)),
             ("time of the file", written),
         )
+        of_speed = _first(
+            ("stated", speed_rpm),
+            ("pattern", named.get("speed")),
+            ("file name", speed_in_name(path.name)),
+        )
         moment = of_date[1]
         assert isinstance(moment, datetime)  # noqa: S101 - the file's time is always there
         result.append(
@@ -374,6 +405,8 @@ def origins(
                 of_date[0],
                 stat.st_size,
                 stat.st_mtime_ns,
+                of_speed[1] if isinstance(of_speed[1], float) else None,
+                of_speed[0],
             )
         )
     if not result and not may_be_none:
@@ -428,14 +461,15 @@ def _printable_name(text: object) -> str:
     return " ".join(line.split())[:LONGEST_NAME]
 
 
-def origin_rows(recordings: Sequence[Origin]) -> list[tuple[str, str, str, str]]:
-    """Return file, machine, point and date of each, with what it rests on, as a person checks them."""
+def origin_rows(recordings: Sequence[Origin]) -> list[tuple[str, str, str, str, str]]:
+    """Return file, machine, point, date and speed of each, with what it rests on, as a person checks them."""
     return [
         (
             o.path.name,
             f"{o.machine} ({o.machine_from})",
             f"{o.point} ({o.point_from})" if o.point else "–",
             f"{o.date:%Y-%m-%d %H:%M} ({o.date_from})",
+            f"{o.speed_rpm:g} rpm ({o.speed_from})" if o.speed_rpm else "–",
         )
         for o in recordings
     ]

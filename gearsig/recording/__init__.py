@@ -12,6 +12,7 @@ from gearsig.recording._read import (
     read_recording,
     recording_target,
     sha256_of,
+    speed_in_name,
     without_condition,
     write_recording,
 )
@@ -56,6 +57,7 @@ __all__ = [
     "recording_target",
     "sha256_of",
     "si_factor",
+    "speed_in_name",
     "variables",
     "without_condition",
     "write_recording",

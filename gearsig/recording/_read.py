@@ -529,6 +529,8 @@ def assemble(
     speed, speed_warnings = _speed(table, channels, rig, speed)
     if speed is None and not table.is_own_layout and (rig is None or rig.speed is None):
         speed_warnings = (*speed_warnings, *_unused_pulses(table, channels))
+        if rig is None or rig.operating_point.speed_rpm is None:
+            speed_warnings = (*speed_warnings, *_unused_name(source))
     recording = Recording(
         _stack(table, source),
         rate_hz,
@@ -734,6 +736,28 @@ def _unused_pulses(table: RawTable, channels: tuple[Channel, ...]) -> Iterator[s
             f'{name!r} holds pulses, as of a tachometer: [speed] with source = "tachometer", channel = "{name}" and '
             "pulses_per_revolution = … in a rig file takes the speed from them"
         )
+
+
+_SPEED_IN_NAME = re.compile(r"(?<![A-Za-z0-9.,])(\d{2,6}(?:[.,]\d{1,2})?)[ _-]?rpm(?![A-Za-z])", re.IGNORECASE)
+
+
+def speed_in_name(name: str) -> float | None:
+    """Return the speed in rpm that a file's name states, None where it states none or several.
+
+    Examples
+    --------
+    >>> [speed_in_name(name) for name in ("pump_1000rpm.csv", "X209RPM.mat", "from 600 rpm to 900 rpm.h5")]
+    [1000.0, None, None]
+    """
+    stated = {float(text.replace(",", ".")) for text in _SPEED_IN_NAME.findall(name)} - {0.0}
+    return stated.pop() if len(stated) == 1 else None
+
+
+def _unused_name(source: str) -> Iterator[str]:
+    """Offer the speed that a name states, which nobody measured and which may be of another shaft."""
+    speed_rpm = speed_in_name(source)
+    if speed_rpm is not None:
+        yield f"the file's name says {speed_rpm:g} rpm, which is not taken: --speed-rpm {speed_rpm:g} states it"
 
 
 def _contradicted(given: SpeedSource, table: RawTable, rig: Rig | None) -> tuple[str, ...]:

@@ -568,7 +568,8 @@ class Rig:
 
     def ratio(self, shaft: str, to: str = "") -> float | None:
         """Revolutions of `shaft` per revolution of `to` (default: the reference shaft); None if not known."""
-        self._check_shaft(shaft, "ratio")
+        if shaft != self.reference_shaft:  # which has no name where no shaft is described
+            self._check_shaft(shaft, "ratio")
         ratios = shaft_ratios(self)
         from_ratio, to_ratio = ratios.get(shaft), ratios.get(to or self.reference_shaft)
         if shaft == (to or self.reference_shaft):

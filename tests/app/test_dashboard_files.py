@@ -62,7 +62,8 @@ def test_a_safe_name_stays_in_its_folder(name: str) -> None:
 
 def test_a_safe_name_keeps_the_ending() -> None:
     assert safe_file_name("a" * 300 + ".csv.gz").endswith("aaa.csv.gz")
-    assert safe_file_name("振動.2024.csv.gz") == "recording.csv.gz"
+    assert safe_file_name("振動.2024.csv.gz") == "2024.csv.gz"
+    assert safe_file_name("..") == safe_file_name("振動") == "recording"
     assert safe_file_name("no ending") == "no-ending"
     assert safe_file_name("…/../Messung 1.MAT") == "Messung-1.MAT"
 

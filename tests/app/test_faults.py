@@ -58,7 +58,7 @@ from app.cli.main import main
 
 main(sys.argv[2:])
 """
-DEFINITIONS = {"sweep.json", "definition.json", "benchmark.json"}
+DEFINITIONS = {"sweep.json", "definition.json", "benchmark.json", "gap.json"}
 """Without them nobody knows what a folder's results are of: the command asks for another folder."""
 OTHER_EACH_TIME = {".html", ".png", ".pdf"}
 """They name the folder, the day or the seconds that something took."""

@@ -20,6 +20,19 @@ from tests.app.test_cli import run
 SHORT = ("--duration", "50ms")
 
 
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="no folder is known in which nobody can write")
+@pytest.mark.parametrize(
+    "words", [("simulate", "cracked", *SHORT, "-o", "x.h5"), ("identify", "no.h5", "-o", "x.toml")]
+)
+def test_where_nothing_can_be_written_is_said_before_the_work(
+    capsys: pytest.CaptureFixture[str], words: tuple[str, ...]
+) -> None:
+    *asked, name = words
+    code, _, err = run(capsys, *asked, f"/proc/self/{name}")
+    assert code == 2
+    assert "/proc/self: cannot be written" in err
+
+
 @pytest.mark.parametrize("extension", ["csv", "h5", "parquet", "wav", "mat"])
 def test_recording_rig_and_truth(capsys: pytest.CaptureFixture[str], tmp_path: Path, extension: str) -> None:
     file = tmp_path / f"crack.{extension}"

@@ -7,7 +7,7 @@ import pytest
 
 from gearsig.errors import InputError
 from gearsig.recording import read_recording
-from gearsig.rig import Rig, Sensor, SpeedChannel, TachometerChannel
+from gearsig.rig import ConstantSpeed, OperatingPoint, Rig, Sensor, SpeedChannel, TachometerChannel
 
 FS_HZ = 25600.0
 
@@ -186,7 +186,7 @@ def test_jitter_below_one_percent_is_fine(tmp_path):
         (["a,b"], "no line of numbers"),
         (["<html><body>1,2"], "HTML"),
         (["time", "1", "2", "3"], "only column"),
-        (["when,a", "1/2/2024 00:00:01,2", "1/2/2024 00:00:02,2"], "line 2 begins .*date and time are read as 2026-01"),
+        (["when,a", "1/2/24 00:00:01,2", "1/2/24 00:00:02,2"], "line 2 begins .*date and time are read as 2026-01"),
         (["when,a", "2024-02-30T00:00:01,2", "2024-02-30T00:00:02,2"], "line 2 begins .*date and time are read as"),
         (["when,a", "2024-01-01T00:00:01,2", "2024-01-01T00:00:02Z,2", "2024-01-01T00:00:03,2"], "line 3, .*no date"),
         (["when,a", "2024-01-01T00:00:01,2", "2024-01-01T00:00:02,2", "2024-01-01T00:00:02,2"], "does not increase at"),
@@ -240,7 +240,7 @@ def test_dates_and_times_are_the_time(tmp_path, separator, zone, between, quote,
 
 
 def test_the_first_bad_line_is_named_not_the_last_of_a_sample(tmp_path):
-    lines = ["timestamp,acc", *(f"01/01/2026 00:00:00.{i:06},{i}" for i in range(20_000))]
+    lines = ["timestamp,acc", *(f"01/01/26 00:00:00.{i:06},{i}" for i in range(20_000))]
     with pytest.raises(InputError, match="line 2 begins"):
         read_recording(write(tmp_path / "x.csv", lines))
 
@@ -318,6 +318,22 @@ def test_rows_are_counted_before_the_time(tmp_path):
     assert described(r) == ([("ch3", "m/s^2")], pytest.approx(1000))
 
 
+def test_a_speed_in_the_name_is_offered_where_nothing_tells_it(tmp_path):
+    text = table(2, ",", ".")
+    read, nominal = read_text(tmp_path, text, "a_1000rpm.csv"), OperatingPoint(speed_rpm=990)
+    assert read.speed_source is None
+    assert [w for w in read.warnings if "--speed-rpm 1000 " in w]
+    for known in ({"speed": ConstantSpeed(990)}, {"rig": Rig(operating_point=nominal)}):
+        read = read_recording(tmp_path / "a_1000rpm.csv", **known)
+        assert read.speed_source == ConstantSpeed(990)
+        assert not [w for w in read.warnings if "1000" in w]
+
+
+def clock(i, hour):
+    """Return second `i` after a minute before the full hour."""
+    return f"{hour + i // 60}:{(59, 0)[i // 60]:02d}:{i % 60:02d}"
+
+
 @pytest.mark.parametrize(
     ("stamp", "rate_hz"),
     [
@@ -325,6 +341,11 @@ def test_rows_are_counted_before_the_time(tmp_path):
         (lambda i: f"1.3.2026 9:05:{i / 100:06.3f}", 100),
         (lambda i: f"2026/01/31;14:22:{i / 100:06.3f}", 100),
         (lambda i: f"14:22:{i / 100:06.3f}", 100),
+        (lambda i: f"{('31/1', '1/2')[i // 60]}/2026;{clock(i, 23).replace('24:', '0:')}", 1),
+        (lambda i: f"{('1/31', '2/1')[i // 60]}/2026 {clock(i, 11)} {'PA'[i // 60]}M", 1),
+        (lambda i: f"{1 + i // 60}/2/2026 {clock(i, 11)} {'PA'[i // 60]}M", 1),
+        (lambda i: f"{clock(i, 11)} {'AP'[i // 60]}M", 1),
+        (lambda i: f"{clock(i, 12).replace('13:', '1:')}pm", 1),
     ],
 )
 @pytest.mark.parametrize("head", ["", "Date;Time;a\n"])

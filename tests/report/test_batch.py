@@ -81,6 +81,17 @@ def test_a_mistyped_path_is_refused_before_anything_is_written(recordings, tmp_p
     assert not (tmp_path / "out").exists()
 
 
+def test_a_mistyped_reference_or_method_is_refused_before_anything_is_written(recordings, tmp_path):
+    for wrong, message in (
+        ({"reference": tmp_path / "on.csv"}, r"on\.csv: cannot be opened"),
+        ({"reference": tmp_path}, "is a folder"),
+        ({"methods": ["x"]}, "there is no method 'x'"),
+    ):
+        with pytest.raises(InputError, match=message):
+            report_many(recordings, tmp_path / "out", n_processes=1, **wrong)
+        assert not (tmp_path / "out").exists()
+
+
 def test_a_condition_of_a_file_that_is_there_is_no_mistyped_path(recordings, tmp_path, monkeypatch):
     monkeypatch.setattr(batch, "_report_one", _page_for)
     result = report_many([f"{recordings[0]}#2"], tmp_path / "out", n_processes=1)

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -127,11 +128,28 @@ def test_a_stopped_sweep_goes_on_and_ends_with_the_same_files(quick: list[SweepP
     assert run_sweep(sweep, folder, n_processes=1).outcomes == ()
 
 
-def test_a_recording_that_was_lost_is_made_again(quick: list[SweepPoint], tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("ending", "damage"),
+    [
+        (".h5", None),
+        (".h5", lambda content: content[: len(content) // 2]),
+        (".toml", lambda content: content + b"["),
+        (".truth.json", lambda content: content.replace(b'"seed"', b'"sead"')),
+        (".truth.json", lambda content: b"\xff" + content),
+    ],
+)
+def test_a_point_that_is_lost_or_damaged_is_made_again(
+    quick: list[SweepPoint], tmp_path: Path, ending: str, damage: Callable[[bytes], bytes] | None
+) -> None:
     sweep = small()
     run_sweep(sweep, tmp_path / "grid", n_processes=1)
-    (tmp_path / "grid" / "point_3.h5").unlink()
+    file = tmp_path / "grid" / f"point_3{ending}"
+    whole = file.read_bytes()
+    file.unlink()
+    if damage is not None:
+        file.write_bytes(damage(whole))
     assert [o.point.index for o in run_sweep(sweep, tmp_path / "grid", n_processes=1).outcomes] == [3]
+    assert file.read_bytes() == whole
     assert len(quick) == 7
 
 

@@ -14,12 +14,11 @@ from app.dashboard.widgets.machine import describe, machine_text, stated, stated
 from app.dashboard.widgets.texts import as_typed
 from app.samples import SampleRecording, samples
 from gearsig.errors import InputError
-from gearsig.recording import FORMAT_NAMES, FORMAT_OF_EXTENSION, sha256_of
+from gearsig.recording import FORMAT_NAMES, sha256_of
 
 if TYPE_CHECKING:
     from streamlit.runtime.uploaded_file_manager import UploadedFile
 
-ENDINGS = (*FORMAT_OF_EXTENSION, ".gz")
 KINDS = f"{FORMAT_NAMES}; text also as .gz."
 SIMULATED = "Simulated, not measured: what is in them is known."
 
@@ -84,7 +83,7 @@ def choose_files(
         _open_named(key, name)
     given = st.file_uploader(
         label,
-        type=["toml"] if of_rigs else list(ENDINGS),
+        type=["toml"] if of_rigs else None,  # a recording's name need not have an ending
         accept_multiple_files=several,
         key=state.uploader_key(key),
         help=about,
@@ -133,7 +132,7 @@ def choose_with_rig(label: str, key: str, *, about: str = KINDS) -> tuple[Chosen
     InputError
         If there are several of either, or the rig file is no text.
     """
-    given = st.file_uploader(label, type=[*ENDINGS, ".toml"], accept_multiple_files=True, key=key, help=about)
+    given = st.file_uploader(label, accept_multiple_files=True, key=key, help=about)
     rigs = [file for file in given if file.name.lower().endswith(".toml")]
     recordings = [file for file in given if file not in rigs]
     for files, kind in ((recordings, "recordings"), (rigs, "rig files")):

@@ -47,8 +47,9 @@ COMMENT_SIGNS = ("#", "%", "//")
 
 # Possessive: digits that no number ends are looked at once.
 _NUMBER = re.compile(r"[+-]?(?:\d++\.?\d*+|\.\d++)(?:e[+-]?\d++)?\Z|[+-]?(?:nan|inf|infinity)\Z", re.IGNORECASE)
-_CLOCK = r"[0-9]{1,2}:[0-9]{2}:[0-9]{2}(?:[.,][0-9]{1,9})?"
-_DAY = r"(?:[0-9]{4}[-/.][0-9]{2}[-/.][0-9]{2}|[0-9]{1,2}\.[0-9]{1,2}\.[0-9]{4})"
+_MINUTES = r":[0-9]{2}:[0-9]{2}(?:[.,][0-9]{1,9})?"
+_CLOCK = rf"(?:[0-9]{{1,2}}{_MINUTES}|(?:0?[0-9]|1[0-2]){_MINUTES} ?[AaPp][Mm])"
+_DAY = r"(?:[0-9]{4}[-/.][0-9]{2}[-/.][0-9]{2}|[0-9]{1,2}\.[0-9]{1,2}\.[0-9]{4}|[0-9]{1,2}/[0-9]{1,2}/[0-9]{4})"
 _ISO = r"[0-9]{4}-[0-9]{2}-[0-9]{2}[T ][0-9]{2}:[0-9]{2}:[0-9]{2}(?:\.[0-9]{1,9})?"
 _DATE_TIMES = {
     kind: re.compile(expression + r"\Z")
@@ -61,7 +62,10 @@ _DATE_TIMES = {
     }.items()
 }
 """Kinds of date and time → how they are written: ISO 8601, as people write it, in two columns, the time of day."""
-DATE_TIME_EXAMPLES = "2026-01-31T12:00:00.0001, 2026-01-31 12:00:00.0001Z, 31.01.2026 12:00:00,0001 or 12:00:00.0001"
+DATE_TIME_EXAMPLES = (
+    "2026-01-31T12:00:00.0001, 2026-01-31 12:00:00.0001Z, 31.01.2026 12:00:00,0001, 1/31/2026 12:00:00.0001 PM "
+    "or 12:00:00.0001"
+)
 """Of what is read as date and time."""
 
 
@@ -128,6 +132,8 @@ def date_time_kind(fields: Sequence[str]) -> str:
     ['zoned', 'local', '']
     >>> [date_time_kind(fields) for fields in (["31.1.2026 12:00:00,5"], ["2026/01/31", "12:00:00"], ["0:00:01"])]
     ['written', 'apart', 'clock']
+    >>> [date_time_kind([text]) for text in ("1/31/2026 12:00:00 AM", "31/1/2026 2:05:00 pm", "13:00:00 PM")]
+    ['written', 'written', '']
     """
     from pyarrow import ArrowInvalid
 
@@ -150,31 +156,53 @@ def _date_time_text(fields: Sequence[str], kind: str) -> str:
 
 
 def _seconds_from_first(date_times: Any, kind: str) -> FloatArray:
-    """Return dates and times, as texts or as Arrow's, in seconds from the first: exact to a nanosecond over days."""
+    """Return dates and times, as texts or as Arrow's, in seconds from the first: exact to a nanosecond over days.
+
+    Of days with slashes, month first as in America or day first, the reading by which the record is shorter is taken.
+    """
     import pyarrow as pa
+    from pyarrow import compute
 
     if isinstance(date_times, list):
         date_times = pa.array(date_times, pa.string())
-    if kind in ("written", "apart", "clock"):
-        date_times = _as_iso(date_times, kind)
-    whole, rest_ns = np.divmod(
-        date_times.cast(pa.timestamp("ns", "UTC" if kind == "zoned" else None))
-        .cast(pa.int64())
-        .to_numpy(zero_copy_only=False),
-        10**9,
-    )
+    if kind in ("local", "zoned"):
+        return _from_first(date_times, "UTC" if kind == "zoned" else None)
+    first, half_days = date_times[0].as_py() if len(date_times) else "", 0
+    if first[-1:] in ("m", "M"):  # twelve hours twice a day: 12 AM is midnight
+        half_days = compute.match_substring_regex(date_times, "[pP].$").to_numpy(zero_copy_only=False)
+        for old, new in ((r" ?[AaPp][Mm]$", ""), (r"(^|[ T\x1f])12(:[0-9]{2}:[^:]*)$", r"\100\2")):
+            date_times = compute.replace_substring_regex(date_times, old, new)
+    if "/" not in first[:3]:
+        return _from_first(_as_iso(date_times, kind), None, half_days)
+    readings, problems = list[FloatArray](), list[pa.ArrowInvalid]()
+    for order in (r"\3-\1-\2", r"\3-\2-\1"):
+        try:
+            readings.append(_from_first(_as_iso(date_times, kind, order), None, half_days))
+        except pa.ArrowInvalid as error:
+            problems.append(error)
+    if not readings:
+        raise problems[0]
+    return min(readings, key=np.ptp)
+
+
+def _from_first(date_times: Any, zone: str | None, half_days: Any = 0) -> FloatArray:
+    """Return dates and times as ISO 8601 has them, and half days to be added, in seconds from the first."""
+    import pyarrow as pa
+
+    moments_ns = date_times.cast(pa.timestamp("ns", zone)).cast(pa.int64()).to_numpy(zero_copy_only=False)
+    whole, rest_ns = np.divmod(moments_ns + half_days * (12 * 3600 * 10**9), 10**9)
     seconds: FloatArray = (whole - whole[:1]) + (rest_ns - rest_ns[:1]) / 1e9
     return seconds
 
 
-def _as_iso(texts: Any, kind: str) -> Any:
-    """Return dates and times that are written otherwise as ISO 8601 has them."""
+def _as_iso(texts: Any, kind: str, order: str = r"\3-\2-\1") -> Any:
+    """Return dates and times that are written otherwise as ISO 8601 has them; the order is of a day's three numbers."""
     from pyarrow import compute
 
     changes = [(r"^([0-9]{4})[/.]([0-9]{2})[/.]", r"\1-\2-")]
     if kind != "clock":
-        changes += [(r"^([0-9])\.", r"0\1."), (r"^([0-9]{2})\.([0-9])\.", r"\1.0\2.")]
-        changes += [(r"^([0-9]{2})\.([0-9]{2})\.([0-9]{4})", r"\3-\2-\1")]
+        changes += [(r"^([0-9])([./])", r"0\1\2"), (r"^([0-9]{2})([./])([0-9])[./]", r"\1\20\3\2")]
+        changes += [(r"^([0-9]{2})[./]([0-9]{2})[./]([0-9]{4})", order)]
     else:
         changes += [("^", "1970-01-01 ")]
     for old, new in [*changes, ("\x1f", " "), (" ([0-9]):", r" 0\1:"), (",", ".")]:
