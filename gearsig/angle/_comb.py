@@ -214,7 +214,7 @@ def _mean_power(x: FloatArray, n_segment: int) -> FloatArray:
     from scipy.fft import rfft
 
     precision = np.result_type(x.dtype, np.float32)
-    window = 0.5 - 0.5 * np.cos(np.arange(n_segment, dtype=precision) * precision.type(2 * np.pi / n_segment))  # Hann
+    window = _hann(n_segment, precision)
     step = max(1, n_segment // 2)
     power = np.zeros(n_segment // 2 + 1)
     for start in range(0, len(x) - n_segment + 1, step):
@@ -222,6 +222,12 @@ def _mean_power(x: FloatArray, n_segment: int) -> FloatArray:
         lines = rfft((segment - segment.mean(dtype=np.float64)).astype(precision) * window, overwrite_x=True)
         power += lines.real**2 + lines.imag**2
     return power
+
+
+@lru_cache(maxsize=1)  # blocks of one length are asked for one after the other
+def _hann(n: int, precision: np.dtype[Any]) -> FloatArray:
+    window: FloatArray = 0.5 - 0.5 * np.cos(np.arange(n, dtype=precision) * precision.type(2 * np.pi / n))
+    return window
 
 
 def _log_ratio(power: FloatArray) -> FloatArray:

@@ -45,7 +45,9 @@ def track_speed(
     over the rest, hence the limit.
     """
     starts = np.arange(0, samples.shape[1] - n_block + 1, max(1, n_block // 2))
-    evidence = [line_evidence(samples[:, start : start + n_block], rate, n_block, TOP * rate) for start in starts]
+    reach = comb.highest * high
+    blocks = (samples[:, start : start + n_block] for start in starts)
+    evidence = [line_evidence(block, rate, n_block, TOP * rate, reach) for block in blocks]
     speeds = candidate_speeds(low, high, comb, evidence[0])
     scores = np.array([score_speeds(e, comb, speeds) for e in evidence])
     inner = scores[:, 1:-1]

@@ -646,21 +646,21 @@ def smallest_depth(
     best: dict[tuple[float, float], float] = {}
     for envelope in envelopes:
         score = score_needed(envelope.excess, 6, order * (1 - slip), order * (1 + slip), probability)
-        depths = sorted(_depth_in(envelope, order * (1 + part * slip), score) for part in SLIPS)
-        best[envelope.band_hz] = min(depths[max(ceil(share * len(SLIPS)), 1) - 1], best.get(envelope.band_hz, inf))
+        depths = np.sort(_depths_in(envelope, order * (1 + slip * np.array(SLIPS)), score))
+        enough = float(depths[max(ceil(share * len(SLIPS)), 1) - 1])
+        best[envelope.band_hz] = min(enough, best.get(envelope.band_hz, inf))
     return median_high(best.values()) if best else inf
 
 
-def _depth_in(envelope: BandEnvelope, order: float, score: float) -> float:
+def _depths_in(envelope: BandEnvelope, orders: FloatArray, score: float) -> FloatArray:
     excess = envelope.excess
-    places = order * np.arange(1, 7)
-    places = places[places <= excess.spectrum.positions[-1]]
-    index = np.array([excess.spectrum.index_of(place) for place in places], dtype=np.int64)
-    free = index[~excess.masked[index]] if len(index) else index
-    if len(free) < 3 or envelope.mean <= 0:  # harmonics beside those of the shafts that a family must have to be seen
-        return inf
-    needed = score / len(free)
-    if needed > LOG_RATIO_LIMIT:
-        return inf
-    floor = float(np.exp(np.mean(np.log(np.maximum(excess.floor[free], 1e-300)))))
-    return floor * float(np.exp(needed / 2)) / envelope.mean
+    places = orders[:, None] * np.arange(1, 7)
+    lines = np.clip(excess.line_numbers(places), 0, len(excess.masked) - 1)
+    free = (places <= excess.spectrum.positions[-1]) & ~excess.masked[lines]
+    n_free = np.maximum(free.sum(axis=1), 1)
+    needed = score / n_free
+    log_floor = np.where(free, np.log(np.maximum(excess.floor[lines], 1e-300)), 0.0).sum(axis=1) / n_free
+    # Harmonics beside those of the shafts that a family must have to be seen are three.
+    shows = (n_free >= 3) & (needed <= LOG_RATIO_LIMIT) & (envelope.mean > 0)
+    depths: FloatArray = np.where(shows, np.exp(log_floor + needed / 2) / max(envelope.mean, 1e-300), inf)
+    return depths
