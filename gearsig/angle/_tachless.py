@@ -139,7 +139,7 @@ def _thinned(recording: Recording, channels: tuple[str, ...], highest_hz: float)
     response = n_thin / n_padded * np.sin(np.pi / 2 * kept) ** 2
     thin = np.empty((len(channels), n * n_thin // n_padded))
     for name, row in zip(channels, thin, strict=True):
-        lines = rfft(recording.values(name).astype(np.float64), n_padded, overwrite_x=True)[: len(response)]
+        lines = rfft(recording.values(name), n_padded)[: len(response)]  # in the samples' precision
         row[:] = irfft(lines * response, n_thin, overwrite_x=True)[: len(row)]
     return replace(recording.select(channels), samples=thin, sampling_rate_hz=rate * n_thin / n_padded)
 

@@ -8,7 +8,7 @@ from math import ceil, inf
 from statistics import median_high
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft
+from scipy.fft import irfft, next_fast_len, prev_fast_len, rfft
 from scipy.signal.windows import hann
 
 from gearsig.checks import FloatArray
@@ -246,10 +246,10 @@ def _with_course(candidate: Candidate) -> Candidate:
         return candidate
     # Shafts' lines, beside the race's or stronger, would be taken for its course.
     values, per_revolution = over_angle.values(envelope.channel), over_angle.samples_per_revolution
-    n = len(values)
+    n = prev_fast_len(len(values), real=True)
     # Nothing above what is asked for: the lines of N_MULTIPLES and half an interval beyond, and the window's foot.
     n_kept = min(n, next_fast_len(int(2 * (N_MULTIPLES + 2) * n * order / per_revolution), real=True))
-    lines = rfft(values)[: n_kept // 2 + 1]
+    lines = rfft(values[:n])[: n_kept // 2 + 1]
     numbers = excess.line_numbers(np.arange(len(lines)) * per_revolution / n)
     lines[excess.masked[np.clip(numbers, 0, len(excess.masked) - 1)]] = 0
     course = course_of_knocks(irfft(lines, n_kept) * (n_kept / n), per_revolution * n_kept / (n * order))

@@ -123,7 +123,7 @@ def band_envelope(
     if blocks is not None and blocks.pay(has_transform=transform is not None):
         values, rate_hz = blocks.magnitude(x), fs * blocks.n_out / blocks.n
     else:
-        known = rfft(joined_ends(x.astype(np.float64), continued=continued)) if transform is None else transform
+        known = rfft(joined_ends(x, continued=continued)) if transform is None else transform
         n = joined_length(len(x), len(known))
         z = _complex_envelope(known, n, *_band_lines(band_hz, fs, n), edge_fraction, 2 if kind == "squared" else 4)
         rate_hz = fs * len(z) / n
