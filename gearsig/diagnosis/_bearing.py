@@ -239,7 +239,7 @@ def _other_speed_text(times: int) -> str:
 
 
 def _with_course(candidate: Candidate) -> Candidate:
-    """Return a family with whether what modulates at a race's order is no knocking, by more than twice the errors."""
+    """Return a family with whether what modulates at a race's order is no knocking, by more than three standard errors."""
     envelope, over_angle = candidate.envelope, candidate.envelope.over_angle
     order, excess = candidate.comb.fundamental, envelope.excess
     if candidate.name not in RACES or over_angle is None or len(excess.free_lines_at(order * ONE_TO_THREE)) < 3:
@@ -256,7 +256,7 @@ def _with_course(candidate: Candidate) -> Candidate:
     if course is None:
         return candidate
     (moment, moment_error), (later, later_error) = course
-    is_smooth = moment + 2 * moment_error < KNOCK or later + 2 * later_error < LATER_LINES
+    is_smooth = moment + 3 * moment_error < KNOCK or later + 3 * later_error < LATER_LINES
     return replace(candidate, is_smooth=is_smooth)
 
 
