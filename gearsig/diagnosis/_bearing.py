@@ -239,7 +239,7 @@ def _other_speed_text(times: int) -> str:
 
 
 def _with_course(candidate: Candidate) -> Candidate:
-    """Return a family with whether what modulates at a race's order is no knocking, by more than three standard errors."""
+    """Return a family with whether what modulates at a race's order is no knocking, by three standard errors."""
     envelope, over_angle = candidate.envelope, candidate.envelope.over_angle
     order, excess = candidate.comb.fundamental, envelope.excess
     if candidate.name not in RACES or over_angle is None or len(excess.free_lines_at(order * ONE_TO_THREE)) < 3:

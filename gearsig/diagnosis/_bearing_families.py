@@ -18,6 +18,7 @@ from gearsig.diagnosis._signals import (
     AnalysisSignals,
     BandEnvelope,
     is_of_tones,
+    lines_without_tones,
     without_shafts,
 )
 from gearsig.prepared import MAINS_TOLERANCE, Comb, LinesOverFloor, best_comb, comb_at, peak_position
@@ -293,7 +294,7 @@ def find_families(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Fa
         named = _distinct(signals, pulls)
     trains = [t for t in trains if not any(t.strength_db < c.strength_db - SECOND_DB for c in named)]
     named = [c for c in named if not any(c.strength_db < t.strength_db - SECOND_DB for t in trains)]
-    if named and speed_is_only_stated(signals):
+    if named:
         stranger = _strongest_family(signals, envelopes)
         named = [c for c in named if c.strength_db >= stranger - SECOND_DB]
     clear = [c for c in named if _stands_out(signals, c)]
@@ -451,13 +452,21 @@ def best_unnamed(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Can
 
 
 def _strongest_family(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> float:
-    """Return the strength of the strongest family that is no chance, in dB: one of no known part has another cause.
+    """Return the strength of the strongest family that is no chance, without steady tones that beat, in dB.
 
-    Where the speed is wrong a damaged race is no part's, and its by-products are near one or another.
+    One of no known part has another cause: a damaged race where the speed is wrong, or a bearing that nobody described.
+    Its by-products are near one part or another.
     """
-    families = _families(envelopes, *_rates_of_bearings(signals))
-    allowed = signals.settings.false_alarm_probability
-    return max((c.strength_db for c in families if c.p_value <= allowed), default=0.0)
+    allowed, strongest = signals.settings.false_alarm_probability, 0.0
+    families = [c for c in _families(envelopes, *_rates_of_bearings(signals)) if c.p_value <= allowed]
+    for family in sorted(families, key=lambda c: -c.strength_db):
+        if family.strength_db <= strongest:
+            break
+        excess = lines_without_tones(signals, family.envelope)
+        if excess is not None:
+            left = _strength_in(replace(family.envelope, excess=excess), family.comb.fundamental)
+            strongest = max(strongest, min(left, family.strength_db))
+    return strongest
 
 
 def clearest_family(envelopes: list[BandEnvelope], low: float, high: float) -> Candidate | None:

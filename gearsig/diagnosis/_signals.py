@@ -479,11 +479,16 @@ def is_of_tones(signals: AnalysisSignals, envelope: BandEnvelope, order: float) 
     Tones of a supply and of slots are that steady. Impacts of a bearing that slips ring in tones no longer than some
     turns of its cage, or shake all of a band, so that removing single lines leaves them.
     """
+    excess = lines_without_tones(signals, envelope)
+    return excess is not None and seen_in(excess, order) is None
+
+
+def lines_without_tones(signals: AnalysisSignals, envelope: BandEnvelope) -> LinesOverFloor | None:
+    """Return the lines of an envelope without the steady tones; None where tones are all there is, or no envelope."""
     key = envelope.channel, envelope.band_hz
     if key not in signals.without_tones:
         signals.without_tones[key] = _lines_without_tones(signals, *key)
-    excess = signals.without_tones[key]
-    return excess is not None and seen_in(excess, order) is None
+    return signals.without_tones[key]
 
 
 def _lines_without_tones(signals: AnalysisSignals, channel: str, band_hz: tuple[float, float]) -> LinesOverFloor | None:
