@@ -144,7 +144,6 @@ class _AnalysisJob:
     sha256: str
     setup: str
     replaces: str = ""
-    nominal_speed_rpm: float | None = None
 
 
 def add_recordings(
@@ -191,7 +190,7 @@ def add_recordings(
                     unseen.append(origin)
                     claims.pop(_digest(_identity(origin, setup))).close()
                 else:
-                    yield _AnalysisJob(origin, options, sha256, setup, key, _nominal_speed_rpm(origin, options))
+                    yield _AnalysisJob(origin, options, sha256, setup, key)
 
     running = run_jobs(analyse_file, jobs(), n_workers=max(1, min(workers, 64)), executor=executor, if_killed=_killed)
     try:
@@ -234,7 +233,7 @@ def analyse_file(job: _AnalysisJob) -> tuple[Row, list[Row], Origin]:
 
     path, began = job.origin.path, time.process_time()
     try:
-        result = job.options.analyze(path, job.nominal_speed_rpm)
+        result = job.options.analyze(path, _nominal_speed_rpm(job.origin, job.options))
         analysis = result.as_one() if isinstance(result, LongAnalysis) else result
         if (analysis.recording.provenance.sha256 or sha256_of(path)) != job.sha256:  # of parts no hash is taken
             return _row(job, outcome=FAILED, reason="it was written while it was read", key=""), [], job.origin

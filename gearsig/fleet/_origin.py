@@ -405,7 +405,7 @@ def origins(
                 of_date[0],
                 stat.st_size,
                 stat.st_mtime_ns,
-                of_speed[1] if isinstance(of_speed[1], float) else None,
+                float(of_speed[1]) if isinstance(of_speed[1], int | float) else None,
                 of_speed[0],
             )
         )

@@ -399,7 +399,8 @@ def _sharpest(values, floor, masked, candidates, origins, factors, first, resolu
         for j in range(len(candidates)):
             line = int(np.rint((origins[i] + factors[i] * candidates[j] - first) / resolution))
             line = min(max(line, 0), len(values) - 1)
-            if values[line] > 0.0 and not masked[line]:  # over a floor of nothing it is cut
+            if values[line] > 0.0 and not masked[line]:
+                # Cut where the floor is next to nothing.
                 sums[j] += min(log(values[line] / floor[line]), 40.0) if floor[line] > 0.0 else 40.0
     return np.argmax(sums)
 

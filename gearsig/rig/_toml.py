@@ -215,7 +215,8 @@ def from_table(kind: type, table: Any, where: str, **ready: Any) -> Any:
     hints = type_hints_of(kind)
     values = {}
     for key, value in table.items():
-        known_name(key, known, f"there is no key {key!r}", where=where, remedy=_elsewhere(key))
+        if key not in known:
+            known_name(key, known, f"there is no key {key!r}", where=where, remedy=_elsewhere(key))
         values[key] = _typed(value, hints[key], f"{where}: {key}")
     missing = [
         n for n, f in known.items() if f.default is MISSING and f.default_factory is MISSING and n not in values | ready

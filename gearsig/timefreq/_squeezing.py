@@ -80,10 +80,18 @@ def check_ssqueezepy_bytes(n_bytes: int) -> None:
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
+def _momentary_frequency(w, dw, smallest):  # type: ignore[no-untyped-def]
+    """ω̂ = Im(w'/w); not a number where |w|² <= `smallest`."""
+    a, b = w.real, w.imag
+    power = a * a + b * b
+    return (dw.imag * a - dw.real * b) / power if power > smallest else np.nan
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def squeeze(W, dW, weights, smallest, borders, lookup, T, first):  # type: ignore[no-untyped-def]
     """T[l, first + t] += weights[j] W[j, t], l being the line whose borders hold the momentary frequency.
 
-    ω̂ = Im(W' / W), in the unit of `borders` (n_lines + 1, increasing). `lookup` gives the line at the left end of each
+    That is in the unit of `borders` (n_lines + 1, increasing). `lookup` gives the line at the left end of each
     of its equal cells between the outermost borders. Coefficients with |W|² <= `smallest` have no frequency.
     """
     n_lines = T.shape[0]
@@ -91,12 +99,8 @@ def squeeze(W, dW, weights, smallest, borders, lookup, T, first):  # type: ignor
     per_cell = lookup.shape[0] / (top - bottom)
     for j in range(W.shape[0]):
         for t in range(W.shape[1]):
-            a, b = W[j, t].real, W[j, t].imag
-            power = a * a + b * b
-            if power <= smallest:
-                continue
-            omega = (dW[j, t].imag * a - dW[j, t].real * b) / power
-            if omega < bottom or omega >= top:
+            omega = _momentary_frequency(W[j, t], dW[j, t], smallest)
+            if not bottom <= omega < top:
                 continue
             line = lookup[int((omega - bottom) * per_cell)]
             while omega >= borders[line + 1]:
@@ -109,12 +113,7 @@ def gather_near(W, dW, weight, smallest, low, high, out):  # type: ignore[no-unt
     """out[t] += weight · W[j, t] wherever low[t] <= ω̂ <= high[t]."""
     for j in range(W.shape[0]):
         for t in range(W.shape[1]):
-            a, b = W[j, t].real, W[j, t].imag
-            power = a * a + b * b
-            if power <= smallest:
-                continue
-            omega = (dW[j, t].imag * a - dW[j, t].real * b) / power
-            if low[t] <= omega <= high[t]:
+            if low[t] <= _momentary_frequency(W[j, t], dW[j, t], smallest) <= high[t]:
                 out[t] += weight * W[j, t]
 
 
