@@ -434,7 +434,7 @@ def summary(request: BifurcationRequest, values: Values) -> dict[str, Any]:
     }
     if {"up", "down"} <= drawn.keys():
         up, down = drawn["up"], drawn["down"]
-        result["coexisting_at"] = phase.values_apart(up, down).tolist()
+        result["coexisting_at"] = phase.coexistence_values(up, down).tolist()
         result["coexisting_ranges"] = [asdict(apart) for apart in phase.coexistence_ranges(up, down)]
         result["coexisting_step"] = phase.step_of(up, down)
         result["coexisting_note"] = BOUNDED

@@ -116,7 +116,7 @@ def test_simulators_use_only_rig_recording_and_the_protocol_of_the_gap_diagnosis
         "gearsig.formatting",
     )
     drive = {"DriveFacts", "DriveSimulator", "DriveTwin"}
-    protocol = {"Added", "GapEffect", "GapSimulator", "OperatingCondition", "Twin"} | drive
+    protocol = {"AddedEffect", "GapEffect", "GapSimulator", "OperatingCondition", "Twin"} | drive
     allowed = ("gearsig.rig", "gearsig.recording", *basic, *(f"gearsig.gap.{name}" for name in protocol))
 
     def wrong(name: str, modules: set[str]) -> set[str]:

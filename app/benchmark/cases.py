@@ -12,7 +12,7 @@ import numpy as np
 from app.benchmark.diagnosers import SHARES
 from gearsig.checks import count, one_of, within
 from gearsig.errors import RefusalError
-from gearsig.gap import Added, OperatingCondition
+from gearsig.gap import AddedEffect, OperatingCondition
 from gearsig.recording import Recording
 from sims.blind import (
     CATALOGUE,
@@ -222,12 +222,12 @@ def _difference(now: Recording, before: Recording) -> dict[str, float]:
 
 def _features(recording: Recording) -> dict[str, float]:
     """Return the features by name; none where the recording cannot be reduced."""
-    from gearsig.gap import once, reduce_recording
+    from gearsig.gap import feature_values, reduce_recording
 
     if recording.rig is None:
         return {}
     try:
-        names, values = once(reduce_recording(recording, recording.rig))
+        names, values = feature_values(reduce_recording(recording, recording.rig))
     except RefusalError:
         return {}
     return dict(zip(names, values.tolist(), strict=True))
@@ -252,7 +252,7 @@ def record_same(plan: Plan, planned: PlannedCase, case: BlindCase) -> tuple[Case
     added = [_added(twin, fault.name, planned.level, rng) for fault in case.faults]
     seed = int(rng.integers(1, 2**31))
 
-    def run(condition: RunCondition, faults: list[Added], noise: int) -> Recording:
+    def run(condition: RunCondition, faults: list[AddedEffect], noise: int) -> Recording:
         recording = twin.run(
             OperatingCondition(condition.true_rpm, condition.true_nm),
             faults,
@@ -273,12 +273,12 @@ def record_same(plan: Plan, planned: PlannedCase, case: BlindCase) -> tuple[Case
     return made, _labels(case, planned, added, made)
 
 
-def _added(twin: PairTwin, name: str, level: float, rng: np.random.Generator) -> Added:
+def _added(twin: PairTwin, name: str, level: float, rng: np.random.Generator) -> AddedEffect:
     drawn = sorted((twin.draw(name, rng) for _ in range(N_DRAWS)), key=lambda candidate: candidate.severity)
     return drawn[min(int(level * N_DRAWS), N_DRAWS - 1)]
 
 
-def _place(added: Added, case: BlindCase) -> dict[str, Any]:
+def _place(added: AddedEffect, case: BlindCase) -> dict[str, Any]:
     """Return where the effect sits, in the words of the blind rig's labels."""
     place: dict[str, Any] = {}
     for name in ("gear", "shaft"):
@@ -294,8 +294,8 @@ def _place(added: Added, case: BlindCase) -> dict[str, Any]:
     return place
 
 
-def _labels(case: BlindCase, planned: PlannedCase, added: list[Added], made: CaseRecordings) -> dict[str, Any]:
-    def of_effect(setting: Added, place: Mapping[str, Any]) -> dict[str, Any]:
+def _labels(case: BlindCase, planned: PlannedCase, added: list[AddedEffect], made: CaseRecordings) -> dict[str, Any]:
+    def of_effect(setting: AddedEffect, place: Mapping[str, Any]) -> dict[str, Any]:
         known = effect(setting.name)
         return {
             "name": setting.name,

@@ -17,13 +17,13 @@ from gearsig.gap import (
     NONE,
     SIDES,
     UNKNOWN,
-    Added,
+    AddedEffect,
     GapCause,
     GapOutcome,
     GapReport,
     Interval,
     ReducedRecording,
-    once,
+    feature_values,
     reduce_recording,
     rule_strengths,
     textbook_rules,
@@ -194,7 +194,7 @@ def _cause(name: str, probability: float, options: Mapping[str, str]) -> GapCaus
         known.title,
         known.severity.unit,
         probability,
-        fitted=Added(name, known.severity.typical, options),
+        fitted=AddedEffect(name, known.severity.typical, options),
         is_nuisance=known.group == NUISANCE_GROUP,
     )
 
@@ -336,8 +336,10 @@ def diagnose_rules(case: VisibleCase) -> GapReport:
 def _deviations(case: VisibleCase) -> Iterator[dict[str, float]]:
     """Yield, for each condition, how far every feature of the table is from usual, in spreads."""
     for i, recording in enumerate(case.reduced):
-        values = dict(zip(*once(recording), strict=True))
-        before = dict(zip(*once(case.reduced_references[i]), strict=True)) if case.reduced_references else None
+        values = dict(zip(*feature_values(recording), strict=True))
+        before = (
+            dict(zip(*feature_values(case.reduced_references[i]), strict=True)) if case.reduced_references else None
+        )
         deviations = dict.fromkeys(values, 0.0)  # what is usual is known of the table's features alone
         for name, (usual, spread, change) in USUAL.items():
             for side in SIDES:

@@ -145,7 +145,7 @@ def strength(truth: Truth, floors: Floors) -> float:
     known = [name for name in floor.names if all(name in change for change in truth.fault_changes)]
     floors_of_known = floor.of(known)
     sizes = [
-        soft_size(known, np.array([change[name] for name in known]) / floors_of_known) / floor.whole_of(known)
+        soft_size(known, np.array([change[name] for name in known]) / floors_of_known) / floor.floor_size(known)
         for change in truth.fault_changes
         if change
     ]

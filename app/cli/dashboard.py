@@ -24,7 +24,7 @@ OPTIONS = (
     "browser.gatherUsageStats=false",
     "client.toolbarMode=minimal",
     "client.showErrorLinks=false",
-    "runner.postScriptGC=false",  # the pages ask for it themselves, when nobody waits: see `work.tidy_later`
+    "runner.postScriptGC=false",  # the pages ask for it themselves, when nobody waits: see `work.collect_garbage_later`
 )
 """Flags win over what the user's environment says in variables; files are not read, see `_read_no_configuration`."""
 

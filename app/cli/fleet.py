@@ -19,7 +19,7 @@ from app.cli.console import EXIT_INPUT_ERROR, EXIT_SOME_FAILED, progress_bar, st
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from gearsig.fleet import AddResult, Fleet, OperatingTrend, Origin, PassedOver
+    from gearsig.fleet import AddResult, ExcludedFile, Fleet, OperatingTrend, Origin
     from gearsig.processes import Cluster
 
 fleet_app = typer.Typer(
@@ -88,22 +88,22 @@ def add(
 
     Example: gearsig fleet add recordings --pattern '{machine}/{point}_{date:%Y%m%d}.csv'
     """
-    from gearsig.fleet import PassedOver, open_fleet, origins, passed_over_text
+    from gearsig.fleet import ExcludedFile, excluded_text, open_fleet, origins
 
     opened = options.open_rig(rig)
-    passed_over = list[PassedOver]()
+    excluded = list[ExcludedFile]()
     stated: dict[str, Any] = {"machine": machine, "point": point, "date": date, "rig": opened, "speed_rpm": speed_rpm}
-    listed = origins(places, pattern=pattern, **stated, on_passed_over=passed_over.append)
+    listed = origins(places, pattern=pattern, **stated, on_excluded=excluded.append)
     if dry_run and json:
         answer = {
             "recordings": [_origin_json(origin) for origin in listed],
-            "passed_over": _passed_over_json(passed_over),
+            "excluded": _excluded_json(excluded),
         }
         _print_json(answer)
     else:
         _show_origins(listed, len(listed) if dry_run else N_SHOWN, err=not dry_run)
-    if passed_over:
-        _say(passed_over_text(passed_over))
+    if excluded:
+        _say(excluded_text(excluded))
     if dry_run:
         return
     fleet = open_fleet(store, create=True, on_message=_say)
@@ -132,7 +132,7 @@ def add(
             )
         except KeyboardInterrupt:
             raise stopped(f"{n_done} results are in {store}") from None
-        _show_added(replace(result, passed_over=tuple(passed_over)), store, workers, json=json)
+        _show_added(replace(result, excluded=tuple(excluded)), store, workers, json=json)
     if result.failures:
         raise typer.Exit(EXIT_INPUT_ERROR if len(result.failures) == len(listed) else EXIT_SOME_FAILED)
 
@@ -427,7 +427,7 @@ def _origin_json(origin: Origin) -> dict[str, Any]:
     return {name: str(value) if name in ("path", "date") else value for name, value in vars(origin).items()}
 
 
-def _passed_over_json(files: Sequence[PassedOver]) -> list[dict[str, str]]:
+def _excluded_json(files: Sequence[ExcludedFile]) -> list[dict[str, str]]:
     return [{"file": str(file.path), "reason": file.reason} for file in files]
 
 
@@ -442,7 +442,7 @@ def _show_added(result: AddResult, store: Path, workers: Cluster | None, *, json
             "known": result.n_known,
             "taken_by_others": result.n_elsewhere,
             "failures": failures,
-            "passed_over": _passed_over_json(result.passed_over),
+            "excluded": _excluded_json(result.excluded),
             "ran": ran,
         }
         _print_json(summary)

@@ -216,7 +216,9 @@ def identify(
 def with_fitted(rig: Rig, identification: Identification) -> Rig:
     """Return the rig with the fitted values in its contact, as far as they could be identified."""
     assert rig.contact is not None  # noqa: S101  motion could not have been measured without it
-    values = {p.name: max(p.value, 0.0) for p in identification.parameters if p.is_told and p.name in FITTED_NAMES}
+    values = {
+        p.name: max(p.value, 0.0) for p in identification.parameters if p.is_determined and p.name in FITTED_NAMES
+    }
     return replace(
         rig,
         contact=replace(rig.contact, **values),  # type: ignore[arg-type]  # all of them are numbers

@@ -634,5 +634,5 @@ def analysed(file: ChosenFile, chosen: Chosen) -> Analysis | None:
         show_error(error)
         speaks_of_form = in_page_words(str(error)) != str(error)
         if machine_text(file) or chosen.request.pulses is not None or speaks_of_form:
-            show_machine(file, is_told=True)
+            show_machine(file, is_reported=True)
         return None

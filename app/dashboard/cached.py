@@ -157,7 +157,7 @@ def read_and_analyze(request: AnalysisRequest, content: Content, reference: Cont
         REFERENCE_OPTIONS,
         LongAnalysis,
         analyze_file,
-        read_usual_part,
+        read_typical_part,
         rig_and_rate_of_reference,
     )
 
@@ -171,7 +171,7 @@ def read_and_analyze(request: AnalysisRequest, content: Content, reference: Cont
                 path, rig, rate_hz, request.reference_rate_hz, is_same_machine=True
             )
             # pulse times belong to the other recording
-            read = read_usual_part(path, its_rig, sampling_rate_hz=its_rate_hz, speed=_constant(request.speed_rpm))
+            read = read_typical_part(path, its_rig, sampling_rate_hz=its_rate_hz, speed=_constant(request.speed_rpm))
             then = _named(read, request.reference_name)
     with _as_file(content, request.name) as path:
         result = analyze_file(

@@ -38,7 +38,7 @@ from gearsig.comparison import (
     Comparison,
     compare,
     for_simulation,
-    missing_words,
+    missing_line_text,
 )
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import axis_label, unit_text
@@ -51,10 +51,10 @@ from gearsig.report import (
     channel_rows,
     comparison_page,
     comparison_to_json,
-    doubt_text,
     mesh_cursors,
     orders_csv,
     shown_orders,
+    tooth_warning_text,
 )
 from gearsig.rig import Rig
 from sims.cracked import CrackedPair
@@ -394,7 +394,7 @@ def _show_angle(comparison: Comparison, channel: ChannelComparison) -> None:
             zoomed_range(key, whole),
             "simulated − recorded",
         )
-        st.caption(f"Tooth by tooth, at the middle of each.{doubt_text(comparison, shaft.shaft)}")
+        st.caption(f"Tooth by tooth, at the middle of each.{tooth_warning_text(comparison, shaft.shaft)}")
 
 
 def _show_bands(comparison: Comparison, channel: ChannelComparison) -> None:
@@ -433,7 +433,9 @@ def _show_lines(comparison: Comparison, channel: ChannelComparison) -> None:
             "line": [line.label for line in shown],
             "difference (dB)": [line.level.difference_db for line in shown],
             "± (dB)": [2 * line.level.repeatability_db for line in shown],
-            "note": [missing_words(line) or ("" if line.level.is_beyond else "within the scatter") for line in shown],
+            "note": [
+                missing_line_text(line) or ("" if line.level.is_beyond else "within the scatter") for line in shown
+            ],
             "recorded (dB)": [line.level.recorded_db for line in shown],
             "simulated (dB)": [line.level.simulated_db for line in shown],
             "order": [line.order for line in shown],

@@ -43,6 +43,6 @@ for name, (title, icon) in PAGES.items():
     mark, is_first = f":material/{icon}:", name == "start"
     pages[name] = st.Page(partial(show, name), title=title, icon=mark, url_path=name, default=is_first)
 page = st.navigation(list(pages.values()), position="top")
-work.tidy_later()
+work.collect_garbage_later()
 with address.of_page(page.url_path):
     page.run()

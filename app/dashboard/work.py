@@ -124,15 +124,15 @@ def let_user_act() -> None:
     st.session_state.get(_CANCELLED)
 
 
-TIDY_AFTER_S = 3.0
+COLLECT_AFTER_S = 3.0
 _is_tidied_soon = Event()
 
 
-def tidy_later() -> None:
+def collect_garbage_later() -> None:
     """Collect garbage in a moment: Streamlit would after each run of a page, which makes the next one wait 0.1 s."""
     if not _is_tidied_soon.is_set():
         _is_tidied_soon.set()
-        _later(TIDY_AFTER_S, _tidy)
+        _later(COLLECT_AFTER_S, _tidy)
 
 
 def _tidy() -> None:
@@ -150,7 +150,7 @@ def _tidy() -> None:
 _give_back = getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None
 
 
-class Kept(Generic[P, R]):
+class CachedFunction(Generic[P, R]):
     """A function whose last answers are kept and shared between sessions; each is computed beside the page.
 
     Parameters
@@ -293,8 +293,8 @@ def _again() -> None:
 
 def kept(
     n_kept: int, words: str, *, key: Callable[..., Hashable] | None = None, grace_s: float = GRACE_S
-) -> Callable[[Callable[P, R]], Kept[P, R]]:
-    """Compute a function beside the page, with a way to cancel it, and keep its last answers; see `Kept`.
+) -> Callable[[Callable[P, R]], CachedFunction[P, R]]:
+    """Compute a function beside the page, with a way to cancel it, and keep its last answers; see `CachedFunction`.
 
     Examples
     --------
@@ -303,8 +303,8 @@ def kept(
     (True, True, False, 8)
     """
 
-    def decorate(function: Callable[P, R]) -> Kept[P, R]:
-        made: Kept[P, R] = Kept(function, n_kept, words, key or _in_words, grace_s)
+    def decorate(function: Callable[P, R]) -> CachedFunction[P, R]:
+        made: CachedFunction[P, R] = CachedFunction(function, n_kept, words, key or _in_words, grace_s)
         update_wrapper(made, function)
         return made
 

@@ -11,23 +11,23 @@ from gearsig.angle._resample import (
     times_of_revolutions,
 )
 from gearsig.angle._source import constant_speed_angle, find_shaft_angle, tachometer_edges
-from gearsig.angle._tachless import CombElsewhere, comb_elsewhere, estimate_shaft_angle, refine_by_phase
+from gearsig.angle._tachless import OffsetComb, estimate_shaft_angle, find_offset_comb, refine_by_phase
 from gearsig.angle._types import AngleSignal, ShaftAngle, check_shaft_angle
 
 __all__ = [
     "REACH",
     "AngleSignal",
-    "CombElsewhere",
+    "OffsetComb",
     "ShaftAngle",
     "check_shaft_angle",
     "clock_tick",
-    "comb_elsewhere",
     "constant_speed_angle",
     "count_pulses",
     "delay_table",
     "doubling_filter",
     "encoder_angle",
     "estimate_shaft_angle",
+    "find_offset_comb",
     "find_pulse_edges",
     "find_shaft_angle",
     "interpolate",

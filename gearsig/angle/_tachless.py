@@ -457,7 +457,7 @@ def _better(
 
 
 @dataclass(frozen=True)
-class CombElsewhere:
+class OffsetComb:
     """A comb of mesh lines that lies beside the place where speed and teeth put it.
 
     Parameters
@@ -476,7 +476,7 @@ FARTHEST_COMB = 12.5
 """Factor on the stated speed up to which the comb is sought: sampling rates are mistaken by 10, and by 2.56."""
 
 
-def comb_elsewhere(recording: Recording, rig: Rig, stated_speed_rpm: float) -> CombElsewhere | None:
+def find_offset_comb(recording: Recording, rig: Rig, stated_speed_rpm: float) -> OffsetComb | None:
     """Return at which multiple of a stated speed the comb of the gears does lie, if anywhere else.
 
     For "sampling rate, speed and teeth disagree": a factor of 2, or of two common sampling rates, names the culprit.
@@ -495,7 +495,7 @@ def comb_elsewhere(recording: Recording, rig: Rig, stated_speed_rpm: float) -> C
     if abs(factor - 1.0) < 0.002:
         return None
     mesh = search.comb.meshes[0]
-    return CombElsewhere(
+    return OffsetComb(
         factor,
         f"Mesh lines with sidebands lie at {mesh * candidate.decision.speed:.5g} Hz and its multiples, "
         f"{factor:.4g} times where speed and teeth put them ({candidate.decision.evidence()}): "
@@ -545,7 +545,7 @@ def _refusal(search: SpeedSearch, best: SpeedCandidate | None, rig: Rig, *, expl
         reason += f" ({best.decision.evidence()}; quality {best.decision.quality:.2f}, needed {MIN_QUALITY})"
     middle = 30.0 * (search.low + search.high)
     if explained and search.high / search.low < 4.0:
-        elsewhere = comb_elsewhere(search.recording, rig, middle)
+        elsewhere = find_offset_comb(search.recording, rig, middle)
         if elsewhere is not None:
             reason += ". " + elsewhere.text
     return RefusalError(

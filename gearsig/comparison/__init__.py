@@ -21,7 +21,7 @@ from gearsig.comparison._types import (
     LevelPair,
     LineLevel,
     RecordFacts,
-    Repeated,
+    RepeatableValue,
     ShaftComparison,
     power_levels,
 )
@@ -31,7 +31,7 @@ from gearsig.comparison._verdict import (
     differing_lines,
     differing_tooth,
     mesh_lines,
-    missing_words,
+    missing_line_text,
 )
 
 __all__ = [
@@ -48,7 +48,7 @@ __all__ = [
     "LevelPair",
     "LineLevel",
     "RecordFacts",
-    "Repeated",
+    "RepeatableValue",
     "ShaftComparison",
     "band_powers",
     "compare",
@@ -57,7 +57,7 @@ __all__ = [
     "for_simulation",
     "frac",
     "mesh_lines",
-    "missing_words",
+    "missing_line_text",
     "order_band_limits",
     "power_levels",
     "third_octave_limits",

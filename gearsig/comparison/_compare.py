@@ -42,7 +42,7 @@ from gearsig.comparison._types import (
     Comparison,
     Locked,
     RecordFacts,
-    Repeated,
+    RepeatableValue,
     ShaftComparison,
     power_levels,
 )
@@ -300,7 +300,7 @@ def _average(lines: HalvedLines, i: int, n_angles: int, shaft: str, channel: str
     )
 
 
-def _coherent_share(shared: _Shared, side: int, i: int, totals: FloatArray) -> Repeated:
+def _coherent_share(shared: _Shared, side: int, i: int, totals: FloatArray) -> RepeatableValue:
     """Return the share of energy that both halves have in common, line by line: Σ Re(a b*) over the mean square.
 
     The noise of one half has nothing to do with that of the other, and adds nothing. An order of several shafts
@@ -317,6 +317,6 @@ def _coherent_share(shared: _Shared, side: int, i: int, totals: FloatArray) -> R
         powers += [np.sum(np.real(a * np.conj(b))), np.sum(np.abs(a) ** 2), np.sum(np.abs(b) ** 2)]
     mean = float(totals.mean())
     if mean <= 0:
-        return Repeated(0.0, 0.0)
+        return RepeatableValue(0.0, 0.0)
     shares = np.clip(powers[1:] / np.maximum(totals, 1e-300), 0.0, 1.0)
-    return Repeated(float(np.clip(powers[0] / mean, 0.0, 1.0)), float(abs(shares[0] - shares[1])) / 2.0)
+    return RepeatableValue(float(np.clip(powers[0] / mean, 0.0, 1.0)), float(abs(shares[0] - shares[1])) / 2.0)

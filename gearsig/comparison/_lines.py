@@ -19,7 +19,7 @@ from gearsig.comparison._types import (
     LevelPair,
     LineKind,
     LineLevel,
-    Repeated,
+    RepeatableValue,
     amplitude_error_db,
     decibel,
     power_levels,
@@ -200,7 +200,9 @@ def correlation(x: ComplexArray, y: ComplexArray) -> float:
     return float(np.vdot(y, x).real) / size if size > 0 else 0.0
 
 
-def repeated(figure: Figure, simulated: HalvedLines, recorded: HalvedLines, channel: int, part: slice) -> Repeated:
+def repeated(
+    figure: Figure, simulated: HalvedLines, recorded: HalvedLines, channel: int, part: slice
+) -> RepeatableValue:
     """Return a figure of one channel's lines, with its scatter when either record is halved.
 
     Half of f(x₁, y) - f(x₂, y) and half of f(x, y₁) - f(x, y₂), added as squares.
@@ -208,7 +210,7 @@ def repeated(figure: Figure, simulated: HalvedLines, recorded: HalvedLines, chan
     x, y = simulated.whole[channel, part], recorded.whole[channel, part]
     by_simulation = figure(simulated.first[channel, part], y) - figure(simulated.second[channel, part], y)
     by_recording = figure(x, recorded.first[channel, part]) - figure(x, recorded.second[channel, part])
-    return Repeated(figure(x, y), float(np.hypot(by_simulation, by_recording)) / 2.0)
+    return RepeatableValue(figure(x, y), float(np.hypot(by_simulation, by_recording)) / 2.0)
 
 
 def agreement(simulated: HalvedLines, recorded: HalvedLines, channel: int, part: slice) -> Agreement:

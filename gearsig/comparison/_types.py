@@ -23,7 +23,7 @@ AlignmentMethod = Literal["marks", "correlation"]
 
 
 @dataclass(frozen=True)
-class Repeated:
+class RepeatableValue:
     """A figure, and how well it repeats.
 
     Parameters
@@ -103,17 +103,17 @@ class Agreement:
 
     Parameters
     ----------
-    complex_frac : Repeated
+    complex_frac : RepeatableValue
         FRAC of the aligned complex lines, 0 to 1.
-    magnitude_frac : Repeated
+    magnitude_frac : RepeatableValue
         FRAC of their magnitudes; spectra that have nothing to do with each other still reach about 0.6.
     complex_by_chance : float
         Mean of the complex FRAC over all alignments: what one line that outweighs all others gives for nothing.
     n_lines : int
     """
 
-    complex_frac: Repeated
-    magnitude_frac: Repeated
+    complex_frac: RepeatableValue
+    magnitude_frac: RepeatableValue
     complex_by_chance: float
     n_lines: int
 
@@ -191,7 +191,7 @@ class ShaftComparison:
         Of the gear that `tooth_levels` count; the first one's, where there are several.
     simulated, recorded : SynchronousAverage
         At the same angles, both up to the same order, without their mean.
-    correlation : Repeated
+    correlation : RepeatableValue
         Of the two, -1 to 1.
     simulated_reliability, recorded_reliability : float
         How well each average repeats itself: 1 is exactly, 0 is noise. Their geometric mean is the highest correlation
@@ -206,7 +206,7 @@ class ShaftComparison:
     n_teeth: int | None
     simulated: SynchronousAverage
     recorded: SynchronousAverage
-    correlation: Repeated
+    correlation: RepeatableValue
     simulated_reliability: float
     recorded_reliability: float
     agreement: Agreement
@@ -222,8 +222,8 @@ class ShaftComparison:
 class Locked:
     """Share of a record's energy that repeats with a shaft's turns, 0 to 1."""
 
-    simulated: Repeated
-    recorded: Repeated
+    simulated: RepeatableValue
+    recorded: RepeatableValue
 
 
 @dataclass(frozen=True)

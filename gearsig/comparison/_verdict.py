@@ -189,7 +189,7 @@ def differing_average(channel: ChannelComparison) -> ShaftComparison | None:
 _WHERE = {"mesh": "mesh harmonics", "shaft": "shaft orders"}
 
 
-def missing_words(line: LineLevel) -> str:
+def missing_line_text(line: LineLevel) -> str:
     """Say which record lacks a line, or would hide it in its own scatter; empty where both show it.
 
     The level of a line that is not seen is that of the noise: where that is no lower, the line may well be there.
@@ -272,7 +272,7 @@ def _most_text(channel: ChannelComparison, line: LineLevel, gain_db: float) -> s
     beside = next((f"Beside the {_WHERE[main.kind]}, " for main in mesh_lines(channel) if main.kind != line.kind), "")
     off_db, scatter = line.level.difference_db - gain_db, BEYOND * line.level.repeatability_db
     after = f" after a common gain of {signed(-gain_db)} dB" if gain_db else ""
-    if words := missing_words(line):
+    if words := missing_line_text(line):
         text = f"{line.label} differs most{after}: it is {words}, by {abs(off_db):.1f} dB or more"
     else:
         by = plus_minus(abs(off_db), scatter)

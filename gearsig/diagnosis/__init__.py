@@ -1,6 +1,6 @@
 """From signals and indicators to findings in words and numbers."""
 
-from gearsig.diagnosis._analyze import analyze, named_alike, only_channel_taken, with_known_angle
+from gearsig.diagnosis._analyze import analyze, only_channel_assumed, with_known_angle, with_matching_channel_names
 from gearsig.diagnosis._bearing import smallest_depth
 from gearsig.diagnosis._bearing_families import (
     BEARING_PARTS,
@@ -18,14 +18,14 @@ from gearsig.diagnosis._long import (
     analyze_file,
     long_overview,
     read_reference,
-    read_usual_part,
+    read_typical_part,
     read_whole,
 )
 from gearsig.diagnosis._modulation import Modulation, modulation_of
 from gearsig.diagnosis._reference import (
     REFERENCE_OPTIONS,
-    Earlier,
     IndicatorChange,
+    ReferenceFinding,
     beside_reference,
     changes,
     in_reference,
@@ -68,7 +68,6 @@ __all__ = [
     "BandEnvelope",
     "CannotTell",
     "ChannelAnalysis",
-    "Earlier",
     "Finding",
     "IndicatorChange",
     "Kind",
@@ -79,6 +78,7 @@ __all__ = [
     "OrderLevel",
     "Outcome",
     "RecordBlocks",
+    "ReferenceFinding",
     "Strength",
     "Where",
     "analyze",
@@ -92,12 +92,11 @@ __all__ = [
     "localise",
     "long_overview",
     "modulation_of",
-    "named_alike",
-    "only_channel_taken",
+    "only_channel_assumed",
     "outcome_of",
     "ranked",
     "read_reference",
-    "read_usual_part",
+    "read_typical_part",
     "read_whole",
     "record_blocks",
     "rig_and_rate_of_reference",
@@ -107,4 +106,5 @@ __all__ = [
     "verdict_of",
     "with_crack",
     "with_known_angle",
+    "with_matching_channel_names",
 ]

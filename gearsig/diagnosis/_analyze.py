@@ -49,7 +49,7 @@ from gearsig.diagnosis._verdict import (
     detect_data_problems,
     lowered,
     ranked,
-    speed_doubts,
+    speed_warnings,
     spoiled,
     verdict_of,
     withheld_crack,
@@ -116,8 +116,8 @@ def analyze(
     healthy = None if reference is None else prepare(reference, prepared.recording.rig, name="reference")
     renamed: list[Finding] = []
     if healthy is not None:
-        given, healthy = healthy.recording, named_alike(prepared.recording, healthy)
-        renamed = only_channel_taken(given, healthy.recording)
+        given, healthy = healthy.recording, with_matching_channel_names(prepared.recording, healthy)
+        renamed = only_channel_assumed(given, healthy.recording)
         _check_reference(prepared.recording, healthy.recording)
     analysis, _ = _examined(prepared, settings or AnalysisSettings(), healthy, torque_nm, on_stage or (lambda _: None))
     return replace(analysis, findings=(*analysis.findings, *renamed)) if renamed else analysis
@@ -147,7 +147,7 @@ def _examined(
     _check_vibration(recording)
     angle = _angle_of(prepared)
     findings = without_synchronous_hum(findings, angle, known)
-    findings += [speed_finding(angle), *speed_doubts(angle, known)]
+    findings += [speed_finding(angle), *speed_warnings(angle, known)]
 
     def ended(findings: Sequence[Finding]) -> tuple[Analysis, None]:
         order = ranked(findings)
@@ -429,7 +429,7 @@ def _check_vibration(recording: Recording) -> None:
         )
 
 
-def named_alike(recording: Recording, healthy: PreparedRecording) -> PreparedRecording:
+def with_matching_channel_names(recording: Recording, healthy: PreparedRecording) -> PreparedRecording:
     """Return the reference with the recording's names of channels that differ by a record's number only.
 
     Where both have only one vibration channel, it is taken for the same one under any other name. The renamed one is
@@ -455,7 +455,7 @@ def _renamed(prepared: PreparedRecording, names: Mapping[str, str]) -> PreparedR
     return prepared.keep(("diagnosis", "renamed", channels), lambda: prepare(replace(recording, channels=channels)))
 
 
-def only_channel_taken(reference: Recording, renamed: Recording) -> list[Finding]:
+def only_channel_assumed(reference: Recording, renamed: Recording) -> list[Finding]:
     """Say that a reference's only vibration channel was taken for the recording's, where their names differ."""
     before, after = reference.vibration_names(), renamed.vibration_names()
     if before == after or len(before) != 1:

@@ -33,8 +33,8 @@ from gearsig.diagnosis._bearing_families import (
     speed_is_only_stated,
     underlying_impulse_train,
 )
-from gearsig.diagnosis._lines import N_COUNTED, factor_left_open, hunting_multiple, speed_is_confirmed
-from gearsig.diagnosis._rotor import half_speed_left_open
+from gearsig.diagnosis._lines import N_COUNTED, hunting_multiple, possible_speed_factor, speed_is_confirmed
+from gearsig.diagnosis._rotor import possible_half_speed_text
 from gearsig.diagnosis._signals import AnalysisSignals, BandEnvelope, KurtogramBand, without_shafts, witness_text
 from gearsig.diagnosis._types import (
     WITH_ASSUMED_DATA,
@@ -53,7 +53,7 @@ from gearsig.rig import Rig
 CLEAR_MODULATION, USUAL_MODULATION, USUAL_OF_RACES = 0.05, 0.1, 0.2
 """Depth of the strongest line of the envelope from which a part is called damaged, not only worth watching: beside a
 reference, which shows what the bearing's waviness and play do; and alone, of elements and cages, and of races. Of
-measured bearings, sound ones have lines of 3 to 20 % at the orders of races, damaged races of 58 to 80 %, a damaged
+measured bearings, healthy ones have lines of 3 to 20 % at the orders of races, damaged races of 58 to 80 %, a damaged
 ball of 12 %."""
 
 MAX_PARTS = 2
@@ -71,20 +71,20 @@ whole multiple of it as well, and it is the part's only if the stated speed is r
 WORTH_A_SUSPICION = 0.3
 """Below this confidence a family at a part's order is worth a notice: other causes are more likely together."""
 
-KNOCK, LATER_LINES = 0.15, 0.06
-"""Third moment of a race's course (`course_of_knocks`), and power of its third to sixth line against the first two,
-below which no knocks make it. Exponentials, however slowly they ring, have 0.5 to 0.9 and, with intervals that scatter
-by 3 %, 0.13 to 0.9; damaged races of recordings and simulators 0.21 to 1.1 and 0.11 to 1.4, sound ones that play,
-waviness and passing elements modulate −0.4 to 0.16, or 0 to 0.04."""
+IMPULSIVE_MOMENT, LATER_LINES = 0.15, 0.06
+"""Third moment of a race's profile (`impact_profile_measures`), and power of its third to sixth line against the first
+two, below which no impacts make it. Exponentials, however slowly they ring, have 0.5 to 0.9 and, with intervals that
+scatter by 3 %, 0.13 to 0.9; damaged races of recordings and simulators 0.21 to 1.1 and 0.11 to 1.4, healthy ones that
+play, waviness and passing elements modulate −0.4 to 0.16, or 0 to 0.04."""
 
 ONE_TO_THREE = np.arange(1.0, 4.0)
-"""Multiples of a race's order that must not be a shaft's for its course to be known."""
+"""Multiples of a race's order that must not be a shaft's for its profile to be known."""
 
 BLOCK_INTERVALS = 8
-"""From knock to knock, over which slip hardly parts the first six multiples."""
+"""From impact to impact, over which slip hardly parts the first six multiples."""
 
 IF_SMOOTH, IF_SMOOTH_BESIDE = 0.25, 0.5
-"""Factors where no knocks make a family: alone, where of 22 such one race was damaged; and beside a reference, which
+"""Factors where no impacts make a family: alone, where of 22 such one race was damaged; and beside a reference, which
 shows what play and waviness make."""
 
 OTHER_MAKE = 0.04
@@ -122,7 +122,9 @@ def detect_bearings(
         return [short] if signals.rig.bearings else []
     families = find_families(signals, cleaned)
     families = replace(
-        families, named=tuple(map(_with_course, families.named)), trains=tuple(map(_with_course, families.trains))
+        families,
+        named=tuple(map(_with_impact_profile, families.named)),
+        trains=tuple(map(_with_impact_profile, families.trains)),
     )
     findings = []
     for candidate in families.named:
@@ -151,7 +153,7 @@ def _named_finding(signals: AnalysisSignals, candidate: Candidate, n_parts: int)
     part = BEARING_PARTS[candidate.name][0]
     slip, only_stated = candidate.comb.fundamental / candidate.expected - 1, speed_is_only_stated(signals)
     is_beyond_slip = only_stated and abs(slip) > signals.settings.bearing_slip
-    times = factor_left_open(signals)
+    times = possible_speed_factor(signals)
     is_shared = candidate.name == "FTF" or candidate.in_train or n_parts > MAX_PARTS
     width = 2.0 * candidate.envelope.excess.spectrum.resolution
     is_hunting = candidate.name == "FTF" and hunting_multiple(signals, candidate.comb.fundamental, width) is not None
@@ -179,7 +181,7 @@ def _named_finding(signals: AnalysisSignals, candidate: Candidate, n_parts: int)
         place += ", or at its rolling elements or cage"
     title = f"{'Damage' if clear else 'Perhaps damage'} at {place}."
     if is_smooth:
-        title = f"Modulation at the order of {place}, unlike knocks."
+        title = f"Modulation at the order of {place}, unlike impacts."
     if is_beyond_slip:
         title = f"May be {place}: the speed is stated and not confirmed."
     if times > 1:
@@ -212,7 +214,7 @@ def _named_evidence(
     """Yield what speaks for a part, and what else would show as it does."""
     slip = signed(100 * (candidate.comb.fundamental / candidate.expected - 1), 2)
     yield f"{_family_text(candidate)}, {slip} % from the kinematic order {candidate.expected:.4f}."
-    yield _modulation_text(candidate) + (" Waviness of sound races gives as much." if is_weak else "")
+    yield _modulation_text(candidate) + (" Waviness of healthy races gives as much." if is_weak else "")
     if candidate.of_same_order:
         yield "Bearings of the same orders cannot be told apart by their envelope."
     for rival in candidate.rivals:
@@ -226,7 +228,7 @@ def _named_evidence(
     elif candidate.in_train:
         yield "The rate is that of a train of lines: another machine's or a belt's would look the same."
     if is_smooth:
-        yield "Play, waviness and elements that pass the load modulate so; knocks rise at once and ring down."
+        yield "Play, waviness and elements that pass the load modulate so; impacts rise at once and ring down."
 
 
 def _other_speed_text(times: int) -> str:
@@ -238,13 +240,13 @@ def _other_speed_text(times: int) -> str:
     )
 
 
-def _with_course(candidate: Candidate) -> Candidate:
-    """Return a family with whether what modulates at a race's order is no knocking, by three standard errors."""
+def _with_impact_profile(candidate: Candidate) -> Candidate:
+    """Return a family with whether what modulates at a race's order is not impacts, by three standard errors."""
     envelope, over_angle = candidate.envelope, candidate.envelope.over_angle
     order, excess = candidate.comb.fundamental, envelope.excess
     if candidate.name not in RACES or over_angle is None or len(excess.free_lines_at(order * ONE_TO_THREE)) < 3:
         return candidate
-    # Shafts' lines, beside the race's or stronger, would be taken for its course.
+    # Shafts' lines, beside the race's or stronger, would be taken for its profile.
     values, per_revolution = over_angle.values(envelope.channel), over_angle.samples_per_revolution
     n = prev_fast_len(len(values), real=True)
     # Nothing above what is asked for: the lines of N_MULTIPLES and half an interval beyond, and the window's foot.
@@ -252,20 +254,20 @@ def _with_course(candidate: Candidate) -> Candidate:
     lines = rfft(values[:n])[: n_kept // 2 + 1]
     numbers = excess.line_numbers(np.arange(len(lines)) * per_revolution / n)
     lines[excess.masked[np.clip(numbers, 0, len(excess.masked) - 1)]] = 0
-    course = course_of_knocks(irfft(lines, n_kept) * (n_kept / n), per_revolution * n_kept / (n * order))
-    if course is None:
+    profile = impact_profile_measures(irfft(lines, n_kept) * (n_kept / n), per_revolution * n_kept / (n * order))
+    if profile is None:
         return candidate
-    (moment, moment_error), (later, later_error) = course
-    is_smooth = moment + 3 * moment_error < KNOCK or later + 3 * later_error < LATER_LINES
+    (moment, moment_error), (later, later_error) = profile
+    is_smooth = moment + 3 * moment_error < IMPULSIVE_MOMENT or later + 3 * later_error < LATER_LINES
     return replace(candidate, is_smooth=is_smooth)
 
 
-def course_of_knocks(
+def impact_profile_measures(
     values: FloatArray, samples_per_interval: float
 ) -> tuple[tuple[float, float], tuple[float, float]] | None:
-    r"""Return two measures of whether an envelope's course over the interval of a race is that of knocks.
+    r"""Return two measures of whether an envelope's profile over the interval of a race is that of impacts.
 
-    Knocks rise at once and ring down: the bispectrum of their envelope has phases from 0 (short) to −90° (a saw tooth),
+    Impacts rise at once and ring down: the bispectrum of their envelope has phases from 0 (short) to −90° (saw tooth),
     that of dips between them 180°. With :math:`C_k` the Fourier coefficients of blocks of eight intervals, which slip
     leaves together, the third moment is
 
@@ -279,7 +281,7 @@ def course_of_knocks(
     values : ndarray, shape (n,)
         Of an envelope.
     samples_per_interval : float
-        From one knock to the next.
+        From one impact to the next.
 
     Returns
     -------
@@ -357,7 +359,7 @@ def _unnamed_finding(signals: AnalysisSignals, candidate: Candidate) -> Finding:
         if beside:
             by_density = "by their density: that is no damage there"
             causes.append(f"Multiples fall near the order of the {', '.join(beside)} {by_density}.")
-    if (times := factor_left_open(signals)) > 1:
+    if (times := possible_speed_factor(signals)) > 1:
         causes.append(sentence(_other_speed_text(times)))
     surer = "Give the bearings in the rig file: then the part is named, or they are ruled out."
     explained = _unexplained_by(signals.rig)
@@ -540,16 +542,16 @@ def _reasons_to_leave_open(
     longer = "A longer recording, or another sensor."
     if not speed_is_confirmed(signals):
         why = "no line of a mesh or shaft stands where the speed puts it, so that bearing orders may be elsewhere"
-        if (times := factor_left_open(signals)) > 1:
+        if (times := possible_speed_factor(signals)) > 1:
             why = _other_speed_text(times)
         yield why, f"A tachometer, or a sensor nearer to the {'gears' if signals.rig.pairs else 'bearings'}."
-    if why := half_speed_left_open(signals):
+    if why := possible_half_speed_text(signals):
         yield f"{why}: every part has another order then", "Check the stated speed and the sampling rate."
     named_here = new((*families.named, *(c for c in families.trains if c.bearing is not None)))
     rival = next((r for c in named_here for r in c.rivals), "")
     besides = f"{rival} would show there as well" if rival else "something else explains them as well"
     if named_here and all(c.is_smooth for c in named_here):
-        besides = "they rise and fall unlike knocks"
+        besides = "they rise and fall unlike impacts"
     for seen, but in (
         (named_here, besides),
         (new(families.unclear), "families beside it are as clear"),

@@ -29,7 +29,7 @@ SEEN_DB = 6.0
 """Height over the floor from which a line between those of a family counts as seen."""
 
 AS_STRONG_DB = 9.0
-"""Scatter of a train's lines about a smooth course: a line of two resonances' beats is weakened by so much."""
+"""Scatter of a train's lines about a smooth profile: a line of two resonances' beats is weakened by so much."""
 
 AS_STRONG_BESIDE_SHAFT_DB = 3.0
 """The same where one of a train's first six lines is a multiple of a shaft's order: sums and differences of family and
@@ -189,7 +189,7 @@ class Candidate:
     `of_same_order` are other bearings whose same part has the very same order: no envelope tells them apart. `share` is
     the part's, these included, among all that would show at that order. `loudest` is the channel with the largest line.
     `of_tones` says that it is gone with the steady tones, `of_elements` that elements which differ may be it as well,
-    `is_smooth` that no knocks make it.
+    `is_smooth` that no impacts make it.
     """
 
     comb: Comb
@@ -478,7 +478,7 @@ def clearest_family(envelopes: list[BandEnvelope], low: float, high: float) -> C
     best = min(families, key=lambda family: (max(family.p_value, 1e-9), -family.strength_db), default=None)
     if best is None:
         return None
-    # At no known order much else may knock as well, and each envelope counts as a trial.
+    # At no known order much else may make impacts as well, and each envelope counts as a trial.
     return replace(best, p_value=min(1.0, best.p_value * len(envelopes)), loudest=_loudest(envelopes, best))
 
 
@@ -580,7 +580,7 @@ def races_in_vibration(signals: AnalysisSignals, envelopes: Sequence[BandEnvelop
 
     Envelopes are searched for the first six lines of a family. A slip may take those to multiples of a slow shaft, of
     which only the further lines of the train part. Where an envelope could show it and does not, lines are smooth tones
-    of elements that pass the load, which sound bearings have too, up to high multiples.
+    of elements that pass the load, which healthy bearings have too, up to high multiples.
     """
     races = [(part_text(name, b.name), order) for b, name, order in expected_parts(signals) if name in RACES]
     multiples, slip = np.arange(1, IN_VIBRATION + 1), slip_of(signals)
@@ -741,7 +741,7 @@ def _with_rivals(signals: AnalysisSignals, candidate: Candidate) -> Candidate:
         if differ:
             rivals.append("a damaged element or cage, whose lines a cage's turn apart are there as strong,")
         elif shallow > 0.5:
-            rivals.append("elements that differ, passing the load of a sound race,")
+            rivals.append("elements that differ, passing the load of a healthy race,")
     if candidate.of_tones and _rings_in_multiples(signals, candidate):
         others += weight
         rivals.append("steady tones of that rate, without which nothing shows there,")
@@ -843,7 +843,7 @@ not what smears those."""
 def races_beside_shaft(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> dict[str, tuple[int, str]]:
     """Return inner races of which one line and its sidebands may stand: a multiple of the shaft beside it, the shaft.
 
-    Where a race rings longer than from knock to knock, there are no further multiples; slip may also take the first so
+    Where a race rings on from impact to impact, there are no further multiples; slip may also take the first so
     near to a whole number of turns that it is taken for the shaft's. It and the two sidebands then lie as far from the
     shaft's multiples, to one side: a speed that wanders spreads these to both, the more the higher. What is a multiple
     of another shaft is that one's.

@@ -113,12 +113,12 @@ def with_crack(findings: Sequence[Finding], answer: Answer | None, rig: Rig) -> 
             surer=same.surer if not answer.with_reference else crack_finding.surer,
         )
         return [merged if f is same else f for f in left]
-    # What a knocking bearing leaves in an average changes single teeth, too; so does what changes all of them.
-    knocks = any(f.kind is Kind.FAULT and f.where.bearing for f in findings)
-    if knocks or (answer.agreement is not None and answer.agreement < AGREES):
+    # What a damaged bearing's impacts leave in an average changes single teeth, too; so does what changes all of them.
+    impacts = any(f.kind is Kind.FAULT and f.where.bearing for f in findings)
+    if impacts or (answer.agreement is not None and answer.agreement < AGREES):
         confidence = 0.5 * crack_finding.confidence
         kind = Kind.SUSPICION if confidence >= 0.35 else Kind.NOTICE
-        cause = "Knocks of the damaged bearing" if knocks else "What has changed all teeth of the gear"
+        cause = "Impacts of the damaged bearing" if impacts else "What has changed all teeth of the gear"
         evidence = (*crack_finding.evidence, f"{cause} may have made the change as well.")
         crack_finding = replace(crack_finding, kind=kind, confidence=confidence, evidence=evidence)
     if not answer.with_reference and crack_finding.confidence < CLEAR:

@@ -123,10 +123,10 @@ def speed_is_confirmed(signals: AnalysisSignals) -> bool:
     """
     orders = signals.known_mesh_orders.values() or signals.known_shaft_orders.values()
     seen = signals.angle is not None and any(_is_confirmed(signals, order) for order in orders)
-    return seen and factor_left_open(signals) == 1
+    return seen and possible_speed_factor(signals) == 1
 
 
-def factor_left_open(signals: AnalysisSignals) -> int:
+def possible_speed_factor(signals: AnalysisSignals) -> int:
     r"""Return the factor of speed or sampling rate that the lines of shafts and meshes do not rule out; 1: none.
 
     With a rate m times too high, or a speed stated m times too low, the lines stand at the orders m, 2m, ... and a part
@@ -203,17 +203,17 @@ def _without_lines(signals: AnalysisSignals) -> tuple[float, float] | None:
         above = {round(order * n_turns) for order in orders if order > 0.5}
         places = sorted(place for place in above if place + beside <= n_block // 2)
         bins = np.array(places, np.int64)[:, None] + np.array([-beside, -1, 0, 1, beside])
-        courses: dict[int, list[FloatArray]] = {}
+        profiles: dict[int, list[FloatArray]] = {}
         for values in signal.samples:
             for place, levels in zip(places, _levels_over_blocks(values, n_block, bins), strict=True):
-                course = levels[:, 1:4].max(axis=1)
-                usual = float(np.percentile(course, 75))
+                profile = levels[:, 1:4].max(axis=1)
+                usual = float(np.percentile(profile, 75))
                 noise = float(np.median(levels[:, [0, 4]]))
                 if usual > noise * 10 ** (STANDING_OUT_DB / 20):
-                    courses.setdefault(place, []).append(course / usual)
-        if len(courses) < 2:
+                    profiles.setdefault(place, []).append(profile / usual)
+        if len(profiles) < 2:
             continue
-        highest = np.max([course for every in courses.values() for course in every], axis=0)
+        highest = np.max([profile for every in profiles.values() for profile in every], axis=0)
         gone = np.flatnonzero(highest < 10 ** (-GONE_DB / 20))
         if not len(gone):
             return None
@@ -287,7 +287,7 @@ def _mesh_finding(signals: AnalysisSignals, pair: GearPair) -> Finding | None:
         near += "errors smear all averages."
     # At which multiple of the stated speed the mesh lines do lie; where another pair's are at their place, nowhere.
     others = (clearest_line(signals, order) for p in signals.rig.pairs if (order := signals.rig.mesh_order(p)))
-    elsewhere = None if any(other and _is_clear(other[0]) for other in others) else signals.comb_elsewhere
+    elsewhere = None if any(other and _is_clear(other[0]) for other in others) else signals.offset_comb
     title = (
         f"No mesh line of {pair.name} where speed and teeth put it (order {mesh:.6g}, {signals.hertz_text(mesh, 6)})"
     )

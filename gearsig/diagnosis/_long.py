@@ -266,11 +266,11 @@ def _read_reference(
 ) -> PreparedRecording:
     del modified_ns  # tells the cache that the file is another one
     return prepare(
-        read_usual_part(path, rig, memory_bytes=memory_bytes, sampling_rate_hz=sampling_rate_hz, speed=speed)
+        read_typical_part(path, rig, memory_bytes=memory_bytes, sampling_rate_hz=sampling_rate_hz, speed=speed)
     )
 
 
-def read_usual_part(
+def read_typical_part(
     path: str | Path,
     rig: Rig | None = None,
     *,

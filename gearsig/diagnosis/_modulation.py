@@ -460,7 +460,7 @@ def _family(signals: AnalysisSignals, excess: LinesOverFloor, pair: GearPair, tr
         for start in (0.0, mesh, *(mesh + k * o for o in signals.known_shaft_orders.values() for k in (-2, -1, 1, 2))):
             excess = excess.without_multiples(train, start=start, skirt=TRAIN_SKIRT)
     for _, part, order in expected_parts(signals):
-        # Rolling elements under the load are stiffer or softer by turns, and so shift the gears, in sound bearings too.
+        # Rolling elements under the load are stiffer or softer by turns, and shift the gears, in healthy bearings too.
         for passing in (order, 2 * order) if part == "BPFO" else ():
             excess = _without_sidebands(excess, mesh, passing, half_width=passing * slip_of(signals))
     centres = mesh * np.arange(1, N_CARRIERS + 1)

@@ -40,7 +40,7 @@ class IndicatorChange:
 
 
 @dataclass(frozen=True)
-class Earlier:
+class ReferenceFinding:
     """A finding's counterpart in the reference.
 
     Parameters
@@ -242,16 +242,16 @@ def _beside(finding: Finding, reference: Analysis, measured: LevelChange | None)
     return replace(finding, kind=kind, title=title, evidence=(*finding.evidence, text))
 
 
-def in_reference(finding: Finding, reference: Analysis) -> Earlier | None:
+def in_reference(finding: Finding, reference: Analysis) -> ReferenceFinding | None:
     """Return what the reference shows of the same part, order or frequency; None where it shows nothing."""
     alike = [f for f in reference.findings if _is_alike(f, finding, reference.rig)]
     same = [f for f in alike if _has_same_witness(f, finding)]
     if same:
-        return Earlier(same[0], True, _change_db(same[0], finding))
-    return Earlier(alike[0], False, None) if alike else None  # levels elsewhere are of another size
+        return ReferenceFinding(same[0], True, _change_db(same[0], finding))
+    return ReferenceFinding(alike[0], False, None) if alike else None  # levels elsewhere are of another size
 
 
-def _then(finding: Finding, earlier: Earlier | None) -> str:
+def _then(finding: Finding, earlier: ReferenceFinding | None) -> str:
     if earlier is None or not (earlier.is_comparable or _is_placed(finding)):
         return "The reference does not show it."
     if not earlier.is_comparable:

@@ -86,7 +86,7 @@ def _largest_fractions(signals: AnalysisSignals) -> Iterator[tuple[str, _Between
             yield shaft, fractions
 
 
-def half_speed_left_open(signals: AnalysisSignals) -> str:
+def possible_half_speed_text(signals: AnalysisSignals) -> str:
     """Say of which shaft a line at a half of its order exceeds all its multiples, and what does it; empty if of none.
 
     Not a sentence yet.

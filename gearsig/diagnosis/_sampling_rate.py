@@ -13,7 +13,7 @@ from math import log10
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.angle import ShaftAngle, comb_elsewhere
+from gearsig.angle import ShaftAngle, find_offset_comb
 from gearsig.checks import FloatArray
 from gearsig.diagnosis._lines import SPREAD_OF_STATED, mains_lines, speed_is_confirmed
 from gearsig.diagnosis._rotor import derivatives_of_velocity
@@ -203,10 +203,10 @@ def _by_gears(signals: AnalysisSignals, angle: ShaftAngle | CannotTell) -> Findi
         if not isinstance(recording.speed_source, ConstantSpeed) or speed_is_confirmed(signals):
             return None
         stated_rpm: float | None = 60.0 * signals.frequency_per_order_hz
-        elsewhere = signals.comb_elsewhere
+        elsewhere = signals.offset_comb
     else:
         stated_rpm = rig.nominal_speed_rpm()
-        elsewhere = comb_elsewhere(recording, rig, stated_rpm) if stated_rpm else None
+        elsewhere = find_offset_comb(recording, rig, stated_rpm) if stated_rpm else None
     factor = None if elsewhere is None else _usual(1 / elsewhere.factor, STATED_SPEED_TOLERANCE)
     if stated_rpm is None or elsewhere is None or factor is None:
         return None
@@ -455,7 +455,7 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
         left = _of_the_left(strong_to(ranges[factor]), factor, races)
         if of_races > ENOUGH_OF_EACH or left <= SHARE_OF_LEFT * sums[factor]:
             return None
-    # Where no race is described, one or another part may knock: it asks for no mistake at all, and its order may be
+    # Where no race is described, one or another part may make impacts: that asks for no mistake, and its order may be
     # near a fraction of the shaft's. So may one that nobody described beside the shaft's own orders.
     if (not races or factor < 1) and has_stranger(ranges[factor], sums[factor] if races else AS_GOOD * best):
         return None
@@ -547,8 +547,8 @@ def _of_the_left(strong: StrongSpectra, factor: float, races: Sequence[tuple[flo
 def _of_a_stranger(strong: StrongSpectra, factor: float = 1.0) -> float:
     """Return lg p of shafts and one part of unknown order, that of a strong line, at a factor times the stated rate.
 
-    Its impacts are as strong all along, or modulated by the shaft. Where something strange knocks and no more, that is
-    likelier than a rate that puts it on a shaft or a race.
+    Its impacts are as strong all along, or modulated by the shaft. Where impacts are of no known order and
+    nothing else shows, that is likelier than a rate that puts it on a shaft or a race.
     """
     orders = sorted({round(float(order), 2) for x in strong.spectra for order in x.orders if order > 0.3})
     tried = [(factor * order, sideband) for order in orders for sideband in (0.0, *strong.shafts)]

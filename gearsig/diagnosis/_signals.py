@@ -10,7 +10,7 @@ from math import log10
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.angle import AngleSignal, CombElsewhere, ShaftAngle, comb_elsewhere
+from gearsig.angle import AngleSignal, OffsetComb, ShaftAngle, find_offset_comb
 from gearsig.checks import FloatArray
 from gearsig.diagnosis._types import AnalysisSettings, ChannelAnalysis, Finding, OrderLevel, Strength, Where
 from gearsig.errors import InputError, RefusalError
@@ -127,9 +127,9 @@ class AnalysisSignals:
         return self.angle.mean_speed_rpm / 60
 
     @cached_property
-    def comb_elsewhere(self) -> CombElsewhere | None:
+    def offset_comb(self) -> OffsetComb | None:
         """At which multiple of the mean speed the gears' comb lies, if anywhere else; sought once, it takes long."""
-        return comb_elsewhere(self.recording, self.rig, 60.0 * self.frequency_per_order_hz)
+        return find_offset_comb(self.recording, self.rig, 60.0 * self.frequency_per_order_hz)
 
     @property
     def speed_varies(self) -> bool:

@@ -103,7 +103,7 @@ def _check_standing(angle_rad: FloatArray, recording: Recording, rig: Rig) -> No
         path = path_of_contact(rig)
     except RefusalError:  # without geometry the rest is examined all the same
         return
-    motions.refuse_standing(angle_rad, path, rig.contact, recording.sampling_rate_hz, recording.provenance.source)
+    motions.check_driver_turns(angle_rad, path, rig.contact, recording.sampling_rate_hz, recording.provenance.source)
 
 
 def _motion_finding(segments: MotionSegments) -> Finding:

@@ -168,7 +168,7 @@ def _p_among_these(energies: FloatArray, start: int, width: int) -> float:
     """Return P(largest of the teeth's energies stands as far over the others), by how these scatter.
 
     Logarithms of energies scatter to the right no more than normally: those of chi-square numbers of any degree less.
-    With mean and deviation of the other teeth, but for the two neighbours into which a knock rings, the largest
+    With mean and deviation of the other teeth, but for the two neighbours into which an impact rings, the largest
     is Student's.
     """
     from scipy.stats import t as student
@@ -188,7 +188,7 @@ def _p_among_these(energies: FloatArray, start: int, width: int) -> float:
 def _onset(x: FloatArray, start: int, width: int) -> float:
     """Return the angle within the window at which the energy has risen to half of its highest value.
 
-    A knock rises at once and rings on: its highest energy comes a little after it. Energy is taken over an eighth of
+    An impact rises at once and rings on: its highest energy comes a little after it. Energy is taken over an eighth of
     the window, and a little of what lies before the window is looked at too.
     """
     n, short = x.shape[1], max(1, width // 8)
@@ -242,7 +242,7 @@ def largest_event(shaft: ShaftSignals, signals: AnalysisSignals) -> LocalEvent:
     """Return the largest local event of a shaft that has separated averages.
 
     Two tests are made and paid for: on the difference signals in full, and above 3.5 times the highest mesh order,
-    where knocks ring and teeth that merely differ do not show. The window is one pitch of the coarsest gear: events
+    where impacts ring and teeth that merely differ do not show. The window is one pitch of the coarsest gear: events
     last about as long as the tooth is in mesh.
     """
     names = list(shaft.separated)
@@ -304,7 +304,7 @@ def _peaks(differences: FloatArray, width: int) -> tuple[float, ...]:
     for start in np.argsort(-energy):
         if energy[start] < limit or len(starts) > 24:
             break
-        # A knock rings on: what follows within two windows is the same event.
+        # An impact rings on: what follows within two windows is the same event.
         if all(min((start - other_start) % n, (other_start - start) % n) > 2 * width for other_start in starts):
             starts.append(int(start))
     return tuple(other_start / n for other_start in starts)
@@ -779,7 +779,7 @@ def _nothing_shows(signals: AnalysisSignals, examined: list[_Examined]) -> list[
 
 
 def _doubtful(examined: _Examined) -> Finding:
-    by_chance = f"as one does by chance on {percent(examined.p_value)} of sound gears"
+    by_chance = f"as one does by chance on {percent(examined.p_value)} of healthy gears"
     return _left_open(examined, by_chance, tuple(_evidence(examined)), _surer(examined.signals))
 
 

@@ -194,7 +194,7 @@ NEAR_ZERO_SHARE = 0.1
 """Of the highest speed: a tachometer does not tell whether a shaft that slows down so far turns on or back."""
 
 
-def speed_doubts(angle: ShaftAngle | CannotTell, rig: Rig) -> list[Finding]:
+def speed_warnings(angle: ShaftAngle | CannotTell, rig: Rig) -> list[Finding]:
     """Compare the speed with the rig's nominal speed and tolerance, and see whether it comes near standstill."""
     if not isinstance(angle, ShaftAngle):
         return []

@@ -15,15 +15,15 @@ from gearsig.fleet._changes import (
 )
 from gearsig.fleet._fleet import TABLES, DiagnosisChange, Fleet, open_fleet
 from gearsig.fleet._origin import (
+    ExcludedFile,
     FilePattern,
     Origin,
-    PassedOver,
     date_in_name,
+    excluded_text,
     find_recordings,
     no_recordings,
     origin_rows,
     origins,
-    passed_over_text,
 )
 from gearsig.fleet._statistics import (
     ALARM,
@@ -66,12 +66,12 @@ __all__ = [
     "AnalysisOptions",
     "Baseline",
     "DiagnosisChange",
+    "ExcludedFile",
     "FilePattern",
     "Fleet",
     "FleetChanges",
     "OperatingTrend",
     "Origin",
-    "PassedOver",
     "PointTrends",
     "Trend",
     "TrendSettings",
@@ -83,6 +83,7 @@ __all__ = [
     "cusum_threshold",
     "date_in_name",
     "events_of",
+    "excluded_text",
     "find_recordings",
     "fleet_changes",
     "last_report",
@@ -92,7 +93,6 @@ __all__ = [
     "open_fleet",
     "origin_rows",
     "origins",
-    "passed_over_text",
     "prediction_limits",
     "regressors",
     "series_level",

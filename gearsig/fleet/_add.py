@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gearsig.errors import GearsigError, InputError, unexpected_text
-from gearsig.fleet._origin import Origin, PassedOver
+from gearsig.fleet._origin import ExcludedFile, Origin
 from gearsig.fleet._store import Row, Store
 from gearsig.processes import killed_text, n_processors, run_jobs
 from gearsig.rig import ConstantSpeed, Rig, SpeedSource, read_rig, rig_file_beside, rig_to_dict
@@ -120,14 +120,14 @@ class AddResult:
         Recordings that the store held already.
     n_elsewhere : int
         Those that another process took meanwhile.
-    passed_over : tuple of PassedOver
+    excluded : tuple of ExcludedFile
         Recordings that the pattern leaves out.
     """
 
     added: tuple[AddedRecording, ...]
     n_known: int
     n_elsewhere: int = 0
-    passed_over: tuple[PassedOver, ...] = ()
+    excluded: tuple[ExcludedFile, ...] = ()
 
     @property
     def failures(self) -> tuple[AddedRecording, ...]:

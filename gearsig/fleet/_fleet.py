@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from gearsig.checks import closest_match_hint, count, known_name, one_of
 from gearsig.errors import InputError
 from gearsig.fleet._add import FAILED, UNTOLD, AddResult, AnalysisOptions, Progress, add_recordings
-from gearsig.fleet._origin import Origin, PassedOver, origins
+from gearsig.fleet._origin import ExcludedFile, Origin, origins
 from gearsig.fleet._statistics import ALARM, OK, WARNING
 from gearsig.fleet._store import SERIES, Store, write_query
 from gearsig.fleet._trends import (
@@ -153,17 +153,17 @@ class Fleet:
         places = [recordings] if isinstance(recordings, (str, Path)) else list(recordings)
         listed = [item for item in places if isinstance(item, Origin)]
         paths = [item for item in places if not isinstance(item, Origin)]
-        passed_over = list[PassedOver]()
+        excluded = list[ExcludedFile]()
         if paths or not listed:
             stated: dict[str, Any] = {"machine": machine, "point": point, "date": date, "rig": rig}
-            listed += origins(paths, pattern=pattern, **stated, on_passed_over=passed_over.append)
+            listed += origins(paths, pattern=pattern, **stated, on_excluded=excluded.append)
         healthy = Path(reference) if reference is not None else None
         options = AnalysisOptions(rig, sampling_rate_hz, speed, healthy, torque_nm, memory_bytes, reference_rate_hz)
         result = add_recordings(
             self._store, listed, options, n_processes=n_processes, executor=executor, on_progress=on_progress
         )
         self._refreshed()
-        return replace(result, passed_over=tuple(passed_over))
+        return replace(result, excluded=tuple(excluded))
 
     # ---------------- settings
 

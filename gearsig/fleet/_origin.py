@@ -81,7 +81,7 @@ class Origin:
 
 
 @dataclass(frozen=True)
-class PassedOver:
+class ExcludedFile:
     """A recording's file that a pattern leaves out.
 
     Parameters
@@ -110,7 +110,9 @@ class FilePattern:
     def __post_init__(self) -> None:
         self._compiled()
 
-    def match(self, path: Path, root: Path | None = None) -> dict[str, str | float | datetime | timedelta] | PassedOver:
+    def match(
+        self, path: Path, root: Path | None = None
+    ) -> dict[str, str | float | datetime | timedelta] | ExcludedFile:
         """Return what the pattern names in a path; for a path of another kind what speaks against it.
 
         Below `root` it is tried on the whole of the path first.
@@ -129,7 +131,7 @@ class FilePattern:
             match = expression.fullmatch(path.relative_to(root).as_posix())
         match = match or expression.search(path.absolute().as_posix())
         if match is None:
-            return PassedOver(path.absolute(), "does not match the pattern")
+            return ExcludedFile(path.absolute(), "does not match the pattern")
         result: dict[str, str | float | datetime | timedelta] = {
             k: v for k, v in match.groupdict().items() if k != "date"
         }
@@ -141,7 +143,7 @@ class FilePattern:
             try:
                 result["date"] = datetime.strptime(match["date"], form)  # noqa: DTZ007 - as the name states it
             except ValueError:  # the 31st of February
-                return PassedOver(path.absolute(), f"{match['date']} is no date in the form {form}")
+                return ExcludedFile(path.absolute(), f"{match['date']} is no date in the form {form}")
         return result
 
     def _compiled(self) -> tuple[re.Pattern[str], str | timedelta]:
@@ -316,7 +318,7 @@ def origins(
     date: datetime | None = None,
     rig: Rig | None = None,
     speed_rpm: float | None = None,
-    on_passed_over: Callable[[PassedOver], object] | None = None,
+    on_excluded: Callable[[ExcludedFile], object] | None = None,
     may_be_none: bool = False,
 ) -> list[Origin]:
     """Find recordings and say of which machine, point and date each is.
@@ -338,8 +340,8 @@ def origins(
         Of all; None: the rig file of the same name beside each.
     speed_rpm : float or None
         Stated of all.
-    on_passed_over : callable or None
-        Called with a `PassedOver` for each recording that does not match the pattern.
+    on_excluded : callable or None
+        Called with a `ExcludedFile` for each recording that does not match the pattern.
     may_be_none : bool
         Whether nothing may be found, as in a folder that is watched.
 
@@ -350,17 +352,17 @@ def origins(
     """
     from gearsig.recording import speed_in_name
 
-    searched, passed_over = list(places), list[PassedOver]()
+    searched, excluded = list(places), list[ExcludedFile]()
     file_pattern = FilePattern(pattern) if pattern else None
     recordings = find_recordings(searched)
     rigs = _rig_names(rig)
     result = []
     for path, root in recordings:
         named = file_pattern.match(path, root) if file_pattern is not None else {}
-        if isinstance(named, PassedOver):
-            passed_over.append(named)
-            if on_passed_over is not None:
-                on_passed_over(named)
+        if isinstance(named, ExcludedFile):
+            excluded.append(named)
+            if on_excluded is not None:
+                on_excluded(named)
             continue
         try:
             stat = path.stat()
@@ -411,7 +413,7 @@ def origins(
         )
     if not result and not may_be_none:
         complaint = f" that match {pattern!r}" if pattern else ""
-        complaint += f"; {passed_over_text(passed_over)}" if passed_over else ""
+        complaint += f"; {excluded_text(excluded)}" if excluded else ""
         raise no_recordings(searched, complaint=complaint)
     return sorted(result, key=lambda o: (o.machine, o.point, o.date, o.path))
 
@@ -419,12 +421,12 @@ def origins(
 N_NAMED = 3
 
 
-def passed_over_text(files: Sequence[PassedOver]) -> str:
+def excluded_text(files: Sequence[ExcludedFile]) -> str:
     """Say how many recordings a pattern leaves out, and of the first ones which and why.
 
     Examples
     --------
-    >>> passed_over_text([PassedOver(Path("/data/pump/DE_1.csv"), "does not match the pattern")])
+    >>> excluded_text([ExcludedFile(Path("/data/pump/DE_1.csv"), "does not match the pattern")])
     '1 recording is passed over: pump/DE_1.csv (does not match the pattern)'
     """
     first = [f"{_printable_name(Path(*file.path.parts[-2:]).as_posix())} ({file.reason})" for file in files[:N_NAMED]]

@@ -16,7 +16,7 @@ from gearsig.checks import not_negative, positive
 from gearsig.errors import GearsigError
 from gearsig.fleet._add import AddedRecording
 from gearsig.fleet._fleet import Fleet
-from gearsig.fleet._origin import FilePattern, Origin, PassedOver, origins, passed_over_text
+from gearsig.fleet._origin import ExcludedFile, FilePattern, Origin, excluded_text, origins
 from gearsig.processes import active_cluster, n_processors, process_pool
 
 
@@ -33,14 +33,14 @@ class WatchEvent:
         In UTC.
     text : str
     added : AddedRecording or None
-    passed_over : tuple of PassedOver
+    excluded : tuple of ExcludedFile
     """
 
     kind: str
     time: datetime
     text: str
     added: AddedRecording | None = None
-    passed_over: tuple[PassedOver, ...] = ()
+    excluded: tuple[ExcludedFile, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """Return what a line of JSON holds."""
@@ -54,8 +54,8 @@ class WatchEvent:
                 "date": origin.date.isoformat(),
                 "outcome": self.added.outcome,
             }
-        if self.passed_over:
-            result["passed_over"] = [{"file": str(file.path), "reason": file.reason} for file in self.passed_over]
+        if self.excluded:
+            result["excluded"] = [{"file": str(file.path), "reason": file.reason} for file in self.excluded]
         return result
 
 
@@ -128,11 +128,11 @@ def watch(
         pool = executor
         while not stop():
             try:
-                left_out = list[PassedOver]()
+                left_out = list[ExcludedFile]()
                 ready, n_waiting = _ready(roots, seen, settle_s, how, left_out.append)
                 if new := tuple(file for file in left_out if file.path not in reported):
                     reported |= {file.path for file in new}
-                    on_event(WatchEvent("passed over", datetime.now(UTC), passed_over_text(new), passed_over=new))
+                    on_event(WatchEvent("passed over", datetime.now(UTC), excluded_text(new), excluded=new))
                 if ready:
                     if pool is None and active_cluster() is None:
                         pool = stack.enter_context(process_pool(n_processes or n_processors()))
@@ -169,14 +169,14 @@ def _ready(
     seen: dict[Path, _WatchedFile],
     settle_s: float,
     how: dict[str, Any],
-    on_passed_over: Callable[[PassedOver], object],
+    on_excluded: Callable[[ExcludedFile], object],
 ) -> tuple[list[Origin], int]:
     """Return the recordings that stand still and were not taken yet, and how many do not stand still."""
     present_roots = [root for root in roots if root.exists()]
     of_origin = {name: how[name] for name in (*_OF_ORIGIN, "rig") if name in how}
     now_s, wall_s = time.monotonic(), time.time()
     ready, n_waiting = [], 0
-    for origin in origins(present_roots, on_passed_over=on_passed_over, may_be_none=True, **of_origin):
+    for origin in origins(present_roots, on_excluded=on_excluded, may_be_none=True, **of_origin):
         signature = origin.n_bytes, origin.mtime_ns
         known = seen.get(origin.path)
         if known is None:

@@ -284,7 +284,7 @@ class Attribution(Generic[TriedT]):
         if self.labelled is not None:
             posterior = with_labelled(posterior, self.labelled.ratios, self.labelled.alike)
         posterior = with_likelihoods(with_likelihoods(posterior, self.matches), self.tooth_error_log_likelihoods)
-        return with_unknown_shared(posterior, {n: self.scores[n] for n in self.untrained if n in self.tried})
+        return with_unknown_distributed(posterior, {n: self.scores[n] for n in self.untrained if n in self.tried})
 
 
 MAX_TRIED, MIN_TRIED_PROBABILITY = 3, 0.06
@@ -314,7 +314,7 @@ def with_likelihoods(probabilities: Mapping[str, float], matches: Mapping[str, f
     return likeliest_first({**probabilities, **parted})
 
 
-def with_unknown_shared(probabilities: Mapping[str, float], scores: Mapping[str, float]) -> dict[str, float]:
+def with_unknown_distributed(probabilities: Mapping[str, float], scores: Mapping[str, float]) -> dict[str, float]:
     """Return the probabilities with those of effects that only a trial speaks for, likeliest first.
 
     They share max_i s_i of what is unknown, each in proportion to its own s_i = max(score, 0): to the forests, a gap
@@ -403,11 +403,11 @@ def _forest(
 ) -> dict[str, float]:
     """Return the forests' joint probabilities over what may be named."""
     allowed = {NONE, UNKNOWN, *(effects or known)} & set(conditions[0].learned.causes)
-    per_condition = [c.recogniser.probabilities(c.change, c.tooth_load_n_per_mm, known.values()) for c in conditions]
+    per_condition = [c.classifier.probabilities(c.change, c.tooth_load_n_per_mm, known.values()) for c in conditions]
     return joint_probabilities(per_condition, [c.tooth_load_n_per_mm for c in conditions], allowed)
 
 
-def within_the_floor(probabilities: Mapping[str, float], size: Interval) -> dict[str, float]:
+def with_unknown_within_floor(probabilities: Mapping[str, float], size: Interval) -> dict[str, float]:
     """Return the probabilities with that of an unknown cause given to none, where the whole gap is within its floor.
 
     Parameters
@@ -438,7 +438,7 @@ N_FIRST_ORDERS = 2
 """Multiples of a shaft that hardly anything but its own faults raises alone: it would have to turn along."""
 
 
-def counted_against(
+def with_dominant_order_counted(
     probabilities: Mapping[str, float], effects: Mapping[str, GapEffect], places: Sequence[GapPlace], frame: GearFrame
 ) -> dict[str, float]:
     """Return the probabilities with those of causes lowered that cannot make the order that is most of the gap.

@@ -14,8 +14,8 @@ from gearsig.gap._features import (
     NamedValue,
     burst_features,
     clearness,
+    feature_values,
     jackknife_variance,
-    once,
     pattern_features,
     whole_and_parts,
     whole_record_variance,
@@ -230,7 +230,7 @@ def change_features(now: ReducedRecording, healthy: ReducedRecording) -> Feature
     )
 
 
-def change_once(now: ReducedRecording, healthy: ReducedRecording) -> tuple[tuple[str, ...], FloatArray]:
+def change_feature_values(now: ReducedRecording, healthy: ReducedRecording) -> tuple[tuple[str, ...], FloatArray]:
     """Return the change features without their scatter, as for single simulations, which need none.
 
     Parameters
@@ -244,7 +244,7 @@ def change_once(now: ReducedRecording, healthy: ReducedRecording) -> tuple[tuple
     values : array, (n,)
         dB, or ten times the decadic logarithm.
     """
-    (names, after), before = once(now), once(healthy)[1]
+    (names, after), before = feature_values(now), feature_values(healthy)[1]
     return _joined(names, after - before, now, healthy)
 
 
@@ -378,7 +378,7 @@ def lines_of_shaft(reduced: ReducedRecording, side: int) -> ShaftLines:
 # --------------------
 
 
-def beyond_the_mesh(names: Sequence[str], distances: FloatArray) -> FloatArray:
+def change_relative_to_mesh(names: Sequence[str], distances: FloatArray) -> FloatArray:
     """Return changes of levels as far as they hold both relative to the mesh harmonics and by themselves.
 
     If the mesh alone falls by 6 dB, all that is counted relative to it rises by as much, and none of it has changed; if
@@ -481,7 +481,7 @@ def _pairs(place: dict[str, int]) -> list[tuple[str, str]]:
     return [pair for pair in (*pairs, *_OF_ALL) if pair[0] in place and pair[1] in place]
 
 
-def mirrored(names: Sequence[str]) -> np.ndarray:
+def columns_with_shafts_swapped(names: Sequence[str]) -> np.ndarray:
     """Return the places of the features with driver and driven gear exchanged.
 
     What a fault of the driver does to the driver's features, one of the driven gear does to that gear's.

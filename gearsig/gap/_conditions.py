@@ -16,18 +16,18 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import percent
 from gearsig.gap._change import (
     as_mounted,
-    beyond_the_mesh,
     change_features,
+    change_relative_to_mesh,
     difference_features,
     lines_of_shaft,
     turned_difference,
 )
+from gearsig.gap._classifier import EffectClassifier, Learned
 from gearsig.gap._features import STEPS_PER_TOOTH, Features, decibel, tooth_energy
 from gearsig.gap._floors import FLOOR_IN_DEVIATIONS, GapSize, StructuralFloor, gap_size, pooled_scatter
 from gearsig.gap._path import MeasuredPath, measured_path
 from gearsig.gap._population import load_learned
 from gearsig.gap._prediction import ObservedChange
-from gearsig.gap._recognition import Learned, Recogniser
 from gearsig.gap._reduction import (
     DRIVEN,
     DRIVER,
@@ -37,7 +37,7 @@ from gearsig.gap._reduction import (
     shaft_words,
 )
 from gearsig.gap._report import ConditionFacts
-from gearsig.gap._simulator import Added, OperatingCondition, Twin, as_tried
+from gearsig.gap._simulator import AddedEffect, OperatingCondition, Twin, as_tried
 from gearsig.gap._waveform import gain_scatter
 from gearsig.prepared import PreparedRecording
 from gearsig.recording import metres_per_second_squared
@@ -48,7 +48,7 @@ from gearsig.severity import (
     load_calibration,
     orders_from_mesh,
     reversed_text,
-    telling_teeth_apart,
+    tooth_distinguishing_orders,
 )
 
 # --------------------
@@ -121,7 +121,7 @@ class Condition:
     @cached_property
     def floor(self) -> StructuralFloor:
         """How far healthy machines lie from what it is compared with."""
-        return self.recogniser.floor
+        return self.classifier.floor
 
     @cached_property
     def size(self) -> GapSize:
@@ -129,9 +129,9 @@ class Condition:
         return gap_size(self.change, self.floor)
 
     @property
-    def recogniser(self) -> Recogniser:
+    def classifier(self) -> EffectClassifier:
         """By which its change is recognised."""
-        return self.learned.recognisers[self.has_reference]
+        return self.learned.classifiers[self.has_reference]
 
     @property
     def tooth_load_n_per_mm(self) -> float:
@@ -156,7 +156,7 @@ class Condition:
         With a reference, a level relative to the mesh counts as far as it changed by itself.
         """
         names, distances = self.change.names, self.floor.from_centre(self.change.names, self.change.values)
-        held = beyond_the_mesh(names, distances) if self.has_reference else distances
+        held = change_relative_to_mesh(names, distances) if self.has_reference else distances
         return dict(zip(names, held.tolist(), strict=True))
 
     @cached_property
@@ -225,7 +225,7 @@ def _slower_hz(now: ReducedRecording) -> float:
 
 
 def simulated(
-    twin: Twin, facts: ConditionFacts, now: ReducedRecording, added: Sequence[Added] = ()
+    twin: Twin, facts: ConditionFacts, now: ReducedRecording, added: Sequence[AddedEffect] = ()
 ) -> ReducedRecording:
     """Return the twin's run at a recording's point, reduced."""
     recording = twin.run(
@@ -399,13 +399,15 @@ flanks and another path to the sensor change all teeth, some of them much."""
 def warnings_of(condition: Condition) -> list[str]:
     """Return what speaks strongly for a wrong rig file, or for recording and reference exchanged."""
     name, reference = condition.facts.name, condition.reference
-    texts = wrong_teeth(condition.now, name, reference)
+    texts = tooth_count_mismatch_text(condition.now, name, reference)
     if reference is None or texts:
         return texts
-    return wrong_teeth(reference, f"The reference of {name}") or exchanged(condition.now, reference, name)
+    return tooth_count_mismatch_text(reference, f"The reference of {name}") or swapped_recordings_text(
+        condition.now, reference, name
+    )
 
 
-def wrong_teeth(now: ReducedRecording, name: str, reference: ReducedRecording | None = None) -> list[str]:
+def tooth_count_mismatch_text(now: ReducedRecording, name: str, reference: ReducedRecording | None = None) -> list[str]:
     """Say so where a shaft's own mark shows that its gear has not the rig's teeth but another number.
 
     Where angle counts from a mark on the very shaft, its average holds for any teeth. Next to nothing of it must lie at
@@ -454,7 +456,7 @@ def _explained(now: ReducedRecording, side: int) -> dict[int, float]:
     return explained
 
 
-def exchanged(now: ReducedRecording, reference: ReducedRecording, name: str) -> list[str]:
+def swapped_recordings_text(now: ReducedRecording, reference: ReducedRecording, name: str) -> list[str]:
     """Say so where one tooth stands out in the reference and is ordinary in the recording.
 
     Damage adds a burst to one tooth and takes none away. What the change alone cannot tell, its sign does.
@@ -498,13 +500,13 @@ def _energy(now: ReducedRecording, side: int, difference: ShaftLines, lines: NDA
     return energy
 
 
-def strange_teeth(now: ReducedRecording, name: str) -> list[str]:
+def teeth_mismatch_text(now: ReducedRecording, name: str) -> list[str]:
     """Say so where little of what repeats with the shafts lies at the mesh harmonics of the rig's teeth.
 
     Gears of less than some 15 teeth are not noticed: any order lies near one of their harmonics.
     """
     share = max(_mesh_share(now, side) for side in (DRIVER, DRIVEN))
-    if share >= MIN_MESH_SHARE or wrong_teeth(now, name):  # that is said by itself
+    if share >= MIN_MESH_SHARE or tooth_count_mismatch_text(now, name):  # that is said by itself
         return []
     message = (
         f"{name}: only {percent(share)} of what repeats with a shaft lies at mesh harmonics of the rig's "
@@ -513,7 +515,7 @@ def strange_teeth(now: ReducedRecording, name: str) -> list[str]:
     return [message]
 
 
-def strange_pattern(now: ReducedRecording, reference: ReducedRecording, name: str) -> list[str]:
+def pattern_mismatch_text(now: ReducedRecording, reference: ReducedRecording, name: str) -> list[str]:
     """Say so where neither gear's pattern of teeth is that of the reference; flawless gears have none to compare."""
     if not all(_has_pattern(recording, side) for recording in (now, reference) for side in (DRIVER, DRIVEN)):
         return []
@@ -535,7 +537,7 @@ def _has_pattern(reduced: ReducedRecording, side: int) -> bool:
     """Return whether what tells a gear's teeth apart stands clear of noise in the channel where it is clearest."""
     clearest = 0.0
     for average in reduced.averages(side):
-        used = telling_teeth_apart(np.arange(len(average.lines)), average.teeth)
+        used = tooth_distinguishing_orders(np.arange(len(average.lines)), average.teeth)
         clearest = max(clearest, float(np.sum(np.abs(average.lines[used]) ** 2) / np.sum(average.noise[used])))
     return clearest >= MIN_PATTERN
 
@@ -684,7 +686,7 @@ def readable(
 def read_healthy(recording: PreparedRecording) -> tuple[HealthyReference, list[str]]:
     """Return a healthy recording reduced, and what is worth a remark."""
     reduced, messages = _reduced(recording)
-    return HealthyReference(reduced, recording), [*messages, *strange_teeth(reduced, recording.recording.name)]
+    return HealthyReference(reduced, recording), [*messages, *teeth_mismatch_text(reduced, recording.recording.name)]
 
 
 def _condition(
@@ -700,8 +702,10 @@ def _condition(
     facts = facts_of(recording, now, twin)
     messages += _messages_of_recording(recording, facts)
     match, why = matching_reference(now, recording.rig, healthy)
-    if match is None or strange_teeth(match.reduced, match.name):  # a healthy one that fits: damage repeats otherwise
-        messages += strange_teeth(now, name)
+    if match is None or teeth_mismatch_text(
+        match.reduced, match.name
+    ):  # a healthy one that fits: damage repeats otherwise
+        messages += teeth_mismatch_text(now, name)
     if why:
         messages.append(f"{name} is compared with the simulation: {why}.")
     if match is not None:
@@ -716,7 +720,7 @@ def _condition(
     on_read(facts, now)
     condition = Condition(facts, now, simulated(twin, facts, now), reference, learned, path)
     if reference is not None:
-        messages += strange_pattern(now, reference, name)
+        messages += pattern_mismatch_text(now, reference, name)
         messages += _strange_reference(condition)
     return condition, messages
 

@@ -13,7 +13,7 @@ import numpy as np
 from gearsig.checks import closest_match_hint, listed, short
 from gearsig.errors import GearsigError, InputError, RefusalError
 from gearsig.formatting import odds_text
-from gearsig.gap._attribution import Attribution, attribute, counted_against, within_the_floor
+from gearsig.gap._attribution import Attribution, attribute, with_dominant_order_counted, with_unknown_within_floor
 from gearsig.gap._conditions import Condition, Stage, conditions_of, simulated, warnings_of
 from gearsig.gap._curves import angle_curves, average_curves, spectrum_curves
 from gearsig.gap._evidence import CRACK, evidence_of
@@ -21,7 +21,7 @@ from gearsig.gap._gearless import diagnose_gearless, place_of_unexpected, unexpe
 from gearsig.gap._inputs import is_gearless, twin_rig, with_stage
 from gearsig.gap._labelled import LabelledRecording, labelled_changes
 from gearsig.gap._next_recording import next_recordings, next_steps
-from gearsig.gap._places import gap_places, ranked_places, without_multiples, without_silent_races
+from gearsig.gap._places import gap_places, ranked_places, with_unchanged_races_lowered, without_multiples
 from gearsig.gap._population import load_learned
 from gearsig.gap._reduction import ReducedRecording
 from gearsig.gap._report import (
@@ -34,10 +34,10 @@ from gearsig.gap._report import (
     NextRecording,
     fitted_words,
     in_order,
-    is_settled,
     likeliest_first,
     most_probable_two,
     named_cause,
+    names_single_effect,
     unbounded_fits,
 )
 from gearsig.gap._simulator import CanRunUp, DriveSimulator, GapEffect, GapSimulator, Twin, as_tried
@@ -45,7 +45,7 @@ from gearsig.gap._tooth_error import ToothErrorEvidence, has_encoders, mean_log_
 from gearsig.gap._trials import (
     PROCESSES,
     TriedEffect,
-    at_its_tooth,
+    at_recorded_tooth,
     cause_place,
     observed_changes,
     run_for_a_moment,
@@ -287,7 +287,7 @@ def diagnose_gap(
                 (USER_EFFECT_MESSAGE if name in tried else NOT_SIMULATED).format(title=known[name].title)
                 for name in attribution.untrained
             ),
-            *effects_without_place(twin, allowed),
+            *effects_without_setting(twin, allowed),
             *unexpected_messages,
             *(depths or _fit_messages(named, tried)),
             *_waveform_messages(tried, known, clearest),
@@ -422,7 +422,7 @@ def _check_rigs(recordings: Sequence[Recording]) -> Rig:
     return recordings[0].rig or Rig()
 
 
-def effects_without_place(twin: Twin, allowed: Mapping[str, GapEffect]) -> list[str]:
+def effects_without_setting(twin: Twin, allowed: Mapping[str, GapEffect]) -> list[str]:
     """Name the effects that the rig has no place for, a bearing, say."""
     titles = [effect.title for name, effect in allowed.items() if not twin.candidates(name)]
     if not titles:
@@ -498,9 +498,9 @@ def _posterior(
     gap: Sequence[GapPlace],
 ) -> dict[str, float]:
     """Return cause → probability, with what the whole gap, its places and the lines of shafts and races say."""
-    posterior = within_the_floor(attribution.probabilities(), clearest.size.structural)
-    posterior = without_multiples(without_silent_races(posterior, conditions), known, conditions)
-    return counted_against(posterior, known, gap, clearest.now.frame)
+    posterior = with_unknown_within_floor(attribution.probabilities(), clearest.size.structural)
+    posterior = without_multiples(with_unchanged_races_lowered(posterior, conditions), known, conditions)
+    return with_dominant_order_counted(posterior, known, gap, clearest.now.frame)
 
 
 def _places(condition: Condition) -> tuple[GapPlace, ...]:
@@ -529,7 +529,7 @@ def _cause(
     return replace(
         cause,
         severity=None if placing is None else placing.severity,
-        fitted=None if placing is None else at_its_tooth(placing.added, frame, places),
+        fitted=None if placing is None else at_recorded_tooth(placing.added, frame, places),
         shrinkage=trial.shrinkage,
         evidence=evidence_of(trial.fit, observed_changes(conditions), frame),
     )
@@ -577,7 +577,7 @@ def _after_and_next(
     next_ones: tuple[NextRecording, ...] = ()
     with ThreadPoolExecutor(1) as executor:
         after = executor.submit(simulated, twin, clearest.facts, clearest.now, (fitted,)) if fitted else None
-        if pair is not None and not is_settled(causes) and all(name in tried for name in pair):
+        if pair is not None and not names_single_effect(causes) and all(name in tried for name in pair):
             (first, second), titles = (tried[name] for name in pair), (known[pair[0]].title, known[pair[1]].title)
             next_ones = next_recordings(first, second, titles, twin, conditions)
     return (after.result() if after else None), next_ones

@@ -50,7 +50,7 @@ def evidence_of(fit: Fit, observed: Sequence[ObservedChange], frame: GearFrame) 
     largest = sorted((i for i in best if clear[i]), key=lambda i: -sizes[i])
     return tuple(
         evidence_of_feature(
-            feature_words(fit.path.names[i], frame),
+            feature_text(fit.path.names[i], frame),
             float(predicted[i]),
             float(clearest.distances[i]),
             float(clearest.floors[i]),
@@ -265,7 +265,7 @@ _SINGLE_FEATURES = {
 }
 
 
-def feature_words(name: str, frame: GearFrame) -> str:
+def feature_text(name: str, frame: GearFrame) -> str:
     """Return a feature's name in words, e.g. "input shaft: sidebands 6 to 12"."""
     if name in _SINGLE_FEATURES:
         return _SINGLE_FEATURES[name]

@@ -478,8 +478,8 @@ def features_of(reduced: ReducedRecording) -> Features:
 def whole_and_parts(reduced: ReducedRecording) -> tuple[tuple[str, ...], FloatArray]:
     """Return names and values, (1 + n_blocks, n): of the whole, and without each of its blocks; computed once."""
     if "features" not in reduced.kept:
-        names, values = once(reduced)
-        parts = [once(part)[1] for part in reduced.leaving_one_out()]
+        names, values = feature_values(reduced)
+        parts = [feature_values(part)[1] for part in reduced.leaving_one_out()]
         reduced.kept["features"] = names, np.stack([values, *parts])
     rows: tuple[tuple[str, ...], FloatArray] = reduced.kept["features"]
     return rows
@@ -490,7 +490,7 @@ def whole_record_variance(names: Sequence[str]) -> FloatArray:
     return np.array([WHOLE_RECORD_DB.get(name, 0.0) ** 2 for name in names])
 
 
-def once(reduced: ReducedRecording) -> tuple[tuple[str, ...], FloatArray]:
+def feature_values(reduced: ReducedRecording) -> tuple[tuple[str, ...], FloatArray]:
     """Return names and values of the features, without their scatter; computed once."""
     if "whole" not in reduced.kept:
         reduced.kept["whole"] = _read_once(reduced)
@@ -528,11 +528,11 @@ LOWEST_MESH_ORDER = 0.5
 PEAK_PITCHES = 0.25
 """Within which the loudest part of a burst is sought, and by which its profile is counted."""
 
-COURSE_PITCHES = (-1.5, 3.0)
+PROFILE_PITCHES = (-1.5, 3.0)
 """From the loudest part on; so are the ranges below. A tooth carries for one to two pitches, and what it strikes rings
 on."""
 
-N_QUARTERS = round((COURSE_PITCHES[1] - COURSE_PITCHES[0]) / PEAK_PITCHES)
+N_QUARTERS = round((PROFILE_PITCHES[1] - PROFILE_PITCHES[0]) / PEAK_PITCHES)
 
 ECHO_LAGS_PITCHES = np.arange(0.3, 2.15, 0.15)
 ECHO_PITCHES = (-2.2, 2.8)
@@ -585,7 +585,7 @@ def burst_features(lines: ComplexArray, noise: FloatArray, teeth: int) -> Iterat
         energy, width = np.mean(by_channel, axis=0), round(PEAK_PITCHES * STEPS_PER_PITCH)
         within = uniform_filter1d(energy, width, mode="wrap", origin=-(width // 2))  # from each step on
         energy = np.roll(energy, -int(np.argmax(within)))
-        profile = _cut(energy, COURSE_PITCHES).reshape(N_QUARTERS, width).sum(axis=1)
+        profile = _cut(energy, PROFILE_PITCHES).reshape(N_QUARTERS, width).sum(axis=1)
         shares = profile / max(float(profile.sum()), 1e-300)
         for i, share in enumerate(shares):
             yield f"burst.{way}.course.{i}", decibel(share + MIN_BURST_SHARE)

@@ -144,7 +144,7 @@ class StructuralFloor:
     Parameters
     ----------
     names : tuple of str
-        Of features, see `once` and `change_once`.
+        Of features, see `feature_values` and `change_feature_values`.
     values : array, (n,), above 0
         dB: 19 of 20 healthy machines lie within `centres` ± `values`.
     centres : array, (n,)
@@ -223,9 +223,9 @@ class StructuralFloor:
         """Return changes in structural floors, with their sign."""
         return self.from_centre(change.names, change.values) / self.of(change.names)
 
-    def whole_of(self, names: Sequence[str]) -> float:
+    def floor_size(self, names: Sequence[str]) -> float:
         """Return the `soft_size` that is one structural floor."""
-        return independent_whole(tuple(names)) if self.whole is None else self.whole
+        return independent_floor_size(tuple(names)) if self.whole is None else self.whole
 
 
 @dataclass(frozen=True)
@@ -262,8 +262,8 @@ def gap_size(change: Features, structural: StructuralFloor) -> GapSize:
     scatter = FLOOR_IN_DEVIATIONS * pooled_scatter(change)
     floors = structural.of(change.names)
     return GapSize(
-        _size(change, structural, floors, structural.whole_of(change.names)),
-        _size(change, structural, scatter, independent_whole(change.names)),
+        _size(change, structural, floors, structural.floor_size(change.names)),
+        _size(change, structural, scatter, independent_floor_size(change.names)),
     )
 
 
@@ -352,7 +352,7 @@ _N_DRAWS = 2000
 
 
 @cache
-def independent_whole(names: tuple[str, ...]) -> float:
+def independent_floor_size(names: tuple[str, ...]) -> float:
     """Return the `soft_size` that one in twenty exceeds if features are independent and normal, each at its floor.
 
     A constant of the features' names, found by counting, so the same numbers are drawn each time.

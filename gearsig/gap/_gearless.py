@@ -14,14 +14,14 @@ from gearsig.diagnosis import (
     SAME_BEARING_ORDER,
     Analysis,
     CannotTell,
-    Earlier,
     Finding,
     Kind,
     Outcome,
+    ReferenceFinding,
     analyze,
     in_reference,
-    named_alike,
-    only_channel_taken,
+    only_channel_assumed,
+    with_matching_channel_names,
 )
 from gearsig.errors import RefusalError
 from gearsig.formatting import enumerated, named, percent, signed
@@ -206,7 +206,7 @@ def shafts_of_unknown_speed(rig: Rig) -> str:
     return named("shaft", " and ".join(shaft.name for shaft in rig.shafts if rig.ratio(shaft.name) is None))
 
 
-def _rise_db(finding: Finding, earlier: Earlier) -> float | None:
+def _rise_db(finding: Finding, earlier: ReferenceFinding) -> float | None:
     """Return the rise since then; None where the bands differ, since the level in a band grows with its width."""
     bands = finding.where.band_hz or (), earlier.finding.where.band_hz or ()
     differ = any(abs(now - then) > SAME_EDGE * max(now, then) for now, then in zip(*bands, strict=False))
@@ -456,7 +456,7 @@ def diagnose_gearless(
     left_out: list[str] = []
 
     def healthy_reference(reference: PreparedRecording) -> tuple[PreparedRecording, list[str]]:
-        _with_bearings(named_alike(recordings[0].recording, reference))
+        _with_bearings(with_matching_channel_names(recordings[0].recording, reference))
         return reference, []
 
     usable = readable(references, healthy_reference, "reference", left_out)
@@ -464,10 +464,10 @@ def diagnose_gearless(
 
     def examine(recording: PreparedRecording) -> tuple[ExaminedRecording, list[str]]:
         tell(f"analysing {recording.recording.name}", 0.2 + 0.7 * next(done) / len(recordings))
-        healthy = [named_alike(recording.recording, reference) for reference in usable]
+        healthy = [with_matching_channel_names(recording.recording, reference) for reference in usable]
         alone = examined(_with_bearings(recording), [_with_bearings(reference) for reference in healthy])
         pairs = zip(usable, healthy, strict=True)
-        taken = [f.title for then, named in pairs for f in only_channel_taken(then.recording, named.recording)]
+        taken = [f.title for then, named in pairs for f in only_channel_assumed(then.recording, named.recording)]
         return _beyond_reference(recording, alone, healthy), taken
 
     every = readable(recordings, examine, "recording", left_out)
@@ -626,7 +626,7 @@ def unexpected_findings(
                 (abs(reference.shaft_angle.mean_speed_rpm - now.shaft_angle.mean_speed_rpm), len(speeds), reference)
             )
     nearest = min(speeds)[2] if speeds else references[0] if len(references) == 1 else None
-    alike = [] if nearest is None else [named_alike(recording.recording, nearest)]
+    alike = [] if nearest is None else [with_matching_channel_names(recording.recording, nearest)]
     healthy = [analysis for analysis in map(analyze, alike) if isinstance(analysis.shaft_angle, ShaftAngle)]
     alone = examined(now, healthy, damaged_too=True)  # what both have is no gap; that it is there, a warning says
     now_examined = _beyond_reference(recording, alone, alike)

@@ -14,9 +14,9 @@ from gearsig.cache import keep, read_arrays
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError, RefusalError
 from gearsig.gap._change import as_mounted, change_features, difference_features
+from gearsig.gap._classifier import Learned, clipped_discriminant_input
 from gearsig.gap._conditions import Condition, HealthyReference, facts_of, matching_reference, read_healthy, simulated
 from gearsig.gap._features import Features
-from gearsig.gap._recognition import Learned, within_reach
 from gearsig.gap._reduction import reduce_recording
 from gearsig.gap._report import shares_of
 from gearsig.gap._simulator import OperatingCondition, Twin
@@ -240,18 +240,20 @@ def labelled_evidence(conditions: Sequence[Condition], labelled: Sequence[Labell
     ratios: dict[str, list[float]] = {label: [] for label in labels}
     alike: dict[str, list[float]] = {}
     for condition in conditions:
-        way, recogniser, load = condition.has_reference, condition.recogniser, condition.tooth_load_n_per_mm
-        row = within_reach(recogniser.input_row(condition.change, load))
-        unlabelled = recogniser.probabilities(condition.change, load)
+        way, classifier, load = condition.has_reference, condition.classifier, condition.tooth_load_n_per_mm
+        row = clipped_discriminant_input(classifier.input_row(condition.change, load))
+        unlabelled = classifier.probabilities(condition.change, load)
         for label in labels:
             of_label = [change for change in labelled if change.label == label and way in change.changes]
             near = [change for change in of_label if _speed_ratio(change, condition) <= MAX_SPEED_RATIO] or of_label
             if not near:
                 continue
-            rows = np.array([within_reach(recogniser.input_row(change.changes[way], load)) for change in near])
-            ratios[label].append(labelled_support(recogniser.labels.log_ratios(row, rows, label)))
-            if label not in recogniser.causes:
-                near_probabilities = [recogniser.probabilities(change.changes[way], load) for change in near]
+            rows = np.array(
+                [clipped_discriminant_input(classifier.input_row(change.changes[way], load)) for change in near]
+            )
+            ratios[label].append(labelled_support(classifier.labels.log_ratios(row, rows, label)))
+            if label not in classifier.causes:
+                near_probabilities = [classifier.probabilities(change.changes[way], load) for change in near]
                 mean = {name: float(np.mean([p[name] for p in near_probabilities])) for name in unlabelled}
                 alike.setdefault(label, []).append(sum(min(unlabelled[name], mean[name]) for name in unlabelled))
     counts = {label: sum(change.label == label for change in labelled) for label in labels}

@@ -16,7 +16,7 @@ from gearsig.gap._change import (
     turned_difference,
 )
 from gearsig.gap._conditions import Condition
-from gearsig.gap._evidence import feature_words
+from gearsig.gap._evidence import feature_text
 from gearsig.gap._features import (
     LOWEST_STRANGE,
     MAX_SHAFT_ORDERS,
@@ -101,7 +101,9 @@ MISSED_RACE = 0.2
 """Probability that a damaged race shows, and has no lines of its own: as `MISSED_FAULT`, of bearings alone."""
 
 
-def without_silent_races(probabilities: Mapping[str, float], conditions: Sequence[Condition]) -> dict[str, float]:
+def with_unchanged_races_lowered(
+    probabilities: Mapping[str, float], conditions: Sequence[Condition]
+) -> dict[str, float]:
     """Return the probabilities with those of races lowered whose lines rose in none of the recordings.
 
     Balls that roll over a spall make lines at the race's own order. A tooth that strikes once a turn makes lines at all
@@ -503,7 +505,7 @@ def locate_mesh(condition: Condition) -> GapPlace | None:
     if abs(change) < MIN_CHANGE_DB:  # the lines hardly moved: what was scored is a ratio, of harmonics or of sensors
         scored = condition.strongest("mesh.", "alike.")
         change = condition.change_db[scored]
-        title = f"{feature_words(scored, frame)}, {by_decibels(change)}"
+        title = f"{feature_text(scored, frame)}, {by_decibels(change)}"
         if scored.startswith("alike."):
             title = "what lies beside the mesh harmonics, which themselves hardly moved"
         return GapPlace(PlaceKind.MESH, title, change, orders=_harmonic_order(scored, frame))
@@ -788,7 +790,7 @@ def locate_tooth(condition: Condition, side: int) -> GapPlace | None:
     if pattern.synchronous_share < MIN_SYNCHRONOUS_SHARE:
         return None
     if pattern.prominence < STANDS_OUT:
-        return locate_all_round(condition, side, shaft, name)
+        return distributed_place(condition, side, shaft, name)
     place, teeth = pattern.place_rev, frame.teeth[side]
     above, angle = 10.0 * float(np.log10(pattern.prominence)), 360.0 * place
     tooth = int(place * teeth) % teeth + 1 if now.marks[side] else None
@@ -797,7 +799,7 @@ def locate_tooth(condition: Condition, side: int) -> GapPlace | None:
     return GapPlace(PlaceKind.TOOTH, title, above, angle_deg=angle, tooth=tooth, channel=name)
 
 
-def locate_all_round(condition: Condition, side: int, shaft: str, channel: str) -> GapPlace:
+def distributed_place(condition: Condition, side: int, shaft: str, channel: str) -> GapPlace:
     """Return that no tooth in particular stands out, with the figure of the feature that was scored."""
     scored = condition.strongest(*(f"{kind}.{SIDES[side]}." for kind in ("tooth", "change", "surprise")))
     level = f"tooth.{SIDES[side]}.level"

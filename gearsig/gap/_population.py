@@ -17,20 +17,20 @@ from numpy.typing import NDArray
 from gearsig.cache import cache_folder, modules_digest, read_arrays
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError
-from gearsig.gap._change import mirrored
-from gearsig.gap._floors import StructuralFloor, credibility_of, soft_size
-from gearsig.gap._recognition import (
+from gearsig.gap._change import columns_with_shafts_swapped
+from gearsig.gap._classifier import (
     LEARNED_FILE,
+    EffectClassifier,
+    ForestNodes,
     Learned,
     LinearRule,
-    Recogniser,
-    Trees,
+    clipped_discriminant_input,
     fit_label_space,
     input_rows,
     read_learned,
-    within_reach,
     write_learned,
 )
+from gearsig.gap._floors import StructuralFloor, credibility_of, soft_size
 from gearsig.gap._report import NONE, UNKNOWN
 from gearsig.recording import sha256_of
 
@@ -211,7 +211,7 @@ def learn(population: Population, *, n_trees: int = N_TREES) -> Learned:
     )
 
 
-def fit_recogniser(population: Population, *, with_reference: bool, n_trees: int = N_TREES) -> Recogniser:
+def fit_recogniser(population: Population, *, with_reference: bool, n_trees: int = N_TREES) -> EffectClassifier:
     """Fit to a population, and to the same with driver and driven gear exchanged.
 
     Extremely randomised trees: P. Geurts, D. Ernst, L. Wehenkel, "Extremely randomized trees", 2006. The linear
@@ -235,7 +235,7 @@ def fit_recogniser(population: Population, *, with_reference: bool, n_trees: int
         random_state=_SEED,
     )
     is_visible = _is_visible(floor, tables[0], population.causes)
-    exchanged = mirrored(floor.names)
+    exchanged = columns_with_shafts_swapped(floor.names)
     changes, scatter = (np.concatenate([table[is_visible], table[is_visible][:, exchanged]]) for table in tables)
     loads = np.tile(population.loads_n_per_mm[is_visible], 2)
     rows = input_rows(floor, changes, scatter, loads).astype(np.float32)
@@ -243,23 +243,27 @@ def fit_recogniser(population: Population, *, with_reference: bool, n_trees: int
     forest.fit(
         rows,
         causes,
-        sample_weight=np.tile(even_weights(population.sources[is_visible], population.causes[is_visible]), 2),
+        sample_weight=np.tile(
+            balanced_source_weights(population.sources[is_visible], population.causes[is_visible]), 2
+        ),
     )
     names = tuple(map(str, forest.classes_))
     usual_load = float(np.median(population.loads_n_per_mm))
     simulated = np.tile(~population.by_hand[is_visible], 2)
     machines = np.concatenate([population.rigs[is_visible], -1 - population.rigs[is_visible]])[simulated]
-    labels = fit_label_space(within_reach(rows[simulated]).astype(np.float64), causes[simulated], machines)
+    labels = fit_label_space(
+        clipped_discriminant_input(rows[simulated]).astype(np.float64), causes[simulated], machines
+    )
     if with_reference:
-        return Recogniser(names, floor, Trees.of(forest), usual_load, labels)
+        return EffectClassifier(names, floor, ForestNodes.of(forest), usual_load, labels)
     even = np.full(len(names), 1.0 / len(names))
     linear = LinearDiscriminantAnalysis(solver="lsqr", shrinkage=LINEAR_SHRINKAGE, priors=even)
-    linear.fit(within_reach(rows), causes)
+    linear.fit(clipped_discriminant_input(rows), causes)
     rule = LinearRule(linear.coef_, linear.intercept_)
-    return Recogniser(names, floor, Trees.of(forest), usual_load, labels, rule)
+    return EffectClassifier(names, floor, ForestNodes.of(forest), usual_load, labels, rule)
 
 
-def even_weights(sources: NDArray[np.str_], causes: NDArray[np.str_]) -> FloatArray:
+def balanced_source_weights(sources: NDArray[np.str_], causes: NDArray[np.str_]) -> FloatArray:
     """Return weights of rows by which the sources of a cause count more alike than they have rows: n^(−`EVENNESS`).
 
     None of them shows an effect as it is; what they have in common is what holds for a machine.
@@ -273,7 +277,7 @@ def even_weights(sources: NDArray[np.str_], causes: NDArray[np.str_]) -> FloatAr
 def _is_visible(floor: StructuralFloor, changes: FloatArray, causes: NDArray[np.str_]) -> NDArray[np.bool_]:
     """Return which rows to learn from: an effect that changes nothing would only teach that nothing is that effect."""
     rows = floor.from_centre(floor.names, changes) / floor.of(floor.names)
-    sizes = np.array([soft_size(floor.names, row) for row in rows]) / floor.whole_of(floor.names)
+    sizes = np.array([soft_size(floor.names, row) for row in rows]) / floor.floor_size(floor.names)
     is_visible: NDArray[np.bool_] = (sizes > MIN_SIZE) | np.isin(causes, (NONE, UNKNOWN))
     return is_visible
 
@@ -297,7 +301,7 @@ def _learned(left_out: str) -> Learned:
             raise InputError("is missing or damaged", where=LEARNED_FILE.name, remedy="install gearsig again")
         return learned
     population = load_population()
-    code = modules_digest(f"gearsig.gap.{name}" for name in ("_change", "_features", "_floors", "_recognition"))
+    code = modules_digest(f"gearsig.gap.{name}" for name in ("_change", "_features", "_floors", "_classifier"))
     made_of = sha256(f"{modules_digest([__name__])} {code} {sha256_of(population_file())}".encode()).hexdigest()[:16]
     path = cache_folder("forests") / f"without_{left_out}-{made_of}.npz"
     kept = read_learned(path)

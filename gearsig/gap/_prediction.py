@@ -13,7 +13,7 @@ from gearsig.checks import FloatArray
 from gearsig.gap._features import Feature, jackknife_variance
 from gearsig.gap._floors import FLOOR_IN_DEVIATIONS, family_members, t_quantile
 from gearsig.gap._report import MIN_PREDICTED, Interval, Shrinkage
-from gearsig.gap._simulator import Added
+from gearsig.gap._simulator import AddedEffect
 from gearsig.rig import SIDES
 
 N_SEVERITIES = 41
@@ -130,9 +130,9 @@ class Fit:
     ways: Mapping[int, int]
 
     @property
-    def added(self) -> Added:
+    def added(self) -> AddedEffect:
         """The fitted setting."""
-        return Added(self.path.name, float(f"{self.severity.value:.4g}"), dict(self.path.options))
+        return AddedEffect(self.path.name, float(f"{self.severity.value:.4g}"), dict(self.path.options))
 
     def at(self, condition: int) -> FloatArray:
         """Return the predicted distances; at a condition that it was not fitted to, at the level of the others."""
@@ -151,7 +151,7 @@ class Fit:
 
 def paths_of(
     names: tuple[str, ...],
-    candidates: Sequence[Added],
+    candidates: Sequence[AddedEffect],
     distances: Sequence[FloatArray],
     levels_db: tuple[float, ...] = (0.0,),
 ) -> tuple[EffectPath, ...]:
@@ -161,7 +161,7 @@ def paths_of(
     ----------
     names : tuple of str
         Of the features.
-    candidates : sequence of Added
+    candidates : sequence of AddedEffect
     distances : sequence of arrays, (n_ways, n_candidates, n)
         One per condition.
     levels_db : tuple of float
@@ -308,7 +308,7 @@ _BANDS, _KURTOSIS = "floor.band.", "floor.kurtosis."
 _OF_A_PATTERN = ("prominence", "second", "kurtosis", "width", "below_mesh", "centroid")
 
 
-def transplanted(
+def predicted_on_baseline(
     names: Sequence[str],
     change: FloatArray,
     simulated: Mapping[str, float],
@@ -327,7 +327,7 @@ def transplanted(
     Parameters
     ----------
     names : sequence of str
-        Of the changes, see `change_once`; those of patterns last, or none.
+        Of the changes, see `change_feature_values`; those of patterns last, or none.
     change : array, (…, n)
         dB, with the effect less healthy, both simulated. `change.…`: the pattern's own value.
     simulated, real : mapping

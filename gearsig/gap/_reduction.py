@@ -20,7 +20,7 @@ from gearsig.prepared import MAINS_TOLERANCE, PreparedRecording, prepare
 from gearsig.recording import MAINS_HZ, Recording, metres_per_second_squared
 from gearsig.rig import GearPair, Rig
 from gearsig.severity import orders_from_mesh
-from gearsig.spectra import BEYOND_THE_ENDS, continuations
+from gearsig.spectra import BEYOND_THE_ENDS, reflected_ends
 
 # --------------------
 # The gear pair under study, with every order counted on its driver's shaft.
@@ -801,7 +801,7 @@ def _envelopes(
 
     n = len(residual)
     beyond = min(BEYOND_THE_ENDS, n - 1)
-    before, after = continuations(residual, beyond)
+    before, after = reflected_ends(residual, beyond)
     long = np.concatenate([before, residual, after])
     lines = rfft(long)
     m = 2 * next_fast_len(int(highest_cycle * n / n_per_rev) + 1)

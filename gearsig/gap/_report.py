@@ -11,7 +11,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 from gearsig.formatting import enumerated, odds_text, percent, readable
-from gearsig.gap._simulator import Added, GapEffect, OperatingCondition, same_load, same_speed
+from gearsig.gap._simulator import AddedEffect, GapEffect, OperatingCondition, same_load, same_speed
 from gearsig.results import Result, verdict_html
 
 _UNITS = {"um": "µm", "deg": "°", "g mm": "g·mm", "N m": "N·m", "m/s^2": "m/s²", "1": ""}
@@ -339,7 +339,7 @@ class GapCause(Result):
     severity : Interval or None
         With which the twin comes nearest, in the effect's unit; the interval is the fit's, and the machine's own may
         lie further off.
-    fitted : Added or None
+    fitted : AddedEffect or None
         The setting that fits best.
     place : str
         "tooth 7 of the driver", "bearing 2", "order 6"; empty where it has none.
@@ -357,7 +357,7 @@ class GapCause(Result):
     unit: str
     probability: float
     severity: Interval | None = None
-    fitted: Added | None = None
+    fitted: AddedEffect | None = None
     place: str = ""
     shrinkage: Shrinkage | None = None
     evidence: tuple[Evidence, ...] = ()
@@ -411,7 +411,7 @@ def shares_of(levels: Mapping[str, float]) -> dict[str, float]:
     return scaled({name: exp(level - top) for name, level in levels.items()})
 
 
-def rivals(causes: Sequence[GapCause]) -> tuple[str, ...]:
+def inseparable_effects(causes: Sequence[GapCause]) -> tuple[str, ...]:
     """Return the effects that cannot be told apart: the two likeliest, and more until they have `TOGETHER` of all.
 
     Parameters
@@ -606,12 +606,12 @@ class PathFacts:
         )
 
 
-def hardly_predicted(shrinkage: Shrinkage) -> str:
+def too_small_to_judge_text(shrinkage: Shrinkage) -> str:
     """Return what is said of an effect that the simulator does not make large enough to judge."""
     return f"hardly shows on the simulator at these conditions (at most {shrinkage.predicted or 0.0:.2g} floors)"
 
 
-def stance_words(evidence: Evidence) -> str:
+def evidence_direction_text(evidence: Evidence) -> str:
     """Return "speaks for it", "further than predicted" or "speaks against it"."""
     if evidence.speaks_for:
         return "speaks for it"
@@ -654,7 +654,8 @@ class GapReport(Result, rows="causes"):
     groups : mapping
         Group → probability; default: of the causes.
     inseparable : tuple of str or None
-        Causes that these recordings cannot tell apart, likeliest first; default: `rivals`, where the outcome says so.
+        Causes that these recordings cannot separate, likeliest first; default: `inseparable_effects`, where the outcome
+        says so.
     steps : tuple of GapStep
         Before, with each effect, what is left.
     next_recordings : tuple of NextRecording
@@ -707,7 +708,7 @@ class GapReport(Result, rows="causes"):
             groups = group_probabilities({name: cause.probability for name, cause in known.items()}, known)
             object.__setattr__(self, "groups", groups)
         if self.inseparable is None and self.outcome is GapOutcome.CANNOT_SEPARATE:
-            object.__setattr__(self, "inseparable", rivals(self.causes))
+            object.__setattr__(self, "inseparable", inseparable_effects(self.causes))
 
     @property
     def kind(self) -> GapKind | None:
@@ -850,7 +851,7 @@ SETTLED = 0.01
 """Probability of the second effect below which nobody needs a further recording to tell it from the first."""
 
 
-def is_settled(causes: Sequence[GapCause]) -> bool:
+def names_single_effect(causes: Sequence[GapCause]) -> bool:
     """Whether of all effects one alone is likely."""
     probabilities = sorted((c.probability for c in causes if c.is_effect), reverse=True)
     return len(probabilities) > 1 and probabilities[1] < SETTLED <= probabilities[0]
@@ -858,7 +859,13 @@ def is_settled(causes: Sequence[GapCause]) -> bool:
 
 def unbounded_fits(causes: Sequence[GapCause], outcome: GapOutcome) -> list[str]:
     """Say of what is named which effects the fit can give no size, not even tell from nothing at all."""
-    named = rivals(causes) if outcome is GapOutcome.CANNOT_SEPARATE else [causes[0].name] if outcome in NAMING else ()
+    named = (
+        inseparable_effects(causes)
+        if outcome is GapOutcome.CANNOT_SEPARATE
+        else [causes[0].name]
+        if outcome in NAMING
+        else ()
+    )
     return [
         f"{cause.title[0].upper()}{cause.title[1:]}: on the twin any severity fits the recordings about as well, none "
         "at all included. How the recordings changed speaks for it, the simulation does not."
@@ -890,7 +897,7 @@ def _shrinkage_text(report: GapReport) -> str:
     if report.outcome not in NAMING or shrinkage is None:
         return "How far: no effect was added."
     if not shrinkage.is_predicted:
-        return f"How far: not known; {report.causes[0].title} {hardly_predicted(shrinkage)}."
+        return f"How far: not known; {report.causes[0].title} {too_small_to_judge_text(shrinkage)}."
     s, sizes = shrinkage.shrink, f"from {shrinkage.before.value:.2g} to {shrinkage.after.value:.2g} structural floors"
     low, high = (f"{100 * end:.0f}" for end in (s.low, s.high))
     closed = percent(s.value) + (f" ({low} to {high} %)" if low != high else "")
@@ -942,7 +949,7 @@ def _next(report: GapReport) -> str:
     where_to_look = _common_place(report)
     look = f"look at {where_to_look}; " if where_to_look else ""
     why = "speed or load that was simulated would put the two likeliest effects further apart"
-    if is_settled(report.causes):
+    if names_single_effect(report.causes):
         why = "effect is likely enough to be told from this one by a further recording"
     return f"Next: {look}no other {why}."
 

@@ -33,7 +33,7 @@ class GapEffect:
     is_on_every_tooth : bool
         Whether it sits on all teeth of a gear, on each by itself.
     profile_varies_with : str
-        Name of its severity or of an option with which the course of its change over a tooth's engagement varies
+        Name of its severity or of an option with which the profile of its change over a tooth's engagement varies
         steadily, so that it can be interpolated; empty: it varies with nothing.
     turns_with_shaft : bool
         Whether it is a force that turns with a shaft, which of a linear machine makes the first order alone.
@@ -55,7 +55,7 @@ class GapEffect:
 
 
 @dataclass(frozen=True)
-class Added:
+class AddedEffect:
     """An effect that is switched on: severity in the effect's unit, and its options (gear, tooth, bearing, order)."""
 
     name: str
@@ -126,7 +126,7 @@ class Twin(Protocol):
     def run(
         self,
         point: OperatingCondition,
-        added: Sequence[Added] = (),
+        added: Sequence[AddedEffect] = (),
         *,
         seed: int,
         duration_s: float,
@@ -136,11 +136,11 @@ class Twin(Protocol):
         """Return a recording with the rig's geometry; another `noise` is another run of the same machine."""
         ...
 
-    def candidates(self, effect: str) -> Sequence[Added]:
+    def candidates(self, effect: str) -> Sequence[AddedEffect]:
         """Return settings of an effect worth a try on this machine, from barely noticeable to strong."""
         ...
 
-    def preset_toml(self, point: OperatingCondition, added: Sequence[Added], notes: Sequence[str]) -> str:
+    def preset_toml(self, point: OperatingCondition, added: Sequence[AddedEffect], notes: Sequence[str]) -> str:
         """Return the machine with the effects as a preset file that `gearsig simulate` runs."""
         ...
 
@@ -186,7 +186,7 @@ class CanRunUp(Protocol):
 class HasFurtherSettings(Protocol):
     """A twin that knows further settings of a tooth's fault, which take another profile over the engagement."""
 
-    def further_settings(self, effect: str) -> Sequence[Added]:
+    def further_settings(self, effect: str) -> Sequence[AddedEffect]:
         """Return those settings, beside the candidates; none where these show all there is."""
         ...
 
@@ -267,7 +267,7 @@ class DriveTwin(Protocol):
         """Torque of the open valve, and the driver's speed that the flow allows."""
         ...
 
-    def run(self, added: Sequence[Added] = ()) -> Recording:
+    def run(self, added: Sequence[AddedEffect] = ()) -> Recording:
         """Return a recording of some cycles, always with the same seed."""
         ...
 
@@ -288,11 +288,11 @@ class DriveTwin(Protocol):
         """
         ...
 
-    def crack_stiffness_loss(self, crack: Added) -> float:
+    def crack_stiffness_loss(self, crack: AddedEffect) -> float:
         """Return which part of its stiffness a cracked tooth loses."""
         ...
 
-    def preset_toml(self, added: Added, notes: Sequence[str]) -> str:
+    def preset_toml(self, added: AddedEffect, notes: Sequence[str]) -> str:
         """Return the drive with an effect as a preset file that `gearsig simulate` runs."""
         ...
 

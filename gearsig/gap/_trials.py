@@ -16,10 +16,10 @@ import numpy as np
 from gearsig.cache import keep, made_folder, modules_digest, read_arrays
 from gearsig.checks import FloatArray, positive
 from gearsig.errors import GearsigError, RefusalError
-from gearsig.gap._change import change_once
+from gearsig.gap._change import change_feature_values
 from gearsig.gap._conditions import SEED, Condition, observed, trial_length_s
 from gearsig.gap._evidence import SIGNS, SINGLE_TOOTH_FAULTS, TOOTH_FAULTS, determined_options
-from gearsig.gap._features import once, whole_and_parts
+from gearsig.gap._features import feature_values, whole_and_parts
 from gearsig.gap._floors import UNPREDICTED, gap_size, shown_in
 from gearsig.gap._places import RACES, SAME_ORDER
 from gearsig.gap._prediction import (
@@ -32,12 +32,12 @@ from gearsig.gap._prediction import (
     closed_shares,
     fit_effect,
     paths_of,
+    predicted_on_baseline,
     shrinkage,
-    transplanted,
 )
 from gearsig.gap._reduction import ComplexArray, GearFrame, ReducedRecording, reduce_recording, shaft_words
 from gearsig.gap._report import ConditionFacts, GapCause, GapPlace, GapStep, Interval, PlaceKind, Shrinkage
-from gearsig.gap._simulator import Added, GapEffect, HasFurtherSettings, OperatingCondition, Twin, as_tried
+from gearsig.gap._simulator import AddedEffect, GapEffect, HasFurtherSettings, OperatingCondition, Twin, as_tried
 from gearsig.gap._waveform import (
     BETWEEN,
     PROFILE_SCATTER,
@@ -74,7 +74,7 @@ class TwinRun:
         """What its runs depend on; twins need not hash."""
         return self.twin.key, self.point, self.duration_s, self.sampling_rate_hz
 
-    def reduced(self, added: Added | None) -> ReducedRecording:
+    def reduced(self, added: AddedEffect | None) -> ReducedRecording:
         """Return a run with an effect, or healthy, reduced."""
         recording = self.twin.run(
             self.point,
@@ -92,7 +92,7 @@ class Task:
     """One simulation with an effect, or healthy; each of the `further` channels is looked at by itself."""
 
     run: TwinRun
-    added: Added | None
+    added: AddedEffect | None
     further: tuple[str, ...] = ()
 
 
@@ -129,7 +129,7 @@ def finished_runs(
         return answers
     batches = [tasks[i : i + n_together] for i in range(0, len(tasks), n_together)]
     # A cluster's workers outlive a twin: what they know of its healthy runs is forgotten after each batch.
-    work = reduced_in_worker if active_cluster() is None else reduced_apart
+    work = reduced_in_worker if active_cluster() is None else reduce_in_worker
     done = 0
     for number, rows in run_jobs(work, batches, n_workers=processes, if_killed=_killed_batch):
         answers[number * n_together : number * n_together + len(rows)] = rows
@@ -142,7 +142,7 @@ def _killed_batch(tasks: Sequence[Task]) -> list[Reduced | str]:
     return [killed_text("simulated it") for _ in tasks]
 
 
-def run_for_a_moment(twin: Twin, added: Sequence[Added] = ()) -> None:
+def run_for_a_moment(twin: Twin, added: Sequence[AddedEffect] = ()) -> None:
     """Run a twin for no longer than it takes to see that it can, and that what it needs is loaded."""
     twin.run(twin.point, added, seed=SEED, duration_s=0.05, sampling_rate_hz=20480.0)
 
@@ -157,7 +157,7 @@ def reduced_in_worker(tasks: Sequence[Task]) -> list[Reduced | str]:
     return [_reduced(task, _KNOWN) for task in tasks]
 
 
-def reduced_apart(tasks: Sequence[Task]) -> list[Reduced | str]:
+def reduce_in_worker(tasks: Sequence[Task]) -> list[Reduced | str]:
     """Return what tasks give, in a process that works for several diagnoses."""
     known: Known = {}
     return [_reduced(task, known) for task in tasks]
@@ -173,13 +173,14 @@ def _reduced(task: Task, known: Known) -> Reduced | str:
         alone = {}
         if task.further:
             alone = {
-                name: change_once(now.of_channels([name]), healthy.of_channels([name]))[1] for name in healthy.channels
+                name: change_feature_values(now.of_channels([name]), healthy.of_channels([name]))[1]
+                for name in healthy.channels
             }
             of_the_rig = [name for name in healthy.channels if name not in task.further]
             now, healthy = now.of_channels(of_the_rig), healthy.of_channels(of_the_rig)
-        names, values = once(healthy) if task.added is None else ((), np.empty(0))
+        names, values = feature_values(healthy) if task.added is None else ((), np.empty(0))
         sidebands = mesh_sidebands(now, healthy, is_turned=False)
-        return Reduced(names, values, *change_once(now, healthy), sidebands, alone)
+        return Reduced(names, values, *change_feature_values(now, healthy), sidebands, alone)
     except GearsigError as error:
         return str(error)
 
@@ -214,11 +215,11 @@ class Bank:
     Parameters
     ----------
     feature_names : tuple of str
-        Of `healthy`; see `once`.
+        Of `healthy`; see `feature_values`.
     change_names : tuple of str
-        Of the changes, the features' names first; see `change_once`.
+        Of the changes, the features' names first; see `change_feature_values`.
     healthy : array, (n_features,)
-    added : tuple of Added
+    added : tuple of AddedEffect
         The candidates that could be simulated.
     changes : array, (n_added, n_changes)
         Each candidate's run against the healthy run.
@@ -229,14 +230,14 @@ class Bank:
     feature_names: tuple[str, ...]
     change_names: tuple[str, ...]
     healthy: FloatArray
-    added: tuple[Added, ...]
+    added: tuple[AddedEffect, ...]
     changes: FloatArray
     sidebands: ComplexArray
 
 
 def banks_of(
     runs: Sequence[TwinRun],
-    candidates: Mapping[str, Sequence[Added]],
+    candidates: Mapping[str, Sequence[AddedEffect]],
     *,
     folder: Path | None,
     processes: int = 2,
@@ -296,7 +297,7 @@ def rounded(point: OperatingCondition, n_digits: int = POINT_DIGITS) -> Operatin
     return OperatingCondition(*(float(f"{value:.{n_digits}g}") for value in (point.speed_rpm, point.torque_nm)))
 
 
-def bank_key(run: TwinRun, candidates: Sequence[Added]) -> str:
+def bank_key(run: TwinRun, candidates: Sequence[AddedEffect]) -> str:
     """Return all that a bank's numbers depend on, as text."""
     settings = [_plain(added) for added in candidates]
     lengths = [run.duration_s, run.sampling_rate_hz]
@@ -304,7 +305,7 @@ def bank_key(run: TwinRun, candidates: Sequence[Added]) -> str:
     return json.dumps(known, sort_keys=True)
 
 
-def _assembled(candidates: Sequence[Added], healthy: Reduced | str, rows: Sequence[Reduced | str]) -> Bank:
+def _assembled(candidates: Sequence[AddedEffect], healthy: Reduced | str, rows: Sequence[Reduced | str]) -> Bank:
     """Return a bank of the candidates that could be simulated."""
     if isinstance(healthy, str):
         raise RefusalError(f"the healthy machine cannot be simulated: {healthy}", remedy="check the rig file")
@@ -354,13 +355,13 @@ def read_bank(path: Path, key: str) -> Bank | None:
         if about["key"] != key:
             return None
         names, changes = map(tuple, about["names"])
-        added = tuple(Added(name, float(severity), options) for name, severity, options in about["added"])
+        added = tuple(AddedEffect(name, float(severity), options) for name, severity, options in about["added"])
         return Bank(names, changes, data["healthy"], added, data["changes"], data["sidebands"])
     except (ValueError, KeyError, TypeError, IndexError):
         return None
 
 
-def _plain(added: Added) -> list[Any]:
+def _plain(added: AddedEffect) -> list[Any]:
     return [added.name, added.severity, dict(added.options)]
 
 
@@ -397,7 +398,7 @@ class TriedEffect:
         return self.match is not None and self.match.is_good
 
     @property
-    def added(self) -> Added:
+    def added(self) -> AddedEffect:
         """The setting that comes nearest: by waveform where the twin shows it well."""
         return self.match.added if self.match is not None and self.match.is_good else self.fit.added
 
@@ -455,7 +456,7 @@ def try_effects(
     determined = {effect.name: determined_options(effect.name, changes, teeth) for effect in effects}
     folds = folds_of(conditions)
     where = " and ".join(c.facts.name for c in conditions)
-    candidates = {name: worth_simulating(twin.candidates(name), determined[name]) for name in determined}
+    candidates = {name: candidates_to_simulate(twin.candidates(name), determined[name]) for name in determined}
     settings = candidates
     if isinstance(twin, HasFurtherSettings) and any(condition.has_reference for condition in conditions):
         settings = {
@@ -496,7 +497,7 @@ def try_effects(
     }
 
 
-def worth_simulating(candidates: Sequence[Added], determined: Mapping[str, str]) -> list[Added]:
+def candidates_to_simulate(candidates: Sequence[AddedEffect], determined: Mapping[str, str]) -> list[AddedEffect]:
     """Return the candidates on the shaft that the recordings tell by themselves, and the strongest on the other one.
 
     That one serves as a placebo. All where nothing is told, or no candidate is there.
@@ -545,7 +546,9 @@ def _match(banks: Sequence[Bank], conditions: Sequence[Condition], effect: GapEf
     return waveform_match(joined, min(severities), max(severities), severity_scatter=scatter)
 
 
-def _settings(bank: Bank, effect: GapEffect, teeth: Sequence[int]) -> Iterator[tuple[Added, int, ComplexArray, int]]:
+def _settings(
+    bank: Bank, effect: GapEffect, teeth: Sequence[int]
+) -> Iterator[tuple[AddedEffect, int, ComplexArray, int]]:
     """Yield what waveforms are compared with: a setting, its gear, sidebands of that, and how many teeth have it.
 
     An effect that may sit on every tooth, each by itself, was simulated on one: that stands for itself and, the first
@@ -561,7 +564,7 @@ def _settings(bank: Bank, effect: GapEffect, teeth: Sequence[int]) -> Iterator[t
             yield added, side, sidebands, 0
         if effect.is_on_every_tooth and simulated:
             first, sidebands = simulated[0]
-            yield Added(first.name, first.severity, {"gear": SIDES[side]}), side, sidebands, teeth[side]
+            yield AddedEffect(first.name, first.severity, {"gear": SIDES[side]}), side, sidebands, teeth[side]
 
 
 def on_shaft(
@@ -600,7 +603,7 @@ def start_healthy_trial(twin: Twin, facts: ConditionFacts, now: ReducedRecording
 
 
 def _paths(
-    banks: Sequence[Bank], candidates: Sequence[Added], conditions: Sequence[Condition], shows_in: tuple[str, ...]
+    banks: Sequence[Bank], candidates: Sequence[AddedEffect], conditions: Sequence[Condition], shows_in: tuple[str, ...]
 ) -> tuple[EffectPath, ...]:
     """Return an effect's paths over the candidates that could be simulated at every condition."""
     n = n_compared(conditions)
@@ -611,7 +614,7 @@ def _paths(
     return paths_of(banks[0].change_names[:n], kept, tables, tuple(level for level, _ in WAYS_DB))
 
 
-def _distances(bank: Bank, kept: Sequence[Added], condition: Condition, shows_in: tuple[str, ...]) -> FloatArray:
+def _distances(bank: Bank, kept: Sequence[AddedEffect], condition: Condition, shows_in: tuple[str, ...]) -> FloatArray:
     """Return what candidates would change on the healthy machine's own baseline, (n_ways, n_candidates, n).
 
     Nothing where theory does not expect it: a simulation changes more, and that is its own.
@@ -630,7 +633,7 @@ def _distances(bank: Bank, kept: Sequence[Added], condition: Condition, shows_in
     real = dict(zip(base_names, baseline.tolist(), strict=True))
     repeated = dict(zip(floor.names, usual.tolist(), strict=True))
     changes = bank.changes[[bank.added.index(a) for a in kept], : len(compared)]
-    table = np.array([transplanted(compared, changes, simulated, real, repeated, *way) for way in WAYS_DB])
+    table = np.array([predicted_on_baseline(compared, changes, simulated, real, repeated, *way) for way in WAYS_DB])
     return np.where(shown_in(compared, shows_in), table, 0.0)
 
 
@@ -729,7 +732,7 @@ def _size(condition: Condition, scored: ObservedChange, explained: FloatArray, n
 # --------------------
 
 
-def place_of(added: Added, frame: GearFrame, places: Sequence[GapPlace]) -> str:
+def place_of(added: AddedEffect, frame: GearFrame, places: Sequence[GapPlace]) -> str:
     """Return "tooth 7 of the gear on the input shaft", "bearing 2", "order 6"; empty where the effect has no place.
 
     The tooth is that of the recording, not of the simulation, which stands for all.
@@ -787,11 +790,11 @@ def cause_place(
     if options or name not in SIGNS:
         is_of_one = name in SINGLE_TOOTH_FAULTS or (name in TOOTH_FAULTS and options["gear"] in gears)
         a_tooth = {"tooth": 1.0} if is_of_one else {}
-        return place_of(Added(name, 0.0, {**options, **a_tooth}) if tried is None else tried.added, frame, places)
+        return place_of(AddedEffect(name, 0.0, {**options, **a_tooth}) if tried is None else tried.added, frame, places)
     if tried is not None and _is_clear(tried, conditions):
         return place_of(tried.fit.added, frame, places)
     if name in TOOTH_FAULTS and len(gears) == 1:
-        return place_of(Added(name, 0.0, {"gear": gears.pop(), "tooth": 1.0}), frame, places)
+        return place_of(AddedEffect(name, 0.0, {"gear": gears.pop(), "tooth": 1.0}), frame, places)
     either = " or ".join(shaft_words(frame, side) for side in range(len(SIDES)))
     return f"{either} (which cannot be told)"
 
@@ -806,7 +809,7 @@ def _is_clear(tried: TriedEffect, conditions: Sequence[Condition]) -> bool:
     return len(costs) < len(SIDES) or max(costs) - min(costs) > INTERVAL_COST
 
 
-def at_its_tooth(added: Added, frame: GearFrame, places: Sequence[GapPlace]) -> Added:
+def at_recorded_tooth(added: AddedEffect, frame: GearFrame, places: Sequence[GapPlace]) -> AddedEffect:
     """Return the setting with the recording's tooth in place of the simulated one, where a mark gives it a number."""
     if "tooth" not in added.options:
         return added

@@ -34,7 +34,7 @@ from gearsig.checks import FloatArray
 from gearsig.gap._change import lines_of_shaft, turned_difference
 from gearsig.gap._reduction import ComplexArray, ReducedRecording
 from gearsig.gap._report import Interval
-from gearsig.gap._simulator import Added, GapEffect
+from gearsig.gap._simulator import AddedEffect, GapEffect
 from gearsig.rig import SIDES
 
 N_HARMONICS = 8
@@ -158,7 +158,7 @@ class SimulatedWaveform:
 
     Parameters
     ----------
-    added : Added
+    added : AddedEffect
     levels : array, (n_scales,)
         ln L over `LOG_SCALES`, averaged over turns, places and misfits; 0: as if it explained nothing.
     correlation : float
@@ -167,14 +167,14 @@ class SimulatedWaveform:
         ln of the simulated sidebands' rms over the observed ones'.
     """
 
-    added: Added
+    added: AddedEffect
     levels: FloatArray
     correlation: float
     log_size: float
 
 
 def compare_waveform(
-    added: Added,
+    added: AddedEffect,
     simulated: ComplexArray,
     observed: ComplexArray,
     noise: FloatArray,
@@ -187,7 +187,7 @@ def compare_waveform(
 
     Parameters
     ----------
-    added : Added
+    added : AddedEffect
     simulated, observed : arrays, (n_channels, n_harmonics, n_offsets)
     noise : array, as `observed`
         See `sideband_noise`.
@@ -286,13 +286,13 @@ def _log_mean(values: FloatArray, axis: int | None = None) -> FloatArray:
 # Profiles between those that were simulated.
 #
 # Where a spall ends, or a chip's edge lies, says which orders its two steps add up or cancel at: at the seventh mesh
-# harmonic a spall longer by a fiftieth of a pitch has another course. So fine no simulations lie.
+# harmonic a spall longer by a fiftieth of a pitch has another profile. So fine no simulations lie.
 # --------------------
 
 
 def with_profiles_between(
-    simulated: Sequence[tuple[Added, ComplexArray]], effect: GapEffect, n_teeth: int
-) -> Iterator[tuple[Added, ComplexArray]]:
+    simulated: Sequence[tuple[AddedEffect, ComplexArray]], effect: GapEffect, n_teeth: int
+) -> Iterator[tuple[AddedEffect, ComplexArray]]:
     """Yield the settings of one gear, and `BETWEEN` more between neighbours in what the effect's profile varies with.
 
     At the part s of the way, u = (1 − s) u₁ exp(2πj s δ o/z) + s u₂ exp(−2πj (1 − s) δ o/z) at order o: a mixture where
@@ -325,7 +325,7 @@ def with_profiles_between(
                 mixed: ComplexArray = (1.0 - share) * turned[0] + share * turned[1]
                 options = {**dict(others), option: value}
                 severity = float(options.pop(effect.severity_name))
-                yield Added(effect.name, severity, options), mixed
+                yield AddedEffect(effect.name, severity, options), mixed
 
 
 def _turn_between_rad(before: ComplexArray, after: ComplexArray, most_pitches: float, n_teeth: int) -> FloatArray:
@@ -355,7 +355,7 @@ class WaveformMatch:
         ρ, 0 to 1, of the likeliest setting at its turn.
     log_likelihood : float
         Mean over severities and other options: more freedom is no advantage. 0: nothing explained.
-    added : Added
+    added : AddedEffect
         The likeliest setting, at the middle of the severities.
     severity : Interval
         The likely ones: 90 %.
@@ -363,7 +363,7 @@ class WaveformMatch:
 
     correlation: float
     log_likelihood: float
-    added: Added
+    added: AddedEffect
     severity: Interval
 
     @property
@@ -409,7 +409,7 @@ def waveform_match(
     return WaveformMatch(
         max(waveform.correlation for waveform in best_group),
         level,
-        Added(best.added.name, severity, dict(best.added.options)),
+        AddedEffect(best.added.name, severity, dict(best.added.options)),
         interval,
     )
 

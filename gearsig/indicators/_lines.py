@@ -293,7 +293,7 @@ def shaft_indicators(
 
 
 def defect_orders(bearing: Bearing) -> dict[str, float]:
-    """Orders at which a defect knocks, per revolution of the bearing's shaft: BPFO, BPFI, 2×BSF, FTF.
+    """Orders at which a defect impacts, per revolution of the bearing's shaft: BPFO, BPFI, 2×BSF, FTF.
 
     A rolling element's defect strikes both races in one spin, hence twice the BSF.
     """

@@ -21,7 +21,7 @@ from gearsig.compiled import njit
 from gearsig.errors import InputError
 from gearsig.recording import SI_FACTORS, Channel, Recording, si_factor
 from gearsig.results import Result
-from gearsig.spectra import Spectrum, amplitude_spectrum, array_rate_hz, joined_ends, joined_length
+from gearsig.spectra import Spectrum, amplitude_spectrum, array_rate_hz, joined_length, with_continuous_ends
 
 # --------------------
 # The amplitude distribution.
@@ -452,7 +452,7 @@ def overall_indicators(
     spectrum : Spectrum or None
         The values' `amplitude_spectrum`, where it is known.
     transform : array or None
-        The `rfft` of `gearsig.spectra.joined_ends` of the values, where it is known.
+        The `rfft` of `gearsig.spectra.with_continuous_ends` of the values, where it is known.
     """
     from scipy.fft import irfft, rfft
 
@@ -465,7 +465,7 @@ def overall_indicators(
         yield Indicator("overall velocity", velocity, "mm/s", channel.name, "velocity", band=_band_text(band_hz))
     low_hz, high_hz = HIGH_BAND_HZ[0], min(HIGH_BAND_HZ[1], 0.45 * sampling_rate_hz)
     if channel.quantity in ("acceleration", "unknown") and high_hz > 2 * low_hz:
-        known = rfft(joined_ends(checked_values(values))) if transform is None else transform
+        known = rfft(with_continuous_ends(checked_values(values))) if transform is None else transform
         n = joined_length(len(values), len(known))
         inside = slice(ceil(low_hz * n / sampling_rate_hz), floor(high_hz * n / sampling_rate_hz) + 1)
         lines = np.zeros_like(known)

@@ -75,7 +75,7 @@ def _modes(
     )
     modes = prepared.keep((*place, settings), lambda: by_centre(vmd(signal, None, settings)))
     modes = replace(modes, offset=offset)
-    # The mode to look at is the one with the most impulsive waveform: damage knocks, meshing hums.
+    # The mode to look at is the one with the most impulsive waveform: damage impacts, meshing hums.
     impulses = [kurtosis(waveform) for waveform in modes.waveforms]
     chosen = int(np.argmax(impulses)) if mode is None else mode - 1
     if not 0 <= chosen < modes.n_modes:

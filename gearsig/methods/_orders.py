@@ -41,7 +41,7 @@ def _map_answer(prepared: PreparedRecording, channel: str, levels: OrderMap, hig
     caption = f"{over} map: spectra of consecutive blocks"
     cursors = cursors_of(prepared, levels)
     if highest is None and over == "order":
-        highest = plot.highest_of_interest(levels, cursors)
+        highest = plot.upper_axis_limit(levels, cursors)
     kept = levels.positions <= (np.inf if highest is None else highest)
     values, positions = levels.values[:, kept], levels.positions[kept]
     table = {"time (s)": levels.time_s, "speed (rpm)": levels.speed_rpm}

@@ -160,7 +160,7 @@ def _order_spectrum(
     prepared: PreparedRecording, channel: str, shaft: str, lowest: float | None, highest: float | None
 ) -> MethodAnswer:
     spectrum = order_spectrum(prepared.over_angle(shaft, [channel]), channel)
-    top = plot.highest_of_interest(spectrum, cursors_of(prepared, spectrum)) if highest is None else highest
+    top = plot.upper_axis_limit(spectrum, cursors_of(prepared, spectrum)) if highest is None else highest
     return _spectrum_answer(prepared, channel, spectrum, "order spectrum", lowest, top)
 
 

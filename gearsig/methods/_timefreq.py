@@ -90,7 +90,7 @@ def levels_of(
     if transform.endswith("cwt"):
         more["wavelet"] = wavelet_of(periods)
         end = float(signal.highest_valid) if highest is None else highest
-        lowest = max(lowest or end / 2**OCTAVES, timefreq.lowest_possible(signal, more["wavelet"]))
+        lowest = max(lowest or end / 2**OCTAVES, timefreq.lowest_analysable(signal, more["wavelet"]))
     elif window is not None:
         more["window_length"] = window
     if transform.startswith("squeezed"):

@@ -56,7 +56,7 @@ class RobustFit:
         i = self.names.index(name)
         return float(np.sqrt(max(self.covariance[i, i], 0.0)))
 
-    def most_like(self, name: str) -> tuple[str, float]:
+    def correlated_with(self, name: str) -> tuple[str, float]:
         """Return the parameter whose estimate nearly goes with this one, and their correlation; no name: none does."""
         i = self.names.index(name)
         deviations = np.sqrt(np.maximum(np.diag(self.covariance), 1e-300))
@@ -341,13 +341,13 @@ class FittedParameter:
     value : float
     interval : (float, float)
         95 %, from the curvature at the best fit and the residuals' dependence on each other.
-    is_told : bool
+    is_determined : bool
         Whether the record tells it: the interval's half width is below half of the value.
     why_not : str
         Else, why.
     rig_value : float or None
         What the rig file says.
-    most_like : str
+    correlated_with : str
         Parameter that could take its place, with the correlation of both estimates.
     """
 
@@ -355,10 +355,10 @@ class FittedParameter:
     unit: str
     value: float
     interval: tuple[float, float]
-    is_told: bool
+    is_determined: bool
     why_not: str = ""
     rig_value: float | None = None
-    most_like: str = ""
+    correlated_with: str = ""
 
 
 @dataclass(frozen=True)
@@ -556,11 +556,11 @@ def _parameter(
     value, half = fit.value(term), NORMAL_95 * fit.deviation(term)
     size = 1.0 if term == "log stiffness" else value if term in FALLING else abs(value)
     low, high = sorted((turned(value - half), turned(value + half)))
-    is_told = half < MAX_RELATIVE_HALF_WIDTH * size and not why_not
+    is_determined = half < MAX_RELATIVE_HALF_WIDTH * size and not why_not
     alike = _alike(fit, term)
     why = "the record hardly depends on it" + (f", and it is mistaken for {alike}" if alike else "")
     return FittedParameter(
-        name, unit, turned(value), (low, high), is_told, "" if is_told else why_not or why, rig_value, alike
+        name, unit, turned(value), (low, high), is_determined, "" if is_determined else why_not or why, rig_value, alike
     )
 
 
@@ -573,7 +573,7 @@ def _restitution(law: str, factor: float) -> float:
 
 def _alike(fit: RobustFit, parameter: str) -> str:
     """Return what could take a parameter's place, by the name that the result gives it; empty where nothing could."""
-    like, correlation = fit.most_like(parameter)
+    like, correlation = fit.correlated_with(parameter)
     if not like:
         return ""
     sign = -1.0 if (parameter in FALLING) != (like in FALLING) else 1.0
@@ -590,7 +590,7 @@ MIN_SAMPLES_PER_TOOTH = 4
 
 
 @dataclass(frozen=True)
-class YieldingTeeth(Result, columns=("extra_um", "uncertainty_um", "n_samples")):
+class ToothYielding(Result, columns=("extra_um", "uncertainty_um", "n_samples")):
     """How much more than the fitted contact each tooth of the driver yields, while it carries alone.
 
     Parameters
@@ -625,7 +625,7 @@ class YieldingTeeth(Result, columns=("extra_um", "uncertainty_um", "n_samples"))
         return float(1.0 - (1.0 + extra_um / self.deflection_um) ** -exponent)
 
 
-def tooth_compliance(motion: PairMotion) -> YieldingTeeth:
+def tooth_compliance(motion: PairMotion) -> ToothYielding:
     """Return the extra deflection of each tooth of the driver on the drive flank.
 
     The contact's equation is fitted to the whole record; what is left of the compression where one pair carries alone
@@ -666,7 +666,7 @@ def tooth_compliance(motion: PairMotion) -> YieldingTeeth:
     uncertainty = np.where(np.isnan(extra), np.nan, np.maximum(alone, among))
     known = float(np.log(motion.contact.stiffness_n_per_m_lambda))  # one flank hardly tells it from the angles' zero
     deflection = _deflection(equation, fit.value("log stiffness") if equation.has_both_flanks else known, single)
-    return YieldingTeeth(
+    return ToothYielding(
         1e6 * extra, 1e6 * uncertainty, 1e6 * deflection, counts, _weak_teeth(extra, uncertainty, deflection)
     )
 

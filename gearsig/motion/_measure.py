@@ -137,10 +137,10 @@ def check_turns(motion: PairMotion) -> None:
         If the machine stands.
     """
     check_motion(motion)
-    refuse_standing(motion.driver_angle_rad, motion.path, motion.contact, motion.sampling_rate_hz, motion.source)
+    check_driver_turns(motion.driver_angle_rad, motion.path, motion.contact, motion.sampling_rate_hz, motion.source)
 
 
-def refuse_standing(
+def check_driver_turns(
     driver_angle_rad: FloatArray, path: PathOfContact, contact: ToothContact, sampling_rate_hz: float, source: str
 ) -> None:
     """Refuse the angle of a driver that stands; see `check_turns`."""

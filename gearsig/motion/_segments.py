@@ -148,7 +148,7 @@ def motion_segments(
     shortest = max(2, round(0.03 * sampling_rate_hz))
     _absorb(directions, shortest)
     segments = _cut(directions, angle_rad, speed_rad_s, sampling_rate_hz)
-    # What turns by less than 2 % of the longest segment is a standing machine that is knocked, not started.
+    # What turns by less than 2 % of the longest segment is a standing machine that is struck, not started.
     min_turned_rad = 0.02 * max(abs(s.turned_rad) for s in segments)
     for segment in segments:
         if abs(segment.turned_rad) < min_turned_rad:

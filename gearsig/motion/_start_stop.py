@@ -11,7 +11,7 @@ from gearsig.errors import answer_or_none
 from gearsig.indicators import Indicator
 from gearsig.motion._backlash import BacklashEstimate, TorqueTwist, estimate_backlash, torque_twist
 from gearsig.motion._force import find_datum
-from gearsig.motion._identify import YieldingTeeth, tooth_compliance
+from gearsig.motion._identify import ToothYielding, tooth_compliance
 from gearsig.motion._impacts import Impact, find_impacts
 from gearsig.motion._measure import PairMotion, check_turns
 from gearsig.motion._segments import MotionSegments, motion_segments
@@ -48,7 +48,7 @@ class StartStop(Result, rows="impacts"):
     impacts: tuple[Impact, ...]
     loop: TorqueTwist | None
     portrait: PhasePortrait | None
-    teeth: YieldingTeeth | None
+    teeth: ToothYielding | None
     indicators: tuple[Indicator, ...]
     refusals: tuple[str, ...]
     notes: tuple[str, ...] = ()
@@ -83,7 +83,7 @@ def examine_start_stop(motion: PairMotion) -> StartStop:
         impacts = answer_or_none(find, "impacts", refusals) or ()
         if motion.torque_nm is not None:
             loop = torque_twist(motion, segments, datum)
-    teeth: YieldingTeeth | None = None
+    teeth: ToothYielding | None = None
     if motion.torque_nm is not None:
         teeth = answer_or_none(lambda: tooth_compliance(motion), "stiffness of single teeth", refusals)
     indicators = start_stop_indicators(motion, segments, backlash, impacts, loop)

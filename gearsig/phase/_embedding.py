@@ -11,7 +11,7 @@ import numpy as np
 from gearsig.checks import FloatArray, count, freeze, positive, within
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import percent, seconds_text
-from gearsig.phase._neighbours import IndexArray, nearest_apart, spaced
+from gearsig.phase._neighbours import IndexArray, evenly_spaced_indices, nearest_beyond_theiler_window
 from gearsig.phase._plane import PhasePortrait, checked_series, mean_period_samples
 from gearsig.recording import Recording
 from gearsig.results import Result
@@ -386,7 +386,7 @@ def embedding_dimension(
             remedy=f"record at least {100 + 2 * window + largest * tau} samples, or lower the largest dimension",
         )
     x = (x - x.mean()) / x.std()
-    library, references = spaced(n, N_LIBRARY), spaced(n, N_REFERENCES)
+    library, references = evenly_spaced_indices(n, N_LIBRARY), evenly_spaced_indices(n, N_REFERENCES)
     finest = float(np.diff(np.unique(x[library])).min())
     steps = [_step(x, tau, d, library, references, window, finest) for d in range(1, largest + 1)]
     false_fraction = np.array([step[0] for step in steps])
@@ -416,7 +416,7 @@ def _step(
     vectors = delay_vectors(x, tau, d)
     steps = []
     for norm in (2.0, np.inf):  # Kennel's distance, then Cao's
-        distance, near = nearest_apart(vectors, library, references, window, norm, equal_counts=True)
+        distance, near = nearest_beyond_theiler_window(vectors, library, references, window, norm, equal_counts=True)
         known = near >= 0
         r = np.maximum(distance[known], finest)
         steps.append((r, np.abs(x[references[known] + d * tau] - x[near[known] + d * tau])))

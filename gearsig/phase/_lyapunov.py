@@ -11,7 +11,7 @@ from gearsig.checks import FloatArray, count, freeze, limits, one_of
 from gearsig.compiled import njit
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import percent
-from gearsig.phase._neighbours import GOLDEN, IndexArray, nearest_apart, spaced
+from gearsig.phase._neighbours import GOLDEN, IndexArray, evenly_spaced_indices, nearest_beyond_theiler_window
 from gearsig.phase._plane import PhasePortrait, check_portrait, checked_series, mean_period_samples
 from gearsig.results import Result
 
@@ -96,7 +96,7 @@ def rosenstein(points: FloatArray, theiler: int, n_steps: int, *, across: bool =
     exponents from small data sets*, Physica D 65 (1993).
     """
     library, references = _library(points, n_steps)
-    _, near = nearest_apart(points, library, references, theiler)
+    _, near = nearest_beyond_theiler_window(points, library, references, theiler)
     references, near = references[near >= 0], near[near >= 0]
     block = _blocks(references, len(points))
     sums, counts = np.zeros((N_BLOCKS, n_steps)), np.zeros((N_BLOCKS, n_steps))
@@ -134,7 +134,7 @@ def kantz(points: FloatArray, theiler: int, n_steps: int) -> Divergence:
 def _library(points: FloatArray, n_steps: int) -> tuple[IndexArray, IndexArray]:
     """Points that can be followed for all steps: a mean over ever fewer pairs would bend the curve."""
     n = len(points) - n_steps - 2
-    return 1 + spaced(n, N_LIBRARY), 1 + spaced(n, N_REFERENCES)
+    return 1 + evenly_spaced_indices(n, N_LIBRARY), 1 + evenly_spaced_indices(n, N_REFERENCES)
 
 
 def _blocks(references: IndexArray, n: int) -> IndexArray:
@@ -144,7 +144,7 @@ def _blocks(references: IndexArray, n: int) -> IndexArray:
 def _unrelated_log_distance(points: FloatArray, theiler: int, *, last_axis: bool) -> float:
     """Mean logarithm of the distance of points far apart in time: pairs by the golden ratio, spread over all delays."""
     n = len(points)
-    firsts = spaced(n, N_UNRELATED)
+    firsts = evenly_spaced_indices(n, N_UNRELATED)
     seconds = (firsts + 1 + theiler + ((np.arange(len(firsts)) * GOLDEN) % 1.0 * (n - 2 * theiler - 2))) % n
     difference = points[firsts] - points[seconds.astype(np.intp)]
     distance = np.abs(difference[:, -1]) if last_axis else np.linalg.norm(difference, axis=1)

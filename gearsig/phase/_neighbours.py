@@ -19,12 +19,12 @@ GOLDEN = 0.6180339887498949
 """Fractional part of the golden ratio: k times it, modulo one, is spread evenly whatever the number of k."""
 
 
-def spaced(n: int, n_max: int) -> IndexArray:
+def evenly_spaced_indices(n: int, n_max: int) -> IndexArray:
     """Return at most `n_max` indices spread evenly over 0 to n - 1."""
     return np.unique(np.linspace(0, n - 1, min(n, n_max)).astype(np.intp))
 
 
-def nearest_apart(
+def nearest_beyond_theiler_window(
     points: FloatArray,
     library: IndexArray,
     references: IndexArray,

@@ -460,7 +460,7 @@ def bifurcation_diagram(
     )
 
 
-def values_apart(up: BifurcationDiagram, down: BifurcationDiagram, *, differs: float = DIFFERS) -> FloatArray:
+def coexistence_values(up: BifurcationDiagram, down: BifurcationDiagram, *, differs: float = DIFFERS) -> FloatArray:
     """Return the values at which two branches hold different motions, (n,): coexisting attractors, hysteresis.
 
     |s_up − s_down| > 0.1 max(s_up, s_down), with s the standard deviation of the path along the drawn axis.
@@ -512,7 +512,7 @@ class TwoMotions:
 def coexistence_ranges(
     up: BifurcationDiagram, down: BifurcationDiagram, *, differs: float = DIFFERS
 ) -> tuple[TwoMotions, ...]:
-    """Return the ranges in which two motions coexist, ascending; see `values_apart` for when they do.
+    """Return the ranges in which two motions coexist, ascending; see `coexistence_values` for when they do.
 
     Where a range begins and ends is known to half a step only, and how wide it is depends on the sweep: a jump back
     needs a sweep that goes far enough to lose each motion.
@@ -520,10 +520,10 @@ def coexistence_ranges(
     Raises
     ------
     InputError
-        As `values_apart`.
+        As `coexistence_values`.
     """
     values = np.intersect1d(up.values, down.values)
-    apart = np.isin(values, values_apart(up, down, differs=differs))
+    apart = np.isin(values, coexistence_values(up, down, differs=differs))
     steps = np.diff(np.concatenate([[False], apart, [False]]).astype(int))
     half = 0.5 * step_of(up, down)
     ranges = []

@@ -7,7 +7,6 @@ from gearsig.plot._cursors import (
     PRIORITY,
     AngleMark,
     Cursor,
-    highest_of_interest,
     importance,
     marks_of,
     modulation_cursors,
@@ -15,6 +14,7 @@ from gearsig.plot._cursors import (
     order_cursors,
     place,
     rig_cursors,
+    upper_axis_limit,
 )
 from gearsig.plot._fe_gear import (
     draw_shaded,
@@ -94,7 +94,7 @@ from gearsig.plot._phase import (
     phase_portrait_figure,
     recurrence_figure,
 )
-from gearsig.plot._pictures import Captioned, Picture, embed, figure_svg, svg_panel, svg_ring, trend_panel
+from gearsig.plot._pictures import CaptionedFigure, Picture, embed, figure_svg, svg_panel, svg_ring, trend_panel
 from gearsig.plot._spectrum import (
     METHODS,
     displayed_values,
@@ -126,7 +126,7 @@ from gearsig.plot._style import (
     decibels,
     envelope,
     font_folder,
-    is_sound,
+    is_sound_pressure,
     level_colours,
     level_name,
     new_figure,
@@ -149,7 +149,7 @@ __all__ = [
     "PRIORITY",
     "QUIET",
     "AngleMark",
-    "Captioned",
+    "CaptionedFigure",
     "ChartLine",
     "ChartRow",
     "Cursor",
@@ -202,10 +202,9 @@ __all__ = [
     "gear_mesh_figure",
     "gear_modes_figure",
     "gear_stress_figure",
-    "highest_of_interest",
     "impacts_figure",
     "importance",
-    "is_sound",
+    "is_sound_pressure",
     "kurtogram",
     "kurtogram_figure",
     "level_colours",
@@ -261,6 +260,7 @@ __all__ = [
     "track_orders",
     "tracked_panel",
     "trend_panel",
+    "upper_axis_limit",
     "value_limits",
     "vmd",
     "with_unit",

@@ -131,7 +131,7 @@ def rig_cursors(
 WITHOUT_MESH = 50.0  # highest order shown where no mesh is known
 
 
-def highest_of_interest(shown: Spectrum | OrderMap, cursors: Iterable[Cursor]) -> float:
+def upper_axis_limit(shown: Spectrum | OrderMap, cursors: Iterable[Cursor]) -> float:
     """Return where a spectrum or map may end: past the third harmonic of the fastest mesh among its cursors.
 
     Where there is none, one over orders may end at 50, one over frequency at its own end.

@@ -71,7 +71,7 @@ class Picture:
 
 
 @dataclass(frozen=True)
-class Captioned:
+class CaptionedFigure:
     """A figure with the words that belong to it; see `Picture`."""
 
     figure: Figure

@@ -46,7 +46,7 @@ def decibels(values: FloatArray, scaling: Scaling, unit: str = "") -> FloatArray
     """
     factor = 10.0 if scaling in ("power", "power density") else 20.0
     result: FloatArray = factor * np.log10(above_zero(values))
-    if not is_sound(unit):
+    if not is_sound_pressure(unit):
         return result
     return result - 20.0 * log10(SOUND_REFERENCE_PA) - (10.0 * log10(2.0) if scaling == "amplitude peak" else 0.0)
 
@@ -70,13 +70,13 @@ def decibel_text(unit: str) -> str:
     >>> decibel_text("m/s^2"), decibel_text("Pa"), decibel_text("Pa^2/Hz"), decibel_text("")
     ('dB re 1 m/s²', 'dB re 20 µPa', 'dB re (20 µPa)²/Hz', 'dB re 1')
     """
-    if is_sound(unit):
+    if is_sound_pressure(unit):
         reference = "20 µPa" if unit == "Pa" else "(20 µPa)"  # of amplitudes; of powers, squared
         return f"dB re {unit_text(unit.replace('Pa', reference))}"
     return f"dB re 1 {unit_text(unit)}".rstrip()
 
 
-def is_sound(unit: str) -> bool:
+def is_sound_pressure(unit: str) -> bool:
     """Whether values are sound pressures, or powers of them."""
     return unit.partition("^2")[0] == "Pa"
 

@@ -149,7 +149,7 @@ WANDERS = 0.02
 def _refuse_a_wandering_speed(recording: Recording, stated: ShaftAngle) -> None:
     """Refuse a constant speed where a rotor's own line runs through a range of speeds, from block to block steadily.
 
-    Lines over the angle of a constant speed would be smeared, and what does not show in them would be called sound.
+    Lines over the angle of a constant speed would be smeared, and what does not show in them would be called healthy.
     """
     from scipy.fft import rfft
 

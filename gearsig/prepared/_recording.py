@@ -27,7 +27,7 @@ from gearsig.prepared._angle import phase_followed_angle, refined_angle
 from gearsig.prepared._lines import LinesOverFloor, lines_over_noise_floor
 from gearsig.recording import ChannelProblem, Recording, check_recording, find_problems
 from gearsig.rig import PulseTimes, Rig, TachometerChannel, check_rig, known_ratio
-from gearsig.spectra import Spectrum, amplitude_spectrum, ends_meet, fast_length, joined_ends, power_density
+from gearsig.spectra import Spectrum, amplitude_spectrum, ends_meet, fast_length, power_density, with_continuous_ends
 
 T = TypeVar("T")
 
@@ -272,7 +272,7 @@ class PreparedRecording:
         return self.keep(("transform", channel), lambda: read_only(rfft(self.fast_part.values(channel))))
 
     def joined_transform(self, channel: str) -> NDArray[np.complexfloating]:
-        """Return the `rfft` of the channel with its ends joined, from which bands are cut, see `joined_ends`.
+        """Return the `rfft` of the channel with its ends joined, from which bands are cut, see `with_continuous_ends`.
 
         All vibration channels are continued where one must be, so that their envelopes are of one length.
         """
@@ -282,7 +282,8 @@ class PreparedRecording:
         if self.keep("ends meet", lambda: all(ends_meet(part.values(name)) for name in part.vibration_names())):
             return self.transform(channel)
         return self.keep(
-            ("joined transform", channel), lambda: read_only(rfft(joined_ends(part.values(channel), continued=True)))
+            ("joined transform", channel),
+            lambda: read_only(rfft(with_continuous_ends(part.values(channel), continued=True))),
         )
 
     def spectrum(self, channel: str) -> Spectrum:

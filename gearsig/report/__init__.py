@@ -6,10 +6,10 @@ from gearsig.report._comparison import (
     comparison_page,
     comparison_text,
     comparison_to_json,
-    doubt_text,
     mesh_cursors,
     orders_csv,
     shown_orders,
+    tooth_warning_text,
 )
 from gearsig.report._files import (
     Section,
@@ -73,7 +73,7 @@ from gearsig.report._motion import (
 )
 from gearsig.report._page import (
     bearing_cursors,
-    circled_text,
+    circle_legend,
     highest_order_of_interest,
     is_of_sidebands,
     level_panel,
@@ -122,13 +122,12 @@ __all__ = [
     "channel_rows",
     "check_pdf",
     "check_writable",
-    "circled_text",
+    "circle_legend",
     "comparison_page",
     "comparison_text",
     "comparison_to_json",
     "condition_advice",
     "condition_rows",
-    "doubt_text",
     "entry_of",
     "finding_card",
     "finding_cards",
@@ -182,6 +181,7 @@ __all__ = [
     "start_stop_json",
     "start_stop_text",
     "step_rows",
+    "tooth_warning_text",
     "verdict_picture",
     "verdict_rows",
     "write_answer",

@@ -16,12 +16,12 @@ from gearsig.comparison import (
     LevelPair,
     LineLevel,
     RecordFacts,
-    Repeated,
+    RepeatableValue,
     ShaftComparison,
     differing_lines,
     differing_tooth,
     mesh_lines,
-    missing_words,
+    missing_line_text,
 )
 from gearsig.formatting import (
     csv_rows,
@@ -35,7 +35,7 @@ from gearsig.formatting import (
     unit_text,
     with_minus,
 )
-from gearsig.plot import Captioned, Cursor, Picture, embed
+from gearsig.plot import CaptionedFigure, Cursor, Picture, embed
 from gearsig.report._files import date_text, render
 from gearsig.report._json import Layout, document, plain
 from gearsig.report._sections import Rows
@@ -68,7 +68,7 @@ def channel_pictures(comparison: Comparison, channel: ChannelComparison) -> Iter
             yield embed(picture.figure, picture.caption, picture.alternative)
 
 
-def order_figures(comparison: Comparison, channel: ChannelComparison) -> Iterator[Captioned]:
+def order_figures(comparison: Comparison, channel: ChannelComparison) -> Iterator[CaptionedFigure]:
     """Yield both order spectra with the differences of their lines."""
     from gearsig.plot import order_overlay_figure
 
@@ -81,30 +81,30 @@ def order_figures(comparison: Comparison, channel: ChannelComparison) -> Iterato
         title=f"Order spectra, {channel.name}",
     )
     shows = f"Order spectra of {channel.name}, recorded and simulated, and the difference of their lines."
-    yield Captioned(figure, LOOK_AT_ORDERS, shows)
+    yield CaptionedFigure(figure, LOOK_AT_ORDERS, shows)
 
 
-def angle_figures(comparison: Comparison, channel: ChannelComparison) -> Iterator[Captioned]:
+def angle_figures(comparison: Comparison, channel: ChannelComparison) -> Iterator[CaptionedFigure]:
     """Yield the synchronous averages of each shaft."""
     for shaft in channel.shafts:
         yield _average(comparison, channel, shaft)
 
 
-def band_figures(comparison: Comparison, channel: ChannelComparison) -> Iterator[Captioned]:
+def band_figures(comparison: Comparison, channel: ChannelComparison) -> Iterator[CaptionedFigure]:
     """Yield the bands over order, and the third octaves."""
     from gearsig.plot import band_levels_figure
 
     del comparison  # a maker of figures is given it, and this one needs none of it
     figure = band_levels_figure(channel.order_bands, channel.unit, title=f"Bands over order, {channel.name}")
     shows = f"Levels of bands over order of {channel.name}, recorded and simulated, and their agreement."
-    yield Captioned(figure, LOOK_AT_BANDS, shows)
+    yield CaptionedFigure(figure, LOOK_AT_BANDS, shows)
     if channel.third_octaves:
         figure = band_levels_figure(channel.third_octaves, channel.unit, title=f"Third octaves, {channel.name}")
         shows = f"Third-octave levels of {channel.name}, recorded and simulated."
-        yield Captioned(figure, LOOK_AT_OCTAVES, shows)
+        yield CaptionedFigure(figure, LOOK_AT_OCTAVES, shows)
 
 
-FIGURES: dict[str, Callable[[Comparison, ChannelComparison], Iterator[Captioned]]] = {
+FIGURES: dict[str, Callable[[Comparison, ChannelComparison], Iterator[CaptionedFigure]]] = {
     "Orders": order_figures,
     "Angle": angle_figures,
     "Bands": band_figures,
@@ -112,7 +112,7 @@ FIGURES: dict[str, Callable[[Comparison, ChannelComparison], Iterator[Captioned]
 """Makers of a channel's figures, by what they are over."""
 
 
-def _average(comparison: Comparison, channel: ChannelComparison, shaft: ShaftComparison) -> Captioned:
+def _average(comparison: Comparison, channel: ChannelComparison, shaft: ShaftComparison) -> CaptionedFigure:
     from gearsig.plot import average_overlay_figure
 
     name = shaft.shaft or "the shaft"
@@ -126,17 +126,17 @@ def _average(comparison: Comparison, channel: ChannelComparison, shaft: ShaftCom
     )
     look = f"One mean revolution of {name}, aligned; below it a piece of it enlarged.{_teeth_text(comparison, shaft)}"
     shows = f"Synchronous averages of {name}, recorded and simulated, over one revolution."
-    return Captioned(figure, look, shows)
+    return CaptionedFigure(figure, look, shows)
 
 
 def _teeth_text(comparison: Comparison, shaft: ShaftComparison) -> str:
     """Say what the panel of teeth shows, and when it shows nothing."""
     if not shaft.tooth_levels:
         return ""
-    return f" {LOOK_AT_TEETH}{doubt_text(comparison, shaft.shaft)}"
+    return f" {LOOK_AT_TEETH}{tooth_warning_text(comparison, shaft.shaft)}"
 
 
-def doubt_text(comparison: Comparison, shaft: str) -> str:
+def tooth_warning_text(comparison: Comparison, shaft: str) -> str:
     """Say where teeth of both records may not be the same at an angle; empty where they are."""
     is_doubted = any(alignment.is_doubted for alignment in comparison.alignments if alignment.shaft == shaft)
     return " Which tooth of the simulation is which of the recording cannot be told here." if is_doubted else ""
@@ -251,7 +251,7 @@ def _channel_table(comparison: Comparison, channel: ChannelComparison) -> list[s
     rows = [f"{channel.name:<30} {'recorded':>10} {'simulated':>10} {'difference':>11}   (dB{unit}, rms; {SCATTER})"]
     rows.append(_level_row("overall", channel.overall))
     lines = (*mesh_lines(channel)[:12], *differing_lines(channel)[:6])
-    rows += [_level_row(line.label, line.level, missing_words(line)) for line in lines]
+    rows += [_level_row(line.label, line.level, missing_line_text(line)) for line in lines]
     tooth = differing_tooth(channel, comparison.alignments)
     if tooth is not None:
         beside = f"the other teeth {signed(tooth.level.difference_db - tooth.off_db)}" if tooth.is_beside_others else ""
@@ -355,7 +355,7 @@ def _possible(shaft: ShaftComparison) -> str:
 def _line_row(line: LineLevel) -> dict[str, object]:
     """Return a level as the page shows it."""
     texts = dict(zip(("recorded", "simulated", "difference", "scatter"), _level_texts(line.level), strict=True))
-    about = {"label": line.label, "order": readable(line.order, 6), "note": missing_words(line)}
+    about = {"label": line.label, "order": readable(line.order, 6), "note": missing_line_text(line)}
     return {**about, **texts, "is_beyond": line.level.is_beyond}
 
 
@@ -385,11 +385,11 @@ def _difference(level: LevelPair) -> str:
     return f"{plus_minus(level.difference_db, BEYOND * level.repeatability_db, with_sign=True)} dB"
 
 
-def _repeated(figure: Repeated) -> str:
+def _repeated(figure: RepeatableValue) -> str:
     return plus_minus(figure.value, BEYOND * figure.repeatability, 3)
 
 
-def _percent(figure: Repeated) -> str:
+def _percent(figure: RepeatableValue) -> str:
     return f"{plus_minus(100 * figure.value, 100 * BEYOND * figure.repeatability)} %"
 
 

@@ -102,8 +102,8 @@ def _safe(source: str) -> str:
 
 def _unique(name: str, taken: set[str], present: Mapping[str, tuple[str, str]], mark: str) -> str:
     """Return the first free name, or that of the page of this mark; the names `taken` are lower case and grow."""
-    named_alike = re.compile(rf"{re.escape(name)}(-\d+)?", re.IGNORECASE)
-    pages = [page for page, of in present.values() if of == mark and named_alike.fullmatch(page)]
+    with_matching_channel_names = re.compile(rf"{re.escape(name)}(-\d+)?", re.IGNORECASE)
+    pages = [page for page, of in present.values() if of == mark and with_matching_channel_names.fullmatch(page)]
     choice = next((page for page in pages if page.lower() not in taken), name)
     number = 1
     while choice.lower() in taken or (choice not in pages and choice.lower() in present):

@@ -30,12 +30,12 @@ from gearsig.gap import (
     Shrinkage,
     SpectrumCurves,
     against_reference,
-    hardly_predicted,
+    evidence_direction_text,
     lines_beyond,
     point_text,
     same_condition,
     severity_unit,
-    stance_words,
+    too_small_to_judge_text,
 )
 from gearsig.processes import begin
 from gearsig.report._files import render
@@ -219,7 +219,7 @@ def _statements(shrinkage: Shrinkage | None) -> tuple[str, ...]:
     if shrinkage is None:
         return ("It was not fitted: no held-out check.",)
     if not shrinkage.is_predicted:
-        return (f"How far the gap shrinks is not known: it {hardly_predicted(shrinkage)}.",)
+        return (f"How far the gap shrinks is not known: it {too_small_to_judge_text(shrinkage)}.",)
     before, after = interval_text(shrinkage.before), interval_text(shrinkage.after)
     shrink, wrong = shrinkage.shrink, shrinkage.placebo
     taken, low, high = (percent(x) for x in (shrink.value, shrink.low, shrink.high))
@@ -255,7 +255,7 @@ def _evidence_row(evidence: Evidence) -> EvidenceRow:
     look = ("✓", "for") if evidence.speaks_for else ("↗", "further") if evidence.is_further else ("✗", "against")
     predicted, observed = signed(evidence.predicted_db), signed(evidence.observed_db)
     floor = readable(evidence.floor_db, 2)
-    return EvidenceRow(evidence.feature, predicted, observed, floor, stance_words(evidence), *look)
+    return EvidenceRow(evidence.feature, predicted, observed, floor, evidence_direction_text(evidence), *look)
 
 
 def group_texts(report: GapReport) -> tuple[str, ...]:

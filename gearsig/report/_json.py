@@ -26,7 +26,7 @@ from gearsig.diagnosis import Analysis, CannotTell, ChannelAnalysis, LongAnalysi
 from gearsig.errors import InputError
 from gearsig.formatting import rounded
 from gearsig.gap import (
-    Added,
+    AddedEffect,
     AngleCurves,
     AverageCurves,
     ConditionFacts,
@@ -409,7 +409,7 @@ GAP_LAYOUTS = {
     GapReport: Layout({"repeatability": "size_in_repeatability_floors"}, null_if_empty=("twin_toml",)),
     ConditionFacts: Layout(inline=("point",)),
     GapPlace: Layout({"repeatability": "change_in_repeatability_floors", "structural": "change_in_structural_floors"}),
-    Added: Layout({"name": "effect"}),
+    AddedEffect: Layout({"name": "effect"}),
     Shrinkage: Layout({"placebo": "placebo_shrink", "elsewhere": "shrink_elsewhere"}),
     NextRecording: Layout(
         {"standard_deviations": "distance_in_structural_floors", "now": "distance_now_in_structural_floors"},

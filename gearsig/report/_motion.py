@@ -119,8 +119,8 @@ def force_csv(estimate: ForceEstimate) -> str:
 # known is null. Members may be added within a version, never renamed or removed.
 #
 # - ``schema``: "gearsig.identify", ``schema_version``: 1, ``gearsig_version``, ``source``
-# - ``parameters``: each with ``name``, ``unit``, ``value``, ``low``, ``high`` (95 %), ``is_told``, ``why_not``,
-#   ``rig_value``, ``most_like``
+# - ``parameters``: each with ``name``, ``unit``, ``value``, ``low``, ``high`` (95 %), ``is_determined``, ``why_not``,
+#   ``rig_value``, ``correlated_with``
 # - ``equations``: each with ``name``, ``text``, ``condition``
 
 
@@ -129,12 +129,16 @@ def identify_text(identification: Identification) -> str:
     lines = [f"{identification.source or 'recording'}: parameters with 95 % intervals", ""]
     lines += [f"{name} equation: {text}" for name, text in identification.equations.items()]
     lines += ["", f"{'parameter':<26} {'value':>11} {'from':>11} {'to':>11} {'rig':>11}  unit"]
-    lines += [_row(p) for p in identification.parameters if p.is_told]
-    untold = [p for p in identification.parameters if not p.is_told]
+    lines += [_row(p) for p in identification.parameters if p.is_determined]
+    untold = [p for p in identification.parameters if not p.is_determined]
     if untold:
         lines += ["", "Cannot be told from this record"]
         lines += [fill(f"{p.name}: {p.why_not}", WIDTH, initial_indent="  ", subsequent_indent="    ") for p in untold]
-    alike = [f"{p.name} moves with {p.most_like}" for p in identification.parameters if p.is_told and p.most_like]
+    alike = [
+        f"{p.name} moves with {p.correlated_with}"
+        for p in identification.parameters
+        if p.is_determined and p.correlated_with
+    ]
     if alike:
         lines += ["", fill(f"Told together rather than each by itself: {'; '.join(alike)}.", WIDTH)]
     return "\n".join(lines)
@@ -145,7 +149,7 @@ def identify_json(identification: Identification) -> str:
     parameters = [
         members(p, "name", "unit", "value")
         | {"low": p.interval[0], "high": p.interval[1]}
-        | members(p, "is_told", "why_not", "rig_value", "most_like")
+        | members(p, "is_determined", "why_not", "rig_value", "correlated_with")
         for p in identification.parameters
     ]
     equations = [

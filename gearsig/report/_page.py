@@ -18,7 +18,7 @@ from gearsig.errors import RefusalError
 from gearsig.formatting import readable, unit_text
 from gearsig.motion import StartStop
 from gearsig.orders import OrderMap, SynchronousAverage
-from gearsig.plot import FAULT, QUIET, Captioned, ChartLine, Cursor, LinePanel, Picture, embed
+from gearsig.plot import FAULT, QUIET, CaptionedFigure, ChartLine, Cursor, LinePanel, Picture, embed
 from gearsig.recording import si_factor
 from gearsig.report._files import compiled, render, write_pdf
 from gearsig.report._methods import fitting_methods, method_pictures
@@ -73,7 +73,7 @@ def highest_order_of_interest(analysis: Analysis, spectrum: Spectrum | OrderMap)
 
     Where none is known, an order spectrum may end at 50, one over frequency at its own end.
     """
-    return plot.highest_of_interest(spectrum, line_cursors(analysis, spectrum))
+    return plot.upper_axis_limit(spectrum, line_cursors(analysis, spectrum))
 
 
 def mesh_windows(analysis: Analysis, spectrum: Spectrum) -> list[tuple[str, float, float]]:
@@ -285,25 +285,25 @@ def crack_picture(analysis: Analysis) -> Picture | None:
     )
 
 
-def start_stop_figures(examined: StartStop) -> Iterator[Captioned]:
+def start_stop_figures(examined: StartStop) -> Iterator[CaptionedFigure]:
     """Draw the figures; what the record does not show has none."""
     from gearsig.motion import FROM_TORQUE, HUNT_CROSSLEY, PIECEWISE, estimate_forces
 
     motion, impacts = examined.motion, examined.impacts
-    yield Captioned(
+    yield CaptionedFigure(
         plot.motion_profile_figure(examined, title="Speed, torque and compression in their phases"),
         "Look when the compression changes sides: between the dashed lines the flanks do not touch, beyond them they "
         "carry. A run-down that grows shorter tells of friction.",
         f"Driver's speed, torque and compression over {motion.time_s[-1]:.4g} s, phases shaded.",
     )
-    yield Captioned(
+    yield CaptionedFigure(
         plot.start_stop_figure(examined, title="Speed with the impacts"),
         "The walls of the phase plane stand a backlash apart. Torque over twist at the driver: the flat middle is the "
         "play, the slopes are the teeth's stiffness, the area is what is lost.",
         "Speed with impacts, phase plane of the teeth, torque over twist.",
     )
     if impacts:
-        yield Captioned(
+        yield CaptionedFigure(
             plot.impacts_figure(impacts, motion.path.teeth[0], restitution=motion.contact.restitution),
             "Look whether the same teeth meet each time the machine starts or stops: they wear first. Energies are on "
             "a logarithmic scale; a restitution is missing where the flanks stayed together.",
@@ -316,7 +316,7 @@ def start_stop_figures(examined: StartStop) -> Iterator[Captioned]:
     except RefusalError:  # no sample carries a load
         return
     shares = [100.0 * estimate.error(model, FROM_TORQUE).relative_rms for model in (PIECEWISE, HUNT_CROSSLEY)]
-    yield Captioned(
+    yield CaptionedFigure(
         plot.force_figure(estimate, title="Force from the motion, beside the torque's"),
         f"The piecewise model, which knows both flanks and one or two pairs, is {shares[0]:.3g} % rms off torque over "
         f"base radius; Hunt–Crossley, one pair on one flank, {shares[1]:.3g} %. Where the first is far off, the rig's "
@@ -499,7 +499,7 @@ def _spectrum(analysis: Analysis, channel: ChannelAnalysis) -> Picture:
         )
     return Picture.of_svg(
         spectrum_svg(spectrum, cursors, (0.0, highest), marked),
-        f"{look}{circled_text(marked)}",
+        f"{look}{circle_legend(marked)}",
         f"Order spectrum of {channel.channel} up to order {highest:.4g}, with the orders that the rig implies.",
         f"Order spectrum of {channel.channel}",
     )
@@ -512,7 +512,7 @@ def _meshes(analysis: Analysis, channel: ChannelAnalysis, spectrum: Spectrum) ->
         yield Picture.of_svg(
             spectrum_svg(spectrum, cursors, (low, high), marked, height=130),
             "Look at the spacing of the sidebands: it names the shaft that modulates the mesh, hence the gear."
-            f"{circled_text([order for order in marked if low <= order <= high])}",
+            f"{circle_legend([order for order in marked if low <= order <= high])}",
             f"Order spectrum of {channel.channel} from order {low:.4g} to {high:.4g}, around the mesh of {pair}.",
             f"Order spectrum of {channel.channel} around the mesh of {pair}",
         )
@@ -528,7 +528,7 @@ def _frequency_picture(analysis: Analysis, channel: ChannelAnalysis) -> Picture:
     limits = (0.0, float(channel.spectrum.positions[-1]))
     return Picture.of_svg(
         spectrum_svg(channel.spectrum, cursors, limits, marked, height=120),
-        f"Look for broad humps: resonances of the structure, where impacts ring.{smeared}{circled_text(marked)}",
+        f"Look for broad humps: resonances of the structure, where impacts ring.{smeared}{circle_legend(marked)}",
         f"Amplitude spectrum of {channel.channel} over frequency.",
         f"Spectrum of {channel.channel}",
     )
@@ -547,13 +547,13 @@ def envelope_picture(analysis: Analysis, channel: ChannelAnalysis, spectrum: Spe
     return Picture.of_svg(
         spectrum_svg(spectrum, cursors, limits, marked, linear=True, height=130),
         "Equally spaced lines at a shaft's order mean one impact per turn; at a bearing's, a damaged race."
-        f"{circled_text(marked)}",
+        f"{circle_legend(marked)}",
         f"Envelope spectrum of {channel.channel}{where} with shaft and bearing lines.",
         f"Envelope spectrum of {channel.channel}{where}",
     )
 
 
-def circled_text(marked: Sequence[float]) -> str:
+def circle_legend(marked: Sequence[float]) -> str:
     """Say what circles are, where there are any."""
     return " Circled: what a finding names." if len(marked) else ""
 

@@ -34,7 +34,7 @@ from gearsig.severity._features import (
     reversed_channels,
     reversed_text,
     squeezed_rise_db,
-    telling_teeth_apart,
+    tooth_distinguishing_orders,
 )
 from gearsig.severity._model import (
     ALONE,
@@ -111,5 +111,5 @@ __all__ = [
     "root_thickness_mm",
     "segments",
     "squeezed_rise_db",
-    "telling_teeth_apart",
+    "tooth_distinguishing_orders",
 ]

@@ -481,7 +481,7 @@ def difference_lines(now: ShaftLines, healthy: ShaftLines, *, whole_teeth: bool)
     x, r = now.lines[:, : highest + 1], healthy.lines[:, : highest + 1]
     orders, cross = np.arange(highest + 1), _cross_lines(now, healthy).sum(axis=0)  # over channels
     shift = best_shift(cross, _allowed_shifts(now, healthy, whole_teeth=whole_teeth))
-    pattern = np.where(telling_teeth_apart(orders, now.teeth), cross, 0.0)
+    pattern = np.where(tooth_distinguishing_orders(orders, now.teeth), cross, 0.0)
     agreement = float(shift_scores(pattern, np.array([shift]))[0] / np.abs(pattern).sum()) if np.any(pattern) else 0.0
     turned = turned_lines(r, shift)
     return replace(now, lines=x - _matched(turned, x, now.teeth), highest_order=highest), agreement
@@ -583,7 +583,7 @@ def _matched(reference: np.ndarray, x: np.ndarray, teeth: int) -> np.ndarray:
     g = Σ x r*/Σ|r|², held within `LARGEST_GAIN_CHANGE` of 1: more would take the crack for a gain.
     """
     orders = np.arange(x.shape[1])
-    used = telling_teeth_apart(orders, teeth)
+    used = tooth_distinguishing_orders(orders, teeth)
     fitted = reference.copy()
     for k in range(x.shape[1] // teeth + 1):
         band = (orders + teeth // 2) // teeth == k
@@ -596,7 +596,7 @@ def _matched(reference: np.ndarray, x: np.ndarray, teeth: int) -> np.ndarray:
     return fitted
 
 
-def telling_teeth_apart(orders: np.ndarray, teeth: int) -> np.ndarray:
+def tooth_distinguishing_orders(orders: np.ndarray, teeth: int) -> np.ndarray:
     """Return which orders tell one tooth from another; shaft orders, mesh lines and their sidebands hardly do."""
     used: np.ndarray = (orders > SLOW_ORDERS) & (orders_from_mesh(orders, teeth) > 1)
     return used

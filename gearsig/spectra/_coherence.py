@@ -354,7 +354,7 @@ _SPREAD = 8
 """Grid points on either side of a sample: error about 1e-8 of the sum of magnitudes."""
 
 
-class TurnSums:
+class NonuniformTransform:
     """c[k] = Σ_j p_j exp(-2πi k θ_j) for k = 0 … n, with θ in parts of the whole angle, 0 ≤ θ < 1.
 
     Samples are spread over an equal grid by a Gaussian, transformed, and the Gaussian's transform divided out.
@@ -536,7 +536,7 @@ def _correlate_over_angle(
     weight = _weight(angle, envelope_s)
     inside = weight > 0.0
     turn = (angle.revolutions_at(envelope_s[inside]) - float(angle.revolutions[0])) / angle.n_revolutions
-    sums, weight = TurnSums(turn, n_alphas), weight[inside] / weight.sum()
+    sums, weight = NonuniformTransform(turn, n_alphas), weight[inside] / weight.sum()
     n_wide = bands.half + n_shift
     lines = np.concatenate([lines, np.zeros(max(0, n_wide + 1 - len(lines)), dtype=lines.dtype)])
     lines = np.concatenate([np.conj(lines[1 : n_wide + 1][::-1]), lines, np.zeros(n_wide, dtype=lines.dtype)])

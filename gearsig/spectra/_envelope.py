@@ -85,7 +85,7 @@ def band_envelope(
         0 (brick wall) to 0.5: part of the band that each edge takes.
     unit, source : str
     transform : array or None
-        The `rfft` of `joined_ends` of the signal, where several bands of one signal are wanted.
+        The `rfft` of `with_continuous_ends` of the signal, where several bands of one signal are wanted.
     highest_hz : float or None
         Highest modulation of interest: a magnitude that is sampled much faster than that needs may come at three times
         this frequency, without what is faster.
@@ -104,8 +104,8 @@ def band_envelope(
     Notes
     -----
     The transform takes the signal as periodic: within about 1/bandwidth of either end the envelope mixes both ends, or
-    where these do not meet, each with its continuation, see `joined_ends`. The band must be wider than the modulation
-    sought.
+    where these do not meet, each with its reflection, see `with_continuous_ends`. The band must be wider than the
+    modulation sought.
 
     References
     ----------
@@ -123,7 +123,7 @@ def band_envelope(
     if blocks is not None and blocks.pay(has_transform=transform is not None):
         values, rate_hz = blocks.magnitude(x), fs * blocks.n_out / blocks.n
     else:
-        known = rfft(joined_ends(x, continued=continued)) if transform is None else transform
+        known = rfft(with_continuous_ends(x, continued=continued)) if transform is None else transform
         n = joined_length(len(x), len(known))
         z = _complex_envelope(known, n, *_band_lines(band_hz, fs, n), edge_fraction, 2 if kind == "squared" else 4)
         rate_hz = fs * len(z) / n
@@ -210,7 +210,7 @@ def envelope_recording(
 
     It is what angular resampling takes to give an envelope spectrum over order. The speed source is dropped, since
     pulses do not survive the lower rate: find the shaft angle on the original. `transforms` holds the `rfft` of each
-    channel's `joined_ends`, all or none of them continued, where several bands of one recording are wanted;
+    channel's `with_continuous_ends`, all or none of them continued, where several bands of one recording are wanted;
     `highest_hz` is as of `band_envelope`.
     """
     names = tuple(channels) if channels is not None else recording.vibration_names()
@@ -284,7 +284,7 @@ BEYOND_THE_ENDS = 2048
 """Samples by which a record is continued at either end."""
 
 
-def continuations(values: FloatArray, n_beyond: int = BEYOND_THE_ENDS) -> tuple[FloatArray, FloatArray]:
+def reflected_ends(values: FloatArray, n_beyond: int = BEYOND_THE_ENDS) -> tuple[FloatArray, FloatArray]:
     """Return what a record is taken for before its beginning and after its end: its reflections there, which fade.
 
     The reflections are odd, 2 x₀ - x₋ₖ, so that neither value nor slope has a step. A transform of the record alone
@@ -313,7 +313,7 @@ def ends_meet(values: FloatArray) -> bool:
     return not abs(values[0] - values[-1]) > np.abs(np.diff(values)).max(initial=0.0)
 
 
-def joined_ends(values: FloatArray, *, continued: bool = False) -> FloatArray:
+def with_continuous_ends(values: FloatArray, *, continued: bool = False) -> FloatArray:
     """Return a record whose end meets its beginning, as a transform takes it: itself, or with its continuations.
 
     Itself where they meet of themselves, see `ends_meet`: what is periodic stays so. Else the continuation follows it,
@@ -333,7 +333,7 @@ def joined_ends(values: FloatArray, *, continued: bool = False) -> FloatArray:
     """
     if not continued and ends_meet(values):
         return values
-    before, after = continuations(values, min(BEYOND_THE_ENDS, len(values) - 1))
+    before, after = reflected_ends(values, min(BEYOND_THE_ENDS, len(values) - 1))
     joined = np.zeros(_continued_length(len(values)), dtype=values.dtype)
     joined[: len(values)] = values
     joined[len(values) : len(values) + len(after)] = after
@@ -342,7 +342,7 @@ def joined_ends(values: FloatArray, *, continued: bool = False) -> FloatArray:
 
 
 def joined_length(n_samples: int, n_lines: int) -> int:
-    """Return of how many samples a transform of `joined_ends` is, from its number of lines."""
+    """Return of how many samples a transform of `with_continuous_ends` is, from its number of lines."""
     return n_samples if n_lines == n_samples // 2 + 1 else _continued_length(n_samples)
 
 
@@ -427,7 +427,7 @@ class _Blocks:
         from scipy.fft import ifft, irfft, rfft
 
         step, side = 3 * self.n // 4, self.n // 8
-        before, after = (x[-side:], x[: self.n]) if ends_meet(x) else continuations(x, side)
+        before, after = (x[-side:], x[: self.n]) if ends_meet(x) else reflected_ends(x, side)
         joined = np.concatenate([before, x, after, np.zeros(self.n)], dtype=x.dtype, casting="same_kind")
         blocks = np.lib.stride_tricks.sliding_window_view(joined, self.n)[: len(x) : step]
         inner = slice(self.n_out // 8, 7 * self.n_out // 8)

@@ -218,7 +218,7 @@ class Splitter:
 
 
 @lru_cache(maxsize=2)
-def splitter(n_parts: int) -> Splitter:
+def splitting_filters(n_parts: int) -> Splitter:
     """Return the filters for halves or thirds.
 
     h(k) = w(k) sin(2π f_c k)/(πk), f_c = 1/(4 n_parts), w Hamming's window up to the sine's third zero on either
@@ -240,7 +240,7 @@ class Stage:
     """All bands of one level, each split into parts; keeps what the next piece's filters still need."""
 
     def __init__(self, n_bands: int, n_parts: int, *, keep: bool) -> None:
-        self.split: Splitter = splitter(n_parts)
+        self.split: Splitter = splitting_filters(n_parts)
         self.moments = np.zeros((n_bands * n_parts, 3))
         self.n_outputs = 0
         self._tail = np.empty((n_bands, 2, 0))
@@ -345,8 +345,8 @@ def kurtogram(
     Examples
     --------
     >>> t = np.arange(40000) / 10000.0
-    >>> knocks = np.exp(-400 * (t % 0.05)) * np.sin(2 * np.pi * 3000 * (t % 0.05))
-    >>> x = knocks + 0.1 * np.random.default_rng(0).normal(size=len(t))
+    >>> impacts = np.exp(-400 * (t % 0.05)) * np.sin(2 * np.pi * 3000 * (t % 0.05))
+    >>> x = impacts + 0.1 * np.random.default_rng(0).normal(size=len(t))
     >>> low, high = kurtogram(x, 10000.0).best_band(narrowest_hz=300).band_hz
     >>> low <= 3000 <= high
     True

@@ -2,7 +2,14 @@
 
 from gearsig.timefreq._cwt import component, cwt, cwt_map, inverse, squeezed_cwt, squeezed_cwt_map
 from gearsig.timefreq._packets import WaveletPackets, node_path, packet_inverse, wavelet_packet_map, wavelet_packets
-from gearsig.timefreq._ridges import NOT_HIDDEN, best_path, meetings, ridges, tops_of_parted_paths, untangled
+from gearsig.timefreq._ridges import (
+    NOT_HIDDEN,
+    best_path,
+    crossing_segments,
+    maxima_of_separate_paths,
+    reconnected_paths,
+    ridges,
+)
 from gearsig.timefreq._squeezing import SqueezeEngine, squeeze_lines
 from gearsig.timefreq._stft import squeezed_stft, squeezed_stft_map, stft, stft_map
 from gearsig.timefreq._types import Axis, Reduction, Ridge, Source, TimeFrequencyMap, UniformSignal, at_label, uniform
@@ -13,7 +20,7 @@ from gearsig.timefreq._wavelets import (
     band,
     footprint_periods,
     half_support,
-    lowest_possible,
+    lowest_analysable,
     pieces,
     plan_groups,
 )
@@ -35,17 +42,19 @@ __all__ = [
     "band",
     "best_path",
     "component",
+    "crossing_segments",
     "cwt",
     "cwt_map",
     "footprint_periods",
     "half_support",
     "inverse",
-    "lowest_possible",
-    "meetings",
+    "lowest_analysable",
+    "maxima_of_separate_paths",
     "node_path",
     "packet_inverse",
     "pieces",
     "plan_groups",
+    "reconnected_paths",
     "ridges",
     "squeeze_lines",
     "squeezed_cwt",
@@ -54,9 +63,7 @@ __all__ = [
     "squeezed_stft_map",
     "stft",
     "stft_map",
-    "tops_of_parted_paths",
     "uniform",
-    "untangled",
     "wavelet_packet_map",
     "wavelet_packets",
 ]

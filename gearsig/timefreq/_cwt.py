@@ -47,7 +47,7 @@ from gearsig.timefreq._wavelets import (
     block_pieces,
     half_support,
     lines_of,
-    lowest_possible,
+    lowest_analysable,
     pieces,
     plan_group,
     plan_groups,
@@ -339,7 +339,7 @@ def analysis(
     n_below, n_above = (int(np.ceil(n_per_octave * np.log2(r))) for r in (v_high, 1 / v_low))
     k = np.arange(1 - len(lines) - n_below, n_above + 1)
     analysed = lines[-1] * 2.0 ** (k / n_per_octave)
-    inside = (analysed >= min(lines[0], lowest_possible(x, wavelet))) & (analysed <= max(lines[-1], x.rate / 2))
+    inside = (analysed >= min(lines[0], lowest_analysable(x, wavelet))) & (analysed <= max(lines[-1], x.rate / 2))
     weight = 2.0 * np.log(2.0) / n_per_octave / admissibility(wavelet)
     mean_square = float(np.dot(x.values, x.values)) / x.n_samples
     return SqueezingWavelets(lines, analysed[inside], weight, MIN_SHARE**2 * mean_square)
@@ -557,7 +557,7 @@ def component(
         raise InputError("the ridge touches zero", where="ridge", remedy="look for it between lines above zero")
     low, high = path / (1.0 + width), path * (1.0 + width)
     # Where the signal is just long enough for the ridge, the band's lower half is cut rather than refused.
-    bottom = max(float(low.min()), min(float(path.min()), lowest_possible(x, wavelet)))
+    bottom = max(float(low.min()), min(float(path.min()), lowest_analysable(x, wavelet)))
     top = min(float(high.max()), x.highest_valid)
     plan = analysis(x, wavelet, bottom, top, n_per_octave)
     borders = 2 * np.pi / x.rate * low, 2 * np.pi / x.rate * high

@@ -91,7 +91,7 @@ class Meeting:
     stop: int
 
 
-def meetings(a: FloatArray, b: FloatArray, gap: float) -> list[Meeting]:
+def crossing_segments(a: FloatArray, b: FloatArray, gap: float) -> list[Meeting]:
     """Return the segments where |a - b| <= gap, those less than a few columns apart taken as one."""
     near = np.abs(a - b) <= gap
     steps = np.diff(near.astype(np.int8), prepend=0, append=0)
@@ -105,7 +105,7 @@ def meetings(a: FloatArray, b: FloatArray, gap: float) -> list[Meeting]:
     return meetings
 
 
-def untangled(
+def reconnected_paths(
     paths: list[FloatArray], levels: list[FloatArray], gap: float, level_weight: float, power: FloatArray | None = None
 ) -> list[FloatArray]:
     """Return the paths with their tails exchanged wherever both then go on more smoothly.
@@ -140,7 +140,7 @@ def _settled_from_afar(a: FloatArray, b: FloatArray, gap: float) -> list[Meeting
     """Return the meetings, each in the widest of several gaps that leaves columns to compare on both sides."""
     settled: list[Meeting] = []
     for share in _MEETING_GAPS:
-        for meeting in meetings(a, b, share * gap):
+        for meeting in crossing_segments(a, b, share * gap):
             room = min(meeting.start, len(a) - meeting.stop)
             known = any(m.start <= meeting.start and meeting.stop <= m.stop for m in settled)
             if not known and room >= (_N_FIT if share > _MEETING_GAPS[-1] else _MIN_FIT):
@@ -186,7 +186,7 @@ def _settle(a: _Track, b: _Track, meeting: Meeting, level_weight: float, power: 
     crossed, parted = (keep, swap) if crosses_now else (swap, keep)
     if power is not None and _valley(power, crossed, start, gap):
         if crosses_now:
-            _exchange(a, b, meeting, tops_of_parted_paths(power, parted, start))
+            _exchange(a, b, meeting, maxima_of_separate_paths(power, parted, start))
         return
     cost = [[_change(p, q, last - first, level_weight) for q in after] for p in before]
     if cost[0][1] + cost[1][0] < cost[0][0] + cost[1][1]:
@@ -215,7 +215,7 @@ def _largest_near(power: FloatArray, lines: NDArray[np.int64], columns: NDArray[
     return result
 
 
-def tops_of_parted_paths(power: FloatArray, parted: list[FloatArray], start: int) -> list[FloatArray]:
+def maxima_of_separate_paths(power: FloatArray, parted: list[FloatArray], start: int) -> list[FloatArray]:
     """Return the largest power's line on either side of the middle between two paths that part again."""
     middle = np.clip(np.round((parted[0] + parted[1]) / 2), 0, len(power) - 1).astype(np.int64)
     half = np.ceil(np.abs(parted[0] - parted[1])).astype(np.int64)
@@ -426,7 +426,7 @@ def _settled(paths: list[FloatArray], grid: _Grid, power: FloatArray) -> list[Fl
     """Return the paths, read between the lines, each going on as what it was before it met another one."""
     paths = [_read(grid, p)[0] for p in paths]
     levels: list[FloatArray] = [np.log(np.maximum(_along(power, p), np.finfo(np.float64).tiny)) / 2 for p in paths]
-    return untangled(paths, levels, 2.0 * grid.n_reach, float(grid.n_reach), power)
+    return reconnected_paths(paths, levels, 2.0 * grid.n_reach, float(grid.n_reach), power)
 
 
 def _hidden(shape: tuple[int, ...], paths: list[FloatArray], n_cover: int) -> NDArray[np.int16]:

@@ -146,7 +146,7 @@ def footprint_periods(wavelet: Wavelet) -> float:
     return float(np.sqrt(2.0) * wavelet.duration / np.pi)
 
 
-def lowest_possible(signal: UniformSignal, wavelet: Wavelet) -> float:
+def lowest_analysable(signal: UniformSignal, wavelet: Wavelet) -> float:
     """Return the frequency or order whose wavelet just fits into the signal."""
     return footprint_periods(wavelet) / signal.length
 
@@ -180,7 +180,7 @@ def lines_of(
         If the signal is too short for the lowest line.
     """
     instance_of(wavelet, Wavelet, "wavelet", remedy="e.g. gearsig.timefreq.Morse()")
-    fits, unit = lowest_possible(x, wavelet), x.position_unit
+    fits, unit = lowest_analysable(x, wavelet), x.position_unit
     if positions is None:
         count(n_per_octave, "n_per_octave")
         top = x.highest_valid / band(wavelet, 0.01)[1] if highest is None else positive(highest, "highest")

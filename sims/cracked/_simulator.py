@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from gearsig.gap import Added, OperatingCondition
+from gearsig.gap import AddedEffect, OperatingCondition
 from gearsig.recording import Recording
 from gearsig.rig import Rig
 from sims.cracked._respond import (
@@ -137,7 +137,7 @@ class CrackedTwin(PairTwin):
         return CrackedPair()
 
     def _planned(
-        self, point: OperatingCondition, added: Sequence[Added], seed: int, sampling_rate_hz: float
+        self, point: OperatingCondition, added: Sequence[AddedEffect], seed: int, sampling_rate_hz: float
     ) -> tuple[ReadyPair, MeasuredRun[PairState]]:
         """Let a tooth be damaged while the healthy specimen runs, whose start is simulated once for all such faults.
 

@@ -60,7 +60,7 @@ EFFECT = Effect(
     changes="The shaft moves that far before rolling elements carry; fewer of them do, so the support is softer and "
     "its stiffness changes as they pass.",
     signature="Lines at the order at which elements pass a point, n(1 − d cos α/D)/2 of the bearing's shaft, and its "
-    "multiples, with sums and differences to the mesh; no knocks. Other mesh harmonics, as the support is softer. "
+    "multiples, with sums and differences to the mesh; no impacts. Other mesh harmonics, as the support is softer. "
     "Under a turning load, harmonics of the shaft; impacts and a raised floor where the load lets the shaft lift.",
     shows_in=("shaft_orders", "envelope_orders", "resonances", "low_load"),
     change=change,

@@ -12,7 +12,7 @@ from sims.effects.textbook import UP, Signature, SyntheticScene, Textbook, race_
 
 
 def textbook_signature(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
-    """Knocks when elements pass the defect, all alike."""
+    """Impacts when elements pass the defect, all alike."""
     return race_impacts(scene, size, rng, "BPFO")
 
 
@@ -22,8 +22,8 @@ EFFECT = Effect(
     title="spall on an outer race",
     severity=parts.RACE_SEVERITY,
     changes="Rolling elements sink into a gap of the standing race and strike its far edge. From about 0.5 mm on they "
-    "carry nothing there, and the knocks grow no more; they last longer.",
-    signature="A knock for every element that passes, n(1 − d cos α/D)/2 per revolution of the bearing's shaft less "
+    "carry nothing there, and the impacts grow no more; they last longer.",
+    signature="An impact for every element that passes, n(1 − d cos α/D)/2 per revolution of the bearing's shaft less "
     "slip: lines of that order and its multiples in the envelope about a resonance, all nearly as strong as the load "
     "zone does not move; not a multiple of any shaft order, and slightly random, so that a synchronous average takes "
     "it away.",
@@ -31,7 +31,7 @@ EFFECT = Effect(
     change=partial(parts.with_race_defect, "outer"),
     options=parts.RACE_OPTIONS,
     plausible=parts.race_range(
-        "outer", "of the rolling element's diameter; beyond half a millimetre or so the knocks grow no more"
+        "outer", "of the rolling element's diameter; beyond half a millimetre or so the impacts grow no more"
     ),
     textbook=Textbook(
         (("envelope.outer", UP),),

@@ -66,13 +66,13 @@ def textbook_signature(scene: book.SyntheticScene, size: float, rng: np.random.G
     window, place = book.tooth_window(scene, side, float(rng.uniform(0.8, 2.0)), rng)
     gain, late = rng.uniform(0.0, 1.0, 2)
     blow, slow = book.balance(rng, 2) * (4.0, 2.0)
-    knock = book.tooth_impacts(scene, side, place, 0.03, rng)
+    impact = book.tooth_impacts(scene, side, place, 0.03, rng)
     giving_way = np.gradient(np.gradient(window))
     giving_way /= max(float(np.abs(giving_way).max()), 1e-12)
     return book.Signature(
         book.swollen(book.sign(rng) * gain * size, window),
         book.late_tooth(scene, late * size, window, rng),
-        (blow * size * knock, slow * size * giving_way),
+        (blow * size * impact, slow * size * giving_way),
     )
 
 

@@ -45,7 +45,7 @@ class Textbook:
 
 
 # --------------------
-# What vibration is made of when it is made by hand: rings, knocks, tones, over the angle of a recording's shafts.
+# What vibration is made of when it is made by hand: rings, impacts, tones, over the angle of a recording's shafts.
 # --------------------
 
 
@@ -81,7 +81,7 @@ class SyntheticScene:
 
 
 def ring(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    """Return a housing mode's answer to a knock."""
+    """Return a housing mode's answer to an impact."""
     rate = scene.sampling_rate_hz
     frequency, damping = log_uniform(rng, 700.0, 0.4 * rate), float(rng.uniform(0.02, 0.1))
     time = np.arange(int(rate * 6.0 / (2 * np.pi * frequency * damping)) + 2) / rate
@@ -89,7 +89,7 @@ def ring(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
 
 
 def struck(places: FloatArray, sizes: FloatArray, scene: SyntheticScene, answer: FloatArray) -> FloatArray:
-    """Return the answer to knocks at samples `places`."""
+    """Return the answer to impacts at samples `places`."""
     from scipy.signal import oaconvolve
 
     n = len(scene.time_s)
@@ -106,7 +106,7 @@ def passings(scene: SyntheticScene, order: float, phase: float = 0.0) -> FloatAr
 def impact_train(
     order: float, jitter: float, scene: SyntheticScene, rng: np.random.Generator, by: float = 0.0
 ) -> FloatArray:
-    """Return knocks `order` times per revolution, their size swinging at the order `by`."""
+    """Return impacts `order` times per revolution, their size swinging at the order `by`."""
     places = passings(scene, order, rng.uniform())
     if len(places) > 1:
         places += jitter * float(np.median(np.diff(places))) * rng.standard_normal(len(places))
@@ -372,7 +372,7 @@ def tooth_window(
 def tooth_impacts(
     scene: SyntheticScene, side: int, place: float, scatter: float, rng: np.random.Generator, of: int = 1
 ) -> FloatArray:
-    """Return knocks when a tooth meshes, `of` of them a fraction of a pitch apart, in standard deviations at most 1."""
+    """Return impacts when a tooth meshes, `of` of them a fraction of a pitch apart, in deviations at most 1."""
     answer, order, total = ring(scene, rng), scene.shaft_orders[side], np.zeros(len(scene.time_s))
     for _ in range(of):
         at = passings(scene, order, -place - float(rng.uniform(0.0, 0.7)) / scene.teeth[side])
@@ -443,7 +443,7 @@ def modulated(
 
 
 def race_impacts(scene: SyntheticScene, size: float, rng: np.random.Generator, name: str) -> Signature:
-    """Knocks when elements pass the defect; on the inner race louder in the load zone, that is once per turn."""
+    """Impacts when elements pass the defect; on the inner race louder in the load zone, that is once per turn."""
     bearing = scene.bearings[int(rng.integers(len(scene.bearings)))]
     order = bearing[name] * float(rng.uniform(0.985, 1.0))
     by = bearing["shaft"] if name == "BPFI" else 0.0

@@ -17,11 +17,11 @@ from sims.forging._respond import (
     bristle,
     check_convergence,
     drive_numbers,
+    later_pair,
     position,
     reach,
     respond,
     weight,
-    younger_pair,
 )
 from sims.forging._simulator import (
     NAME,
@@ -53,6 +53,7 @@ __all__ = [
     "build_rig",
     "check_convergence",
     "drive_numbers",
+    "later_pair",
     "position",
     "reach",
     "record",
@@ -61,5 +62,4 @@ __all__ = [
     "sensors",
     "weight",
     "with_effects",
-    "younger_pair",
 ]

@@ -353,7 +353,7 @@ def weight(k, p):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def younger_pair(k, angle, flank):
+def later_pair(k, angle, flank):
     """Number of the younger of the two pairs that may touch.
 
     Pairs change hands half-way through single contact, where the pair that goes has left and the one that comes has not
@@ -408,7 +408,7 @@ def reach(k, angle, flank):
     """Compression at which the first pair touches a flank, in the flank's direction; and its slope over the angle."""
     if flank < 0 or k.is_worn == 0.0:
         return k.half_backlash, 0.0
-    p, slope = position(k, angle, flank, younger_pair(k, angle, flank))
+    p, slope = position(k, angle, flank, later_pair(k, angle, flank))
     smallest, change = 1e9, 0.0
     for i in range(2):
         if -0.5 * k.ramp < p + i < k.contact_ratio + 0.5 * k.ramp:
@@ -705,7 +705,7 @@ def _change_contact(k, y, t, next_flank, mode, counts, contacts):
 def open_contact(k, y, t, flank, mode, row):
     """Latch the speed at which flanks meet and the damping that follows; the bristles of the flanks begin straight."""
     mode[0] = flank
-    mode[1] = younger_pair(k, y[0], flank)
+    mode[1] = later_pair(k, y[0], flank)
     speed = abs(flank * y[3] - reach(k, y[0], flank)[1] * y[1])
     mode[2] = k.damping_at_1_mps / max(speed, k.speed_floor)
     y[4], y[5] = 0.0, 0.0
@@ -718,7 +718,7 @@ def open_contact(k, y, t, flank, mode, row):
 @njit(cache=True, nogil=True, error_model="numpy")
 def _hand_over(k, y, mode):
     """Give the bristles to the next slot where the younger pair is another; say whether it is."""
-    younger = younger_pair(k, y[0], mode[0])
+    younger = later_pair(k, y[0], mode[0])
     if younger == mode[1]:
         return False
     if younger > mode[1]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray, closest_match_hint, within
 from gearsig.errors import InputError
-from gearsig.gap import Added, DriveFacts, GapEffect, OperatingCondition
+from gearsig.gap import AddedEffect, DriveFacts, GapEffect, OperatingCondition
 from gearsig.recording import Channel, Provenance, Recording
 from gearsig.rig import EncoderChannel, Rig, Sensor, standard_path
 from sims.effects import EffectSetting, effect, effects
@@ -532,7 +532,7 @@ class ForgingTwin:
     parameters: Parameters
     point: OperatingCondition
 
-    def run(self, added: Sequence[Added] = ()) -> Recording:
+    def run(self, added: Sequence[AddedEffect] = ()) -> Recording:
         """Return a recording of `N_CYCLES` cycles."""
         parameters = self.parameters
         for setting in added:
@@ -586,13 +586,13 @@ class ForgingTwin:
         curve: FloatArray = 0.5 * (low + high) - healthy
         return curve
 
-    def crack_stiffness_loss(self, crack: Added) -> float:
+    def crack_stiffness_loss(self, crack: AddedEffect) -> float:
         """Return which part of its stiffness a cracked tooth loses."""
         _, weak = with_effects(complete_values(PARAMETERS, self.parameters), _settings((crack,)))
         assert weak is not None  # noqa: S101 - a crack of some depth makes a tooth weak
         return float(weak.loss)
 
-    def preset_toml(self, added: Added, notes: Sequence[str]) -> str:
+    def preset_toml(self, added: AddedEffect, notes: Sequence[str]) -> str:
         """Return the drive as a preset file that `gearsig simulate forging --preset FILE` runs."""
         torque_nm = self.point.torque_nm
         if added.name == "torque_gain":  # the motor's torque was read with the same wrong gain
@@ -612,7 +612,7 @@ class ForgingTwin:
         return preset_text(preset, notes)
 
 
-def _settings(added: Sequence[Added]) -> tuple[EffectSetting, ...]:
+def _settings(added: Sequence[AddedEffect]) -> tuple[EffectSetting, ...]:
     """Return the catalogue's settings; none of what is a parameter's wrong value."""
     return tuple(
         EffectSetting(setting.name, setting.severity, dict(setting.options))
@@ -621,7 +621,7 @@ def _settings(added: Sequence[Added]) -> tuple[EffectSetting, ...]:
     )
 
 
-def _with_wrong_value(added: Added, parameters: Parameters) -> Parameters:
+def _with_wrong_value(added: AddedEffect, parameters: Parameters) -> Parameters:
     """Return the parameters with the wrong value of one; effects of the catalogue leave them as they are."""
     factor = 1.0 + 0.01 * added.severity
     if added.name == "load_inertia":

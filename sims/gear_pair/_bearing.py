@@ -2,10 +2,10 @@
 
 A rolling element over a spall carries less, and the shaft sinks towards it. Between the edges an element of radius R
 that follows them is h = x²/2R deep, x its distance from the nearer edge. It can lose no more than its own load: with Q
-its load at this time and k the bearing's stiffness, the shaft sinks by s (1 − exp(−h/s)), s = Q/k. Knocks grow with the
-load, and with the spall only up to half a millimetre or so. Q falls off with the angle ψ from the load's direction as
-cos^1.5 ψ (Stribeck's distribution for a bearing without clearance). The sinking is a displacement of the spring's foot,
-(x_b − d).
+its load at this time and k the bearing's stiffness, the shaft sinks by s (1 − exp(−h/s)), s = Q/k. Impacts grow with
+the load, and with the spall only up to half a millimetre or so. Q falls off with the angle ψ from the load's direction
+as cos^1.5 ψ (Stribeck's distribution for a bearing without clearance). The sinking is a displacement of the spring's
+foot, (x_b − d).
 
 With clearance, fewer elements share the load, and the shaft falls and rises as they pass: the difference from the
 bearing without clearance is found from the static balance of all elements (F = K δ^1.5) at 32 places of the cage. A

@@ -15,7 +15,7 @@ import numpy as np
 
 from gearsig.checks import count, within
 from gearsig.errors import InputError, RefusalError
-from gearsig.gap import Added, GapEffect, OperatingCondition
+from gearsig.gap import AddedEffect, GapEffect, OperatingCondition
 from gearsig.recording import Recording
 from gearsig.rig import OperatingPoint, Rig, rig_to_dict
 from sims.effects import GEARS, EffectSetting, MachineFacts, Options, as_gap_effect, effect, effects, with_effects
@@ -367,7 +367,7 @@ class PairTwin:
     def run(
         self,
         point: OperatingCondition,
-        added: Sequence[Added] = (),
+        added: Sequence[AddedEffect] = (),
         *,
         seed: int,
         duration_s: float,
@@ -390,7 +390,7 @@ class PairTwin:
         return replace(recording, samples=recording.samples[:, skipped:]) if skipped else recording
 
     def _planned(
-        self, point: OperatingCondition, added: Sequence[Added], seed: int, sampling_rate_hz: float
+        self, point: OperatingCondition, added: Sequence[AddedEffect], seed: int, sampling_rate_hz: float
     ) -> tuple[ReadyPair, MeasuredRun[Any]]:
         """Return a specimen with its effects, and a run of it that lasts one sample."""
         rng = np.random.default_rng(seed)
@@ -424,23 +424,23 @@ class PairTwin:
         """
         return replace(self, is_quiet=True)
 
-    def candidates(self, name: str) -> Sequence[Added]:
+    def candidates(self, name: str) -> Sequence[AddedEffect]:
         """Return settings of an effect worth a try, from barely noticeable to strong, for each option that matters."""
         plausible = effect(name).plausible_range
         indices = range(plausible.n_severities)
         return self._settings(name, [(options, indices) for options in plausible.choices(self._facts)])
 
-    def further_settings(self, name: str) -> Sequence[Added]:
+    def further_settings(self, name: str) -> Sequence[AddedEffect]:
         """Return further settings, with which a tooth's fault takes another profile over the engagement."""
         return self._settings(name, effect(name).plausible_range.further_settings(self._facts))
 
-    def _settings(self, name: str, chosen: Sequence[tuple[Options, Sequence[float]]]) -> list[Added]:
+    def _settings(self, name: str, chosen: Sequence[tuple[Options, Sequence[float]]]) -> list[AddedEffect]:
         """Return each set of options with some of its severities, counted from 0; 0.5 lies between the first two."""
         last, settings = effect(name).plausible_range.n_severities - 1, []
         for options, places in chosen:
             low, high = effect(name).plausible_severities(self._facts, options)
             severities = [low * (high / low) ** (place / last) for place in places]
-            settings += [Added(name, float(f"{severity:.4g}"), options) for severity in severities]
+            settings += [AddedEffect(name, float(f"{severity:.4g}"), options) for severity in severities]
         return settings
 
     def with_further_sensors(self) -> tuple[Self, Mapping[str, str]]:
@@ -448,7 +448,7 @@ class PairTwin:
         further = further_seats(installed_of_rig(self.rig, self.nominal.size, ()))
         return replace(self, further=further), {seat.channel: seat.position for seat in further}
 
-    def draw(self, name: str, rng: np.random.Generator, *, above: float = 0.0) -> Added:
+    def draw(self, name: str, rng: np.random.Generator, *, above: float = 0.0) -> AddedEffect:
         """Draw a setting from the range of the candidates, its options at random.
 
         Parameters
@@ -468,10 +468,10 @@ class PairTwin:
             raise RefusalError(f"the rig describes no part that {name} could be in", remedy="describe its bearings")
         options = plausible.drawn(machine, rng)
         low, high = effect(name).plausible_severities(machine, options)
-        return Added(name, log_uniform(rng, low * (high / low) ** above, high), options)
+        return AddedEffect(name, log_uniform(rng, low * (high / low) ** above, high), options)
 
     def preset(
-        self, point: OperatingCondition, added: Sequence[Added] = (), *, seed: int = 0, notes: Sequence[str] = ()
+        self, point: OperatingCondition, added: Sequence[AddedEffect] = (), *, seed: int = 0, notes: Sequence[str] = ()
     ) -> Preset:
         """Return the specimen `seed` with its effects as a preset."""
         drawn = np.random.default_rng([seed, 1])
@@ -505,7 +505,7 @@ class PairTwin:
         )
 
     def preset_toml(
-        self, point: OperatingCondition, added: Sequence[Added], notes: Sequence[str], *, seed: int = 0
+        self, point: OperatingCondition, added: Sequence[AddedEffect], notes: Sequence[str], *, seed: int = 0
     ) -> str:
         """Return the machine with the effects as a preset file for `gearsig simulate MODEL --preset FILE`."""
         comments = [f"The flanks' profiles are not in this file: simulate with --seed {seed} for those of the twin."]

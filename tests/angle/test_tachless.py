@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from gearsig.angle import comb_elsewhere, estimate_shaft_angle
+from gearsig.angle import estimate_shaft_angle, find_offset_comb
 from gearsig.checks import FloatArray
 from gearsig.errors import RefusalError
 from gearsig.recording import Channel, Recording
@@ -147,10 +147,10 @@ def test_wrong_teeth_and_wrong_rate_are_refused_with_evidence() -> None:
     rig = rig_of((23, 46), nominal_rpm=1980.0)
     with pytest.raises(RefusalError, match=r"0\.7812"):
         estimate_shaft_angle(slow, rig)
-    elsewhere = comb_elsewhere(slow, rig, 1980.0)
+    elsewhere = find_offset_comb(slow, rig, 1980.0)
     assert elsewhere is not None
     assert elsewhere.factor == pytest.approx(0.7812, rel=1e-3)
-    assert comb_elsewhere(recording, rig, 1980.0) is None
+    assert find_offset_comb(recording, rig, 1980.0) is None
 
 
 def test_no_teeth_no_motion_no_time() -> None:

@@ -1,11 +1,11 @@
 """Causes of an answer, built by hand."""
 
-from gearsig.gap import Added, GapCause, Interval, Shrinkage
+from gearsig.gap import AddedEffect, GapCause, Interval, Shrinkage
 
 
 def cause(name, probability, options=None, shrink=None, **of_shrinkage):
     """Return a cause, with a held-out shrink where one is given."""
-    fitted = None if options is None else Added(name, 1.0, options)
+    fitted = None if options is None else AddedEffect(name, 1.0, options)
     shrinkage = None if shrink is None else shrinkage_of(shrink, **of_shrinkage)
     return GapCause(name, "", name, "", probability, fitted=fitted, shrinkage=shrinkage)
 

@@ -10,7 +10,7 @@ import pytest
 
 from gearsig.errors import InputError, RefusalError
 from gearsig.gap import (
-    Added,
+    AddedEffect,
     Bank,
     OperatingCondition,
     TriedEffect,
@@ -18,7 +18,7 @@ from gearsig.gap import (
     banks_of,
     change_features,
     conditions_of,
-    once,
+    feature_values,
     reduce_recording,
     rounded,
     try_effects,
@@ -31,7 +31,7 @@ from sims.registry import gap_simulator
 FS, DURATION_S, TEETH = 4096.0, 2.0, (20, 31)
 POINT = OperatingCondition(1800.0, 40.0)
 RIG = Rig("r", (Shaft("a"), Shaft("b")), (GearPair("p", "a", "b", *TEETH),))
-STRONG, WEAK, IMPOSSIBLE = Added("louder", 2.0), Added("louder", 1.1), Added("louder", 1000.0)
+STRONG, WEAK, IMPOSSIBLE = AddedEffect("louder", 2.0), AddedEffect("louder", 1.1), AddedEffect("louder", 1000.0)
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Sines:
     def run(
         self,
         point: OperatingCondition,
-        added: Sequence[Added] = (),
+        added: Sequence[AddedEffect] = (),
         *,
         seed: int,
         duration_s: float,
@@ -62,11 +62,11 @@ class Sines:
         channels = (Channel("v", "acceleration", "m/s^2"), Channel("t", "tachometer", "V"))
         return Recording(samples, sampling_rate_hz, channels, speed=TachometerChannel("t", 1, shaft="a"), rig=RIG)
 
-    def candidates(self, effect: str) -> Sequence[Added]:
+    def candidates(self, effect: str) -> Sequence[AddedEffect]:
         """Two strengths, and one that cannot be simulated; "louder 2" has the strong one only."""
         return {"louder": (WEAK, STRONG, IMPOSSIBLE), "louder 2": (STRONG,)}[effect]
 
-    def preset_toml(self, point: OperatingCondition, added: Sequence[Added], notes: Sequence[str]) -> str:
+    def preset_toml(self, point: OperatingCondition, added: Sequence[AddedEffect], notes: Sequence[str]) -> str:
         """No use here."""
         raise NotImplementedError
 
@@ -96,11 +96,11 @@ def test_changes_are_those_of_the_features_against_the_healthy_run() -> None:
     assert found.changes.shape == (2, len(found.change_names))
     assert found.change_names[: len(found.feature_names)] == found.feature_names
 
-    def gathered(*added: Added):  # type: ignore[no-untyped-def]  # of the features' room
+    def gathered(*added: AddedEffect):  # type: ignore[no-untyped-def]  # of the features' room
         run = Sines().run(rounded(POINT), added, seed=0, duration_s=DURATION_S, sampling_rate_hz=FS)
         return reduce_recording(run, RIG)
 
-    np.testing.assert_array_equal(found.healthy, once(gathered())[1])
+    np.testing.assert_array_equal(found.healthy, feature_values(gathered())[1])
     np.testing.assert_array_equal(found.changes[1], change_features(gathered(STRONG), gathered()).values)
 
 
@@ -224,7 +224,7 @@ def test_effects_that_the_rig_has_no_place_for_are_no_reason_to_refuse() -> None
     class OnlyImpossible(Sines):
         point = POINT
 
-        def candidates(self, effect: str) -> Sequence[Added]:
+        def candidates(self, effect: str) -> Sequence[AddedEffect]:
             return (IMPOSSIBLE,) if effect == "louder" else ()
 
     assert tried("bearing", OnlyImpossible()) == {}
@@ -234,12 +234,12 @@ def test_effects_that_the_rig_has_no_place_for_are_no_reason_to_refuse() -> None
 
 def test_a_trial_differs_from_the_healthy_run_by_its_effect_only() -> None:
     """Another start or noise would be taken for what the effect changes."""
-    runs: list[tuple[tuple[Added, ...], int, int, float]] = []
+    runs: list[tuple[tuple[AddedEffect, ...], int, int, float]] = []
 
     class Noted(Sines):  # local: it cannot be sent to another process
         point = POINT
 
-        def run(self, point: OperatingCondition, added: Sequence[Added] = (), **how: Any) -> Recording:
+        def run(self, point: OperatingCondition, added: Sequence[AddedEffect] = (), **how: Any) -> Recording:
             runs.append((tuple(added), how["seed"], how.get("noise", 0), how["duration_s"]))
             return super().run(point, added, **how)
 

@@ -313,8 +313,8 @@ def test_an_effect_that_was_not_learned_is_listed_as_such(capsys, monkeypatch) -
     from gearsig.gap import load_learned
 
     learned = load_learned()
-    fewer = replace(learned.recognisers[True], causes=("none", "tooth_wear"))
-    only = replace(learned, recognisers={True: fewer, False: fewer})
+    fewer = replace(learned.classifiers[True], causes=("none", "tooth_wear"))
+    only = replace(learned, classifiers={True: fewer, False: fewer})
     monkeypatch.setattr("gearsig.gap.load_learned", lambda: only)
     _, out, _ = run(capsys, "--list-effects")
     assert out.count("not recognised") == 18

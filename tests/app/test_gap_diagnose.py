@@ -11,7 +11,7 @@ import pytest
 
 from gearsig.errors import InputError, RefusalError
 from gearsig.gap import (
-    Added,
+    AddedEffect,
     GapOutcome,
     GapReport,
     HealthyReference,
@@ -22,8 +22,8 @@ from gearsig.gap import (
     check_steady,
     conditions_of,
     diagnose_gap,
-    effects_without_place,
-    once,
+    effects_without_setting,
+    feature_values,
     reduce_recording,
     with_channels_of,
     with_common_channels,
@@ -47,12 +47,12 @@ def rig() -> Rig:
 
 
 @cache
-def run(*added: Added, noise: int) -> Recording:
+def run(*added: AddedEffect, noise: int) -> Recording:
     twin = gap_simulator("cracked").twin_of(rig())
     return twin.run(POINT, added, seed=5, duration_s=4.0, sampling_rate_hz=20480.0, noise=noise)
 
 
-class Eccentric(Added):
+class Eccentric(AddedEffect):
     """An effect that can be a key."""
 
     def __hash__(self) -> int:
@@ -143,7 +143,7 @@ def test_accelerations_in_g_are_compared_in_si_units_and_unknown_units_are_told(
     scale = np.array([9.80665 if c.name in names else 1.0 for c in recording.channels])
     channels = tuple(replace(c, unit="g") if c.name in names else c for c in recording.channels)
     in_g = replace(recording, samples=recording.samples / scale[:, None], channels=channels)
-    expected, seen = (once(reduce_recording(given, rig()))[1] for given in (recording, in_g))
+    expected, seen = (feature_values(reduce_recording(given, rig()))[1] for given in (recording, in_g))
     assert seen == pytest.approx(expected, abs=1e-6)
     bare = replace(recording, channels=tuple(replace(c, unit="") for c in recording.channels))
     _, notes = conditions_of([PreparedRecording(bare)], (), gap_simulator("cracked").twin_of(rig()))
@@ -180,6 +180,6 @@ def test_a_recording_whose_channels_have_other_names_can_be_simulated() -> None:
 def test_an_effect_that_the_rig_has_no_place_for_is_told() -> None:
     simulator, bare = gap_simulator("cracked"), replace(rig(), bearings=())
     known = {name: simulator.gap_effects()[name] for name in ("bearing_outer_race", "backlash")}
-    (text,) = effects_without_place(simulator.twin_of(bare), known)
+    (text,) = effects_without_setting(simulator.twin_of(bare), known)
     assert text.startswith("The rig file names nothing that spall on an outer race could be in")
-    assert effects_without_place(simulator.twin_of(rig()), known) == []
+    assert effects_without_setting(simulator.twin_of(rig()), known) == []

@@ -24,9 +24,9 @@ from gearsig.gap import (
     UNKNOWN,
     ReducedRecording,
     change_features,
+    feature_values,
     load_learned,
     load_population,
-    once,
     read_learned,
     reduce_recording,
     soft_size,
@@ -173,8 +173,8 @@ def test_a_day_repeats_the_machine_and_not_the_noise() -> None:
 def test_machines_get_sidebands_and_shaft_lines_that_last(seed: int) -> None:
     ordinary = Ordinary.of(HEALTHY, seed)
     days = [reduce_recording(ordinary.on(record(seed=day), 0, np.random.default_rng(day)), RIG) for day in (1, 2)]
-    names, before = once(reduce_recording(HEALTHY, RIG))
-    _, after = once(days[0])
+    names, before = feature_values(reduce_recording(HEALTHY, RIG))
+    _, after = feature_values(days[0])
     raised = dict(zip(names, after - before, strict=True))
     assert max(raised[f"shaft.{side}.{n}.to_mesh"] for side in ("driver", "driven") for n in (1, 2, 3)) > 6.0
     between = change_features(days[1], days[0])

@@ -12,7 +12,7 @@ import pytest
 from app.cli.main import main
 from app.samples import sample_folder
 from gearsig.errors import InputError
-from gearsig.gap import NONE, Added, GapOutcome, diagnose_gap
+from gearsig.gap import NONE, AddedEffect, GapOutcome, diagnose_gap
 from gearsig.gap.start_stop import TRIED, compare_drive, read_cycles
 from gearsig.recording import write_recording
 from gearsig.report import gap_schema, read_gap_json
@@ -187,7 +187,7 @@ def test_worn_flanks_touch_later_where_they_slide_most(by_its_rig):
 def test_a_worn_drive_runs_as_its_teeth_at_rest_say(by_its_rig, depth_um):
     """The course of the compression from the balance of forces of two worn pairs, against the drive in motion."""
     drive = by_its_rig
-    worn = drive.features(Added("tooth_wear", depth_um, {"gear": "driver"}))
+    worn = drive.features(AddedEffect("tooth_wear", depth_um, {"gear": "driver"}))
     healthy, expected = drive.healthy, drive.worn_curve_um(depth_um)
     known = np.isfinite(worn.curve_um) & np.isfinite(healthy.curve_um)
     found = (worn.curve_um - healthy.curve_um)[known]

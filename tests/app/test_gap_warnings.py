@@ -12,17 +12,17 @@ from gearsig.angle import find_shaft_angle
 from gearsig.errors import RefusalError
 from gearsig.gap import (
     DRIVER,
-    Added,
+    AddedEffect,
     OperatingCondition,
     ReducedRecording,
     Twin,
     conditions_of,
-    exchanged,
+    pattern_mismatch_text,
     reduce_recording,
-    strange_pattern,
-    strange_teeth,
+    swapped_recordings_text,
+    teeth_mismatch_text,
+    tooth_count_mismatch_text,
     unexpected_findings,
-    wrong_teeth,
 )
 from gearsig.prepared import PreparedRecording
 from gearsig.recording import Recording
@@ -31,7 +31,7 @@ from sims import simulate
 from sims.registry import gap_simulator
 
 POINT = OperatingCondition(1500.0, 60.0)
-CHIPPED = Added("chipped_tooth", 2.5, {"gear": "driver", "tooth": 3.0, "width_percent": 85.0})
+CHIPPED = AddedEffect("chipped_tooth", 2.5, {"gear": "driver", "tooth": 3.0, "width_percent": 85.0})
 
 
 @cache
@@ -71,15 +71,17 @@ def with_wrong_teeth() -> ReducedRecording:
 @pytest.mark.slow
 def test_another_specimen_is_noticed_and_a_damaged_gear_is_not_another_machine() -> None:
     healthy = gathered(0, 0)
-    assert strange_pattern(gathered(0, 1), healthy, "now") == []
-    assert strange_pattern(gathered(0, 1, chipped=True), healthy, "now") == []
-    (remark,) = strange_pattern(gathered(3, 1), healthy, "now")
+    assert pattern_mismatch_text(gathered(0, 1), healthy, "now") == []
+    assert pattern_mismatch_text(gathered(0, 1, chipped=True), healthy, "now") == []
+    (remark,) = pattern_mismatch_text(gathered(3, 1), healthy, "now")
     assert "another machine" in remark
 
 
 @pytest.mark.slow
 def test_gears_without_a_pattern_are_not_another_machine() -> None:
-    assert strange_pattern(reduce_recording(_flawless(1), rig()), reduce_recording(_flawless(2), rig()), "now") == []
+    assert (
+        pattern_mismatch_text(reduce_recording(_flawless(1), rig()), reduce_recording(_flawless(2), rig()), "now") == []
+    )
 
 
 def _flawless(seed: int) -> Recording:
@@ -97,9 +99,9 @@ def _flawless(seed: int) -> Recording:
 @pytest.mark.slow
 def test_the_teeth_of_another_rig_are_noticed_and_the_right_number_is_told() -> None:
     for right in (gathered(0, 1), gathered(0, 1, chipped=True)):
-        assert strange_teeth(right, "now") == []
-        assert wrong_teeth(right, "now") == []
-    (doubt,) = wrong_teeth(with_wrong_teeth(), "now")
+        assert teeth_mismatch_text(right, "now") == []
+        assert tooth_count_mismatch_text(right, "now") == []
+    (doubt,) = tooth_count_mismatch_text(with_wrong_teeth(), "now")
     assert "29 times a revolution" in doubt
     assert "37 teeth" in doubt
 
@@ -107,31 +109,31 @@ def test_the_teeth_of_another_rig_are_noticed_and_the_right_number_is_told() -> 
 @pytest.mark.slow
 def test_a_healthy_reference_that_fits_the_teeth_lifts_the_doubt_of_them() -> None:
     unlike = with_wrong_teeth()
-    assert len(wrong_teeth(unlike, "now", unlike)) == 1
-    assert strange_teeth(unlike, "now") == []  # it is said once
-    assert wrong_teeth(unlike, "now", gathered(0, 1)) == []
+    assert len(tooth_count_mismatch_text(unlike, "now", unlike)) == 1
+    assert teeth_mismatch_text(unlike, "now") == []  # it is said once
+    assert tooth_count_mismatch_text(unlike, "now", gathered(0, 1)) == []
 
 
 @pytest.mark.slow
 def test_without_a_mark_on_the_shaft_its_teeth_are_not_counted() -> None:
     """The average over a shaft whose angle was found by the teeth holds for those teeth only."""
-    assert wrong_teeth(replace(with_wrong_teeth(), marks=(False, False)), "now") == []
+    assert tooth_count_mismatch_text(replace(with_wrong_teeth(), marks=(False, False)), "now") == []
 
 
 def test_teeth_that_explain_little_are_a_remark_where_no_other_number_explains_more() -> None:
     strange = replace(with_wrong_teeth(), marks=(False, False))
-    (remark,) = strange_teeth(strange, "now")
+    (remark,) = teeth_mismatch_text(strange, "now")
     assert "37/53" in remark
 
 
 @pytest.mark.slow
 def test_recording_and_reference_exchanged_are_noticed_by_the_sign_of_the_change() -> None:
     healthy, chipped = gathered(0, 1), gathered(0, 2, chipped=True)
-    (doubt,) = exchanged(healthy, chipped, "now")
+    (doubt,) = swapped_recordings_text(healthy, chipped, "now")
     assert "may have been exchanged" in doubt
-    assert exchanged(chipped, healthy, "now") == []
-    assert exchanged(healthy, gathered(0, 3), "now") == []
-    assert exchanged(gathered(3, 1), healthy, "now") == []  # another specimen is no exchange
+    assert swapped_recordings_text(chipped, healthy, "now") == []
+    assert swapped_recordings_text(healthy, gathered(0, 3), "now") == []
+    assert swapped_recordings_text(gathered(3, 1), healthy, "now") == []  # another specimen is no exchange
 
 
 @pytest.mark.slow

@@ -6,12 +6,12 @@ from pathlib import Path
 from typer.testing import CliRunner
 
 from app.cli.main import app
-from gearsig.gap import Added, OperatingCondition
+from gearsig.gap import AddedEffect, OperatingCondition
 from gearsig.rig import GearPair, Rig, Shaft
 from sims.registry import gap_simulator
 
 RIG = Rig("bench", (Shaft("a"), Shaft("b")), (GearPair("p", "a", "b", 21, 50, 2.0),))
-CRACK = Added("root_crack", 2.0, {"gear": "driver", "tooth": 4.0})
+CRACK = AddedEffect("root_crack", 2.0, {"gear": "driver", "tooth": 4.0})
 
 
 def run(*words: str) -> tuple[int, str]:

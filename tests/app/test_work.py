@@ -12,7 +12,7 @@ import pytest
 from streamlit.testing.v1 import AppTest
 
 from app.dashboard import work as beside
-from app.dashboard.work import Cancelled, Work, kept, tidy_later
+from app.dashboard.work import Cancelled, Work, collect_garbage_later, kept
 from gearsig.errors import InputError
 
 
@@ -149,10 +149,10 @@ def test_garbage_is_collected_once_for_many_runs_of_a_page(monkeypatch: pytest.M
     monkeypatch.setattr(beside, "_later", lambda _, function: waiting.append(function))
     beside._is_tidied_soon.clear()
     for _ in range(5):
-        tidy_later()
+        collect_garbage_later()
     assert len(waiting) == 1
     waiting[0]()
-    tidy_later()
+    collect_garbage_later()
     assert len(waiting) == 2
     beside._is_tidied_soon.clear()
 

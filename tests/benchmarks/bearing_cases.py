@@ -4,7 +4,7 @@ Draws motors on two rolling bearings as they stand on test benches: deep groove 
 that slows the motor down and presses them, shaft harmonics, mains, noise that the shaft modulates, resonances of their
 own for each of up to three sensors, and a damage on one part of one bearing or none; of an outer race at one of three
 positions about the load zone. Sound machines come with what is mistaken for a bearing: a smooth tone near a ball-pass
-order, elements that pass through the load zone, knocks of another machine, looseness. Prints right, unsure, missed and
+order, elements that pass through the load zone, impacts of another machine, looseness. Prints right, unsure, missed and
 wrong by part and by the damage's strength, and what is named on sound machines: of the recording alone, beside one of
 the same motor when it was sound, and of its halves against each other. The signal model is after Antoni and Randall
 (2003), and independent of the product's simulators. With `hard` as a third argument motors are drawn that depart from

@@ -35,7 +35,7 @@ from tests.kinematic.speed import Wander
 BEARINGS = {"in": "front", "out": "rear"}
 FAULTS = ("none", "tooth", "outer", "inner", "eccentric")
 LEVELS = {"weak": 0.1, "medium": 0.4, "strong": 1.5}
-"""Peak of a knock against the rms of the good machine's vibration; depth of modulation for an eccentric gear / 2."""
+"""Peak of an impact against the rms of the good machine's vibration; depth of modulation for an eccentric gear / 2."""
 
 
 @dataclass(frozen=True)
@@ -81,18 +81,18 @@ def _model(rng: np.random.Generator, rpm: float, fault: str, size: float, shaft:
     eccentric = {
         s: (size / 2 if fault == "eccentric" and s == shaft else rng.uniform(0.01, 0.1)) for s in ("in", "out")
     }
-    knock = size * rms * 3
+    impact = size * rms * 3
     return KinematicModel(
         speed=Wander(rpm, rng.uniform(0, 0.01), rng.uniform(0.1, 1.0)),
         meshes=(MeshHarmonics("stage", tuple(levels), tuple(rng.uniform(0, 6.28, 3))),),
         modulations=tuple(MeshModulation("stage", s, m, m / 2) for s, m in eccentric.items()),
         tooth_variations=tuple(ToothVariation("stage", s, rng.uniform(0.005, 0.05), 0.02) for s in ("in", "out")),
         tooth_damages=(
-            ToothDamage("stage", shaft, angle, knock, rng.uniform(2000, 5000), 0.05, 0.2, 0.15 * size, 0.1 * size),
+            ToothDamage("stage", shaft, angle, impact, rng.uniform(2000, 5000), 0.05, 0.2, 0.15 * size, 0.1 * size),
         )
         if fault == "tooth"
         else (),
-        bearing_faults=(BearingFault(BEARINGS[shaft], fault, knock, rng.uniform(2500, 5000), 0.04, 0.01, 0.2),)
+        bearing_faults=(BearingFault(BEARINGS[shaft], fault, impact, rng.uniform(2500, 5000), 0.04, 0.01, 0.2),)
         if fault in ("outer", "inner")
         else (),
         shaft_orders=(ShaftOrder("in", rng.uniform(0, 0.5)), ShaftOrder("out", rng.uniform(0, 0.5))),

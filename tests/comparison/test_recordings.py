@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gearsig.comparison import Comparison, LineLevel, compare, missing_words
+from gearsig.comparison import Comparison, LineLevel, compare, missing_line_text
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import plus_minus
 from gearsig.recording import Channel, Recording
@@ -354,7 +354,7 @@ def test_a_run_up_has_no_speed_of_its_own_and_its_scatter_is_no_missing_line() -
     assert "levels of the simulation are means" in speeds
     said = " ".join((found.verdict, *found.findings))
     assert "too strong" not in said
-    hidden = [x for x in found.channels[0].lines if missing_words(x) == "hidden by the simulation's scatter"]
+    hidden = [x for x in found.channels[0].lines if missing_line_text(x) == "hidden by the simulation's scatter"]
     assert {x.order for x in hidden} >= {float(TEETH[0]), 2.0 * TEETH[0]}
     assert not any(
         x.label in text for x in hidden for text in found.findings if text.startswith("The simulation lacks")

@@ -38,7 +38,7 @@ def test_a_damaged_tooth_is_found_at_its_place() -> None:
     assert (found.code, found.kind) == ("tooth-local-damage", Kind.FAULT)
     assert found.where.shaft == "in"
     assert found.where.angle_deg == pytest.approx(144.0, abs=10.0)
-    assert found.where.tooth in (11, 12)  # 0.4 of 27 teeth: the eleventh; a knock rings on into the next
+    assert found.where.tooth in (11, 12)  # 0.4 of 27 teeth: the eleventh; an impact rings on into the next
     assert found.strength is not None
     assert found.strength.ratio_db is not None
     assert found.strength.ratio_db > 10

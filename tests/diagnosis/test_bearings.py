@@ -457,12 +457,12 @@ def test_noise_that_the_supplys_pull_modulates_is_no_race() -> None:
 @pytest.mark.parametrize(
     ("course", "is_named"),
     [
-        ("knocks", True),
-        ("slow knocks", True),
+        ("impacts", True),
+        ("slow impacts", True),
         ("one sine", False),
         ("passing elements", False),
         ("dips", False),
-        ("knocks turned round", False),
+        ("impacts turned round", False),
     ],
 )
 def test_only_what_rises_and_rings_down_at_a_races_order_is_called_damage(course: str, is_named: bool) -> None:
@@ -470,12 +470,12 @@ def test_only_what_rises_and_rings_down_at_a_races_order_is_called_damage(course
     quiet = motor("", seed=3)
     since = np.arange(quiet.n_samples) / quiet.sampling_rate_hz * 3.585 * 0.997 * MOTOR_HZ % 1  # in intervals
     courses = {
-        "knocks": np.exp(-since / 0.15),
-        "slow knocks": np.exp(-since / 1.5),
+        "impacts": np.exp(-since / 0.15),
+        "slow impacts": np.exp(-since / 1.5),
         "one sine": np.cos(2 * np.pi * since),
         "passing elements": np.abs(np.cos(np.pi * since)),
         "dips": -np.exp(-np.minimum(since, 1 - since) / 0.15),
-        "knocks turned round": -np.exp(-since / 0.15),
+        "impacts turned round": -np.exp(-since / 0.15),
     }
     modulation = (courses[course] - courses[course].mean()) / courses[course].std()
     carrier = 3 * np.random.default_rng(4).standard_normal(quiet.n_samples)
@@ -564,7 +564,7 @@ def test_two_races_do_not_explain_each_other_away() -> None:
 def test_a_race_whose_only_lines_are_beside_those_of_its_shaft_is_not_called_sound(
     strikes: float, *, is_race: bool
 ) -> None:
-    """It rings longer than from knock to knock, and passes the load once a turn."""
+    """It rings longer than from impact to impact, and passes the load once a turn."""
     recording = at_sensors(3.3, (0.0,))
     turns = 29.0 * np.arange(recording.n_samples) / recording.sampling_rate_hz
     ringing = np.random.default_rng(9).standard_normal(len(turns)) * (1 + np.cos(2 * np.pi * strikes * turns))

@@ -12,8 +12,8 @@ from tests.kinematic.model import BearingFault
 RINGS_AT_HZ = 4100.0
 
 
-def damaged(knock: float, ring_hz: float = RINGS_AT_HZ) -> Analysis:
-    fault = BearingFault("front", "inner", knock, ring_hz, 0.02, 0.01, 0.2)
+def damaged(impact: float, ring_hz: float = RINGS_AT_HZ) -> Analysis:
+    fault = BearingFault("front", "inner", impact, ring_hz, 0.02, 0.01, 0.2)
     return analyze(record(replace(GOOD, bearing_faults=(fault,)), seconds=8.0))
 
 

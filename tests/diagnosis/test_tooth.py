@@ -49,7 +49,7 @@ def test_equal_gears_cannot_be_told_apart_and_are_both_named() -> None:
 
 
 def test_beside_an_event_that_chance_hardly_explains_no_tooth_is_called_sound() -> None:
-    """Each tooth knocks, the largest twice as hard as usual; where all others are still, it is a suspicion."""
+    """Each tooth impacts, the largest twice as hard as usual; where all others are still, it is a suspicion."""
     sizes = 0.5 * np.exp(0.4 * np.random.default_rng(3).standard_normal(27))
     sizes[3] = 0.95
     times = np.arange(0.01, 4.95, 1 / 27 / SHAFT_HZ)
@@ -73,9 +73,9 @@ def test_a_single_shock_is_told_as_one() -> None:
 def test_an_event_of_every_second_revolution_is_no_tooth() -> None:
     analysis = analyze(with_knocks(record(STEADY), np.arange(0.01, 5.0, 2 / SHAFT_HZ)))
     assert "event-in-some-revolutions" in codes(analysis, Kind.CANNOT_TELL)
-    # A tooth's mates take its load over unequally: it knocks less in the revolutions between, and is damaged as well.
-    knocks = np.arange(0.01, 5.0, 1 / SHAFT_HZ)
-    unequal = with_knocks(with_knocks(record(STEADY), knocks[::2], size=60.0), knocks[1::2], size=25.0)
+    # A tooth's mates take its load over unequally: it impacts less in the revolutions between, and is damaged as well.
+    impacts = np.arange(0.01, 5.0, 1 / SHAFT_HZ)
+    unequal = with_knocks(with_knocks(record(STEADY), impacts[::2], size=60.0), impacts[1::2], size=25.0)
     assert "tooth-local-damage" in codes(analyze(unequal))
     assert "tooth-local-damage" not in codes(analysis)
     assert "no-tooth-local-damage" not in codes(analysis)
@@ -172,7 +172,7 @@ def test_an_event_that_does_not_come_back_from_turn_to_turn_is_withheld_and_that
 
 
 def knocking_teeth(sizes: np.ndarray, *, seed: int = 0, sign: float = 1.0) -> Recording:
-    """Return the gearbox with a knock of its own size at each tooth of the input gear."""
+    """Return the gearbox with an impact of its own size at each tooth of the input gear."""
     times = np.arange(0.01, 4.95, 1 / 27 / SHAFT_HZ)
     recording = with_knocks(record(STEADY, seed=seed), times, np.resize(sizes, len(times)))
     return replace(recording, samples=recording.samples * np.array([[sign], [1.0]]))

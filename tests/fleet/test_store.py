@@ -22,11 +22,11 @@ from gearsig.fleet import (
     FilePattern,
     TrendSettings,
     date_in_name,
+    excluded_text,
     find_recordings,
     open_fleet,
     origin_rows,
     origins,
-    passed_over_text,
 )
 from gearsig.rig import ConstantSpeed
 from tests.fleet.recordings import PATTERN, write_recording_file
@@ -307,19 +307,19 @@ def test_what_a_pattern_leaves_out_is_said(make_recordings, tmp_path):
     data = make_recordings("pump 1", [1.0, 1.1])
     for name in ("DE_2026-02-01.csv", "DE_20261301.csv"):
         (data / "pump 1" / name).write_text("")
-    passed_over = []
-    assert len(origins([data], pattern=PATTERN, on_passed_over=passed_over.append)) == 2
-    reasons = {each.path.name: each.reason for each in passed_over}
+    excluded = []
+    assert len(origins([data], pattern=PATTERN, on_excluded=excluded.append)) == 2
+    reasons = {each.path.name: each.reason for each in excluded}
     no_date = "20261301 is no date in the form %Y%m%d"
     assert reasons == {"DE_2026-02-01.csv": "does not match the pattern", "DE_20261301.csv": no_date}
-    assert passed_over_text(passed_over * 2) == (
+    assert excluded_text(excluded * 2) == (
         "4 recordings are passed over: pump 1/DE_2026-02-01.csv (does not match the pattern); pump 1/DE_20261301.csv "
         f"({no_date}); pump 1/DE_2026-02-01.csv (does not match the pattern); and 1 more"
     )
     with pytest.raises(InputError, match=r"no recordings that match .*; 1 recording is passed over: pump 1/DE_2026"):
         origins([data / "pump 1" / "DE_20261301.csv"], pattern=PATTERN)
     added = open_fleet(tmp_path / "store", create=True).add(data, pattern=PATTERN, n_processes=1)
-    assert (len(added.added), {each.path.name for each in added.passed_over}) == (2, set(reasons))
+    assert (len(added.added), {each.path.name for each in added.excluded}) == (2, set(reasons))
 
 
 def test_channels_that_bear_a_records_number_are_one_series(tmp_path):

@@ -124,7 +124,7 @@ def test_files_that_the_pattern_leaves_out_are_said_once(make_recordings, tmp_pa
     assert sorted(event.kind for event in watching.events) == ["added", "passed over", "passed over"]
     said = [event.as_dict() for event in watching.events if event.kind == "passed over"]
     assert "1 recording is passed over: pump 1/DE_2026-02-01.csv (does not match the pattern)" in said[0]["text"]
-    assert [(Path(each["file"]).name, each["reason"]) for each in said[1]["passed_over"]] == [
+    assert [(Path(each["file"]).name, each["reason"]) for each in said[1]["excluded"]] == [
         ("DE_20261301.csv", "20261301 is no date in the form %Y%m%d")
     ]
 
@@ -137,8 +137,8 @@ def test_add_says_what_the_pattern_leaves_out(make_recordings, tmp_path):
         done = CliRunner().invoke(app, [*words, *options])
         assert "1 recording is passed over: pump 1/DE_2026-02-01.csv (does not match the pattern)" in done.stderr
         if "--json" in options:
-            passed_over = json.loads(done.stdout)["passed_over"]
-            assert [(Path(each["file"]).name, each["reason"]) for each in passed_over] == [
+            excluded = json.loads(done.stdout)["excluded"]
+            assert [(Path(each["file"]).name, each["reason"]) for each in excluded] == [
                 ("DE_2026-02-01.csv", "does not match the pattern")
             ]
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from gearsig.gap import (
-    Added,
+    AddedEffect,
     AngleCurves,
     AverageCurves,
     ConditionFacts,
@@ -279,7 +279,7 @@ def causes() -> tuple[GapCause, ...]:
             "mm",
             0.88,
             Interval(2.3, 1.9, 2.8),
-            Added("root_crack", 2.3, {"gear": "driver", "tooth": 21.0}),
+            AddedEffect("root_crack", 2.3, {"gear": "driver", "tooth": 21.0}),
             "tooth 21 of the driver",
             shrinkage(0.72, 0.64, 0.79),
             (
@@ -297,7 +297,7 @@ def causes() -> tuple[GapCause, ...]:
             "mm",
             0.05,
             Interval(1.1, 0.7, 1.8),
-            Added("tooth_spall", 1.1, {"gear": "driver", "tooth": 21.0}),
+            AddedEffect("tooth_spall", 1.1, {"gear": "driver", "tooth": 21.0}),
             "tooth 21 of the driver",
             shrinkage(0.31, 0.12, 0.44, placebo=0.19),
             (
@@ -312,7 +312,7 @@ def causes() -> tuple[GapCause, ...]:
             "um",
             0.04,
             Interval(14.0, 6.0, 25.0),
-            Added("pitch_error", 14.0, {"gear": "driver"}),
+            AddedEffect("pitch_error", 14.0, {"gear": "driver"}),
             "",
             shrinkage(0.08, -0.1, 0.2, placebo=0.11),
             (Evidence("sidebands of the input shaft, 1 to 2 orders away", 6.6, 2.0, 1.4, speaks_for=False),),

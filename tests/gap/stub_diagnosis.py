@@ -26,7 +26,7 @@ def diagnose_gap(*given, **more):
 
 stub = ModuleType("gearsig.gap._diagnose")
 stub.diagnose_gap = diagnose_gap
-stub.effects_without_place = None  # of the room's face, not of a diagnosis
+stub.effects_without_setting = None  # of the room's face, not of a diagnosis
 sys.modules["gearsig.gap._diagnose"] = stub
 """
 

@@ -10,7 +10,7 @@ import pytest
 from gearsig.checks import FloatArray
 from gearsig.gap import (
     change_features,
-    feature_words,
+    feature_text,
     gear_frame,
     reduce_recording,
     soft_size,
@@ -74,7 +74,7 @@ def test_it_is_a_feature_of_a_change_with_a_name_in_words_and_no_part_of_its_siz
     values = np.zeros(len(names))
     values[own] = 99.0
     assert soft_size(names, values) == 0.0
-    words = {feature_words(names[i], gear_frame(RIG)) for i in own}
+    words = {feature_text(names[i], gear_frame(RIG)) for i in own}
     assert len(words) == len(own)
 
 

@@ -92,7 +92,7 @@ def test_energy_peaks_at_the_tooth_and_is_over_the_median_one() -> None:
 
 
 def test_the_simulated_change_has_the_size_of_the_measured_one() -> None:
-    """Half the knock has a quarter of the energy, in the units of the measured median tooth."""
+    """Half the impact has a quarter of the energy, in the units of the measured median tooth."""
     simulated = knocking(0.75, seed=2)
     driver = angle_curves(knocking(), healthy(), simulated, healthy=healthy())[0]
     assert driver.after.max() / driver.measured.max() == pytest.approx(0.25, rel=0.1)
@@ -120,7 +120,9 @@ def test_the_reference_stands_beside_recording_and_simulation() -> None:
     without = spectrum_curves(knocking(), healthy())[0]
     assert not len(without.reference)
     assert not len(without.reference_floor)
-    driver = spectrum_curves(healthy(), knocking(), reference=reference)[0]  # the simulation, not the reference, knocks
+    driver = spectrum_curves(healthy(), knocking(), reference=reference)[
+        0
+    ]  # it is the simulation that has impacts
     assert np.nanmax(np.abs(gap_by_order(against_reference(driver), driver.reference))) < 6.0
     assert np.nanmax(np.abs(gap_by_order(driver, driver.before))) > 10.0
 

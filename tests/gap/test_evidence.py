@@ -14,7 +14,7 @@ from gearsig.gap import (
     evidence_of,
     evidence_of_feature,
     family_of,
-    feature_words,
+    feature_text,
     gear_frame,
     load_learned,
 )
@@ -79,6 +79,6 @@ def test_small_predictions_speak_for_an_effect_by_their_size_alone() -> None:
 
 def test_every_feature_has_words_of_its_own_and_a_family() -> None:
     names = load_learned().change_names
-    words = [feature_words(name, gear_frame(RIG)) for name in names]
+    words = [feature_text(name, gear_frame(RIG)) for name in names]
     assert len(set(words)) == len(names)
     assert all(family_of(name) for name in names)

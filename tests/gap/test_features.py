@@ -25,10 +25,10 @@ from gearsig.orders import average_lines, separate_shafts
 from gearsig.recording import Channel, Recording
 from tests.gap.synthetic import MESH_AMPLITUDES, RATE_HZ, RIG, SPEED_HZ, TEETH, record, ringing
 
-Added = Callable[[FloatArray, FloatArray], FloatArray]
+AddedEffect = Callable[[FloatArray, FloatArray], FloatArray]
 
 
-def reduced(added: Added | None = None, **settings: float) -> ReducedRecording:
+def reduced(added: AddedEffect | None = None, **settings: float) -> ReducedRecording:
     return reduce_recording(record(added, **settings), RIG)  # type: ignore[arg-type]  # seed is whole
 
 

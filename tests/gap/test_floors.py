@@ -18,7 +18,7 @@ from gearsig.gap import (
     family_of,
     family_size,
     gap_size,
-    independent_whole,
+    independent_floor_size,
     load_population,
     pooled_scatter,
     population_file,
@@ -89,14 +89,14 @@ def test_one_healthy_machine_in_twenty_is_beyond_one() -> None:
 def test_the_whole_of_independent_features_is_that_of_draws() -> None:
     rng = np.random.default_rng(11)
     sizes = [soft_size(NAMES, row / 1.96) for row in rng.standard_normal((1000, 90))]
-    assert np.mean(np.array(sizes) > independent_whole(NAMES)) == pytest.approx(0.05, abs=0.025)
+    assert np.mean(np.array(sizes) > independent_floor_size(NAMES)) == pytest.approx(0.05, abs=0.025)
 
 
 def test_the_interval_holds_the_size_without_scatter() -> None:
     """Features of the truth plus scatter: nine in ten intervals hold the size of the truth."""
     truth, held = np.zeros(90), 0
     truth[:15] = 12.0
-    value = soft_size(NAMES, truth / 2.0) / independent_whole(NAMES)
+    value = soft_size(NAMES, truth / 2.0) / independent_floor_size(NAMES)
     for seed in range(100):
         drawn = truth + 0.5 * np.random.default_rng([seed, 1]).standard_normal(90)
         interval = gap_size(features(drawn, 0.5, seed=seed), FLOOR).structural
@@ -107,7 +107,7 @@ def test_the_interval_holds_the_size_without_scatter() -> None:
 
 def test_both_floors_are_used() -> None:
     size = gap_size(features(np.full(90, 6.0), scatter_db=1.0), FLOOR)
-    whole = independent_whole(NAMES)
+    whole = independent_floor_size(NAMES)
     assert size.structural.value == pytest.approx(3.0 * 6 ** (1 / 4) / whole)
     assert size.repeatability.value == pytest.approx(6.0 / 1.96 * 6 ** (1 / 4) / whole)
 

@@ -7,7 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from gearsig.gap import GapOutcome, attribute, conditions_of, diagnose_gap, twin_rig, with_stage, within_the_floor
+from gearsig.gap import (
+    GapOutcome,
+    attribute,
+    conditions_of,
+    diagnose_gap,
+    twin_rig,
+    with_stage,
+    with_unknown_within_floor,
+)
 from gearsig.prepared import PreparedRecording
 from gearsig.recording import Recording, read_recording
 from gearsig.rig import GearPair, OperatingPoint, Rig, Shaft, read_rig
@@ -83,7 +91,7 @@ def test_two_halves_of_one_recording_are_no_gap(name: str) -> None:
     twin = simulator.twin_of(twin_rig(first.rig)[0])
     conditions, _ = conditions_of([PreparedRecording(second)], [PreparedRecording(first)], twin)
     found = attribute(conditions, simulator.gap_effects(), (), twin, None, lambda *_: None, max_tried=0)
-    probabilities = within_the_floor(found.probabilities(), conditions[0].size.structural)
+    probabilities = with_unknown_within_floor(found.probabilities(), conditions[0].size.structural)
     assert found.calibration.outcome(probabilities) is GapOutcome.NO_GAP, (conditions[0].size, list(probabilities)[:3])
 
 

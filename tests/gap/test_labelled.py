@@ -146,7 +146,7 @@ def test_a_folder_without_a_table_says_what_belongs_there(tmp_path: Path) -> Non
 # --------------------
 
 
-def knock(order: float, size: float) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+def impact(order: float, size: float) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
     return lambda _time, revolutions: size * ringing(order * revolutions)
 
 
@@ -159,11 +159,11 @@ def test_a_fault_of_ones_own_is_a_class_and_what_was_read_is_kept(tmp_path: Path
         return recording.with_rig(rig).with_name(name)
 
     healthy = [PreparedRecording(named(record(seed=9), "healthy"))]
-    now = [PreparedRecording(named(record(knock(3.37, 4.0), seed=1), "now"))]
+    now = [PreparedRecording(named(record(impact(3.37, 4.0), seed=1), "now"))]
     conditions, _ = conditions_of(now, healthy, twin)
     labelled = [
         *(
-            LabelledRecording(named(record(knock(3.37, s), seed=i), f"{i}"), "loose_cover")
+            LabelledRecording(named(record(impact(3.37, s), seed=i), f"{i}"), "loose_cover")
             for i, s in ((2, 3.0), (3, 6.0))
         ),
         *(LabelledRecording(named(record(seed=i), f"{i}"), NONE) for i in (4, 5)),

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from gearsig.gap import (
-    Added,
+    AddedEffect,
     Condition,
     GapCause,
     GapOutcome,
@@ -88,7 +88,7 @@ def test_labels_are_asked_for_where_it_is_not_settled() -> None:
 HERE = OperatingCondition(1500.0, 60.0)
 NAMES = ("mesh.total", "raw.level")
 CRACK, SPALL = (
-    cast("TriedEffect", SimpleNamespace(name=name, fit=SimpleNamespace(added=Added(name, 1.0))))
+    cast("TriedEffect", SimpleNamespace(name=name, fit=SimpleNamespace(added=AddedEffect(name, 1.0))))
     for name in ("root_crack", "tooth_spall")
 )
 TITLES = ("a crack", "a spall")

@@ -20,19 +20,19 @@ from gearsig.gap import (
     PlaceKind,
     ReducedRecording,
     StructuralFloor,
-    beyond_the_mesh,
     change_features,
+    change_relative_to_mesh,
     difference_features,
+    distributed_place,
     gap_places,
-    locate_all_round,
     reduce_recording,
+    with_unchanged_races_lowered,
     without_multiples,
-    without_silent_races,
 )
 from sims.effects import as_gap_effect, effect
 from tests.gap.synthetic import RIG, SPEED_HZ, TEETH, record, ringing
 
-Added = Callable[[FloatArray, FloatArray], FloatArray]
+AddedEffect = Callable[[FloatArray, FloatArray], FloatArray]
 RATIO = TEETH[0] / TEETH[1]
 OUTER = 9 / 2 * (1 - 7.94 / 39.04)
 FACTS = ConditionFacts("now", OperatingCondition(60.0 * SPEED_HZ, 50.0), 100.0, 4.0, 20480.0)
@@ -56,16 +56,18 @@ def floor(is_reference: bool) -> StructuralFloor:
 def condition_of(now: ReducedRecording, *, is_reference: bool = True) -> Condition:
     """Return a recording beside a healthy one, which stands for the simulation as well."""
     floors = {flag: SimpleNamespace(floor=floor(flag)) for flag in (is_reference,)}
-    learned = SimpleNamespace(credibility=1.0, recognisers=floors)
+    learned = SimpleNamespace(credibility=1.0, classifiers=floors)
     return Condition(FACTS, now, healthy(), healthy() if is_reference else None, learned)
 
 
-def places_of(added: Added | None = None, *, is_reference: bool = True, **settings: float) -> tuple[GapPlace, ...]:
+def places_of(
+    added: AddedEffect | None = None, *, is_reference: bool = True, **settings: float
+) -> tuple[GapPlace, ...]:
     now = reduce_recording(record(added, seed=1, **settings), RIG)
     return gap_places(condition_of(now, is_reference=is_reference))
 
 
-def tone(order: float, amplitude: float) -> Added:
+def tone(order: float, amplitude: float) -> AddedEffect:
     return lambda _, r: amplitude * np.cos(2 * np.pi * order * r + 0.3)
 
 
@@ -78,8 +80,12 @@ def test_only_a_race_with_lines_of_its_own_is_not_counted_against() -> None:
 
     rolling, striking = struck(OUTER, 2.0), struck(1.0, 4.0)
     found = {"bearing_outer_race": 0.5, "root_crack": 0.3, "none": 0.2}
-    assert without_silent_races(found, [rolling]) == without_silent_races(found, [striking, rolling]) == found
-    assert without_silent_races(found, [striking])["bearing_outer_race"] == pytest.approx(0.1 / 0.6)
+    assert (
+        with_unchanged_races_lowered(found, [rolling])
+        == with_unchanged_races_lowered(found, [striking, rolling])
+        == found
+    )
+    assert with_unchanged_races_lowered(found, [striking])["bearing_outer_race"] == pytest.approx(0.1 / 0.6)
 
 
 @pytest.mark.slow
@@ -196,9 +202,9 @@ def test_the_mesh_alone_is_the_mesh_alone() -> None:
 
 def test_a_gain_moves_no_ratio() -> None:
     names = ("mesh.total", "sideband.driver.1", "shaft.driver.1", "shaft.driver.1.to_mesh")
-    assert beyond_the_mesh(names, np.array([6.0, 0.0, 6.0, 0.0])) == pytest.approx([6.0, 0.0, 0.0, 0.0])
-    assert beyond_the_mesh(names, np.array([-6.0, 6.0, 0.0, 6.0])) == pytest.approx([-6.0, 0.0, 0.0, 0.0])
-    assert beyond_the_mesh(names, np.array([1.0, 9.0, 8.0, 7.0])) == pytest.approx([1.0, 9.0, 7.0, 7.0])
+    assert change_relative_to_mesh(names, np.array([6.0, 0.0, 6.0, 0.0])) == pytest.approx([6.0, 0.0, 0.0, 0.0])
+    assert change_relative_to_mesh(names, np.array([-6.0, 6.0, 0.0, 6.0])) == pytest.approx([-6.0, 0.0, 0.0, 0.0])
+    assert change_relative_to_mesh(names, np.array([1.0, 9.0, 8.0, 7.0])) == pytest.approx([1.0, 9.0, 7.0, 7.0])
 
 
 def test_shares_add_up_to_one_at_most() -> None:
@@ -246,13 +252,13 @@ def compared(change_db: dict[str, float], now: ReducedRecording | None = None) -
 def test_the_figure_of_a_place_is_the_one_that_was_scored() -> None:
     """The level of a pattern hardly moved; what exceeds its floor is how much the patterns differ."""
     level, apart = "tooth.driven.level", "change.driven.elsewhere"
-    round_it = locate_all_round(compared({level: 0.18, apart: 6.0}), DRIVEN, "shaft out", "a1")
+    round_it = distributed_place(compared({level: 0.18, apart: 6.0}), DRIVEN, "shaft out", "a1")
     assert round_it.change_db == 6.0
     assert "up by 6 dB against what healthy machines change by" in round_it.title
     assert "0.18" not in round_it.title
-    louder = locate_all_round(compared({level: -4.0, apart: 2.0}), DRIVEN, "shaft out", "a1")
+    louder = distributed_place(compared({level: -4.0, apart: 2.0}), DRIVEN, "shaft out", "a1")
     assert louder.title == "pattern of the teeth of shaft out all round, down by 4 dB"
-    shape = locate_all_round(compared({level: 0.5, "tooth.driven.kurtosis": 3.0}), DRIVEN, "shaft out", "a1")
+    shape = distributed_place(compared({level: 0.5, "tooth.driven.kurtosis": 3.0}), DRIVEN, "shaft out", "a1")
     assert shape.follows
     assert "dB" not in shape.title
 

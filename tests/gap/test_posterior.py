@@ -16,7 +16,7 @@ from gearsig.gap import (
     GapOutcome,
     joint_probabilities,
     load_gap_calibration,
-    with_unknown_shared,
+    with_unknown_distributed,
 )
 
 PLAIN = GapCalibration(1.0, 0.0, 0.0, 0.0, 0.0, 0.5, 0.65)
@@ -147,19 +147,19 @@ SCORES = st.dictionaries(st.sampled_from(["a", "b", "c"]), st.floats(-1.0, 1.0),
 
 
 def test_one_takes_of_unknown_what_it_explains() -> None:
-    found = with_unknown_shared(FOUND, {"mine": 0.8})
+    found = with_unknown_distributed(FOUND, {"mine": 0.8})
     assert found == pytest.approx({"mine": 0.4, "clipping": 0.3, NONE: 0.2, UNKNOWN: 0.1})
     assert list(found) == ["mine", "clipping", NONE, UNKNOWN]
 
 
 def test_what_does_not_shrink_the_gap_has_no_share() -> None:
-    assert with_unknown_shared(FOUND, {"mine": -0.3}) == {**FOUND, "mine": 0.0}
-    assert with_unknown_shared(FOUND, {}) == FOUND
+    assert with_unknown_distributed(FOUND, {"mine": -0.3}) == {**FOUND, "mine": 0.0}
+    assert with_unknown_distributed(FOUND, {}) == FOUND
 
 
 @given(scores=SCORES)
 def test_nothing_is_lost_and_only_unknown_gives(scores: dict[str, float]) -> None:
-    found = with_unknown_shared(FOUND, scores)
+    found = with_unknown_distributed(FOUND, scores)
     assert sum(found.values()) == pytest.approx(1.0)
     assert all(p >= 0.0 for p in found.values())
     assert (found["clipping"], found[NONE]) == (0.3, 0.2)

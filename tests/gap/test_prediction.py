@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gearsig.gap import (
-    Added,
+    AddedEffect,
     EffectPath,
     Fold,
     ObservedChange,
@@ -67,7 +67,7 @@ def test_the_right_options_are_found() -> None:
 
 
 def test_candidates_become_one_path_for_each_set_of_options() -> None:
-    added = [Added("unbalance", s, {"gear": g}) for g in ("driver", "driven") for s in (9.0, 3.0)]
+    added = [AddedEffect("unbalance", s, {"gear": g}) for g in ("driver", "driven") for s in (9.0, 3.0)]
     table = np.arange(4.0)[:, None] * np.ones(len(NAMES))
     found = paths_of(NAMES, added, [table[None]])
     assert [p.options["gear"] for p in found] == ["driver", "driven"]

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from gearsig.gap import UNKNOWN, GapEffect, GapPlace, PlaceKind, counted_against, gear_frame, ranked_places
+from gearsig.gap import UNKNOWN, GapEffect, GapPlace, PlaceKind, gear_frame, ranked_places, with_dominant_order_counted
 from tests.gap.synthetic import RIG, TEETH
 
 NAN = float("nan")
@@ -49,7 +49,7 @@ FOUND = {"misalignment": 0.8, "bearing": 0.05, "of my own": 0.05, "none": 0.05, 
 
 
 def against(place: GapPlace) -> dict[str, float]:
-    return counted_against(FOUND, EFFECTS, [place], gear_frame(RIG))
+    return with_dominant_order_counted(FOUND, EFFECTS, [place], gear_frame(RIG))
 
 
 def test_an_order_that_is_most_of_the_gap_counts_against_what_cannot_make_it() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError, RefusalError
-from gearsig.gap import gear_frame, once, reduce_recording, tooth_load_n_per_mm, twin_rig, with_stage
+from gearsig.gap import feature_values, gear_frame, reduce_recording, tooth_load_n_per_mm, twin_rig, with_stage
 from gearsig.rig import Bearing, GearPair, OperatingPoint, Rig, Shaft
 from sims.registry import gap_simulator
 from tests.gap.synthetic import RIG, TEETH, record
@@ -80,7 +80,7 @@ def test_lines_of_the_other_pair_are_background() -> None:
         return sum(swing * 2.0 * np.cos(2 * np.pi * k * mesh * revolutions) for k in (1, 2, 3))
 
     def features(recording, rig):
-        names, values = once(reduce_recording(recording.with_rig(rig), rig))
+        names, values = feature_values(reduce_recording(recording.with_rig(rig), rig))
         return dict(zip(names, values, strict=True))
 
     quiet, loud = features(record(), RIG), record(heard)

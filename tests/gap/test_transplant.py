@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gearsig.gap import load_learned, once, reduce_recording, transplanted
+from gearsig.gap import feature_values, load_learned, predicted_on_baseline, reduce_recording
 from tests.gap.synthetic import RIG, record
 
 LEARNED = load_learned()
@@ -20,12 +20,14 @@ ONLY = len(FEATURES)
 
 @cache
 def healthy() -> dict[str, float]:
-    return dict(zip(*once(reduce_recording(record(), RIG)), strict=True))
+    return dict(zip(*feature_values(reduce_recording(record(), RIG)), strict=True))
 
 
 def moved(change: dict[str, float], real: dict[str, float], level_db: float = 0.0) -> dict[str, float]:
     row = np.array([change.get(name, 0.0) for name in FEATURES])
-    return dict(zip(FEATURES, transplanted(FEATURES, row, healthy(), real, USUAL, level_db).tolist(), strict=True))
+    return dict(
+        zip(FEATURES, predicted_on_baseline(FEATURES, row, healthy(), real, USUAL, level_db).tolist(), strict=True)
+    )
 
 
 def of_harmonics(levels_db: dict[str, float], powers: dict[str, float]) -> dict[str, float]:
@@ -45,9 +47,9 @@ def test_many_changes_at_once_are_each_as_alone() -> None:
     names = (*FEATURES, *NAMES)
     changes = np.random.default_rng(3).normal(0.0, 8.0, (4, len(names)))
     real = {name: value + 2.0 for name, value in healthy().items()}
-    together = transplanted(names, changes, healthy(), real, USUAL, 3.0, -6.0)
+    together = predicted_on_baseline(names, changes, healthy(), real, USUAL, 3.0, -6.0)
     for change, row in zip(changes, together, strict=True):
-        assert transplanted(names, change, healthy(), real, USUAL, 3.0, -6.0) == pytest.approx(row, rel=1e-12)
+        assert predicted_on_baseline(names, change, healthy(), real, USUAL, 3.0, -6.0) == pytest.approx(row, rel=1e-12)
 
 
 @given(st.floats(-20.0, 0.0))
@@ -96,7 +98,11 @@ def test_only_the_lowest_shaft_orders_hang_on_what_a_machine_stands_on() -> None
     names = ("shaft.driver.1", "shaft.driver.2.to_mesh", "sideband.driver.1", "shaft.driver.low")
     change = np.array([20.0 * (name in names) for name in FEATURES])
     rigid = dict(
-        zip(FEATURES, transplanted(FEATURES, change, healthy(), healthy(), USUAL, 0.0, -40.0).tolist(), strict=True)
+        zip(
+            FEATURES,
+            predicted_on_baseline(FEATURES, change, healthy(), healthy(), USUAL, 0.0, -40.0).tolist(),
+            strict=True,
+        )
     )
     assert rigid["shaft.driver.1"] == pytest.approx(10 * np.log10(1.0 + 99e-4))
     assert rigid["shaft.driver.2.to_mesh"] == pytest.approx(rigid["shaft.driver.1"])
@@ -122,7 +128,7 @@ def test_prominence_is_that_of_the_moved_peak() -> None:
 
 def test_nothing_changed_is_nothing_but_repetition() -> None:
     change = np.array([0.0] * ONLY + [USUAL[name] - 200.0 * name.endswith(("level", "peak")) for name in NAMES[ONLY:]])
-    found = transplanted(NAMES, change, healthy(), healthy(), USUAL)
+    found = predicted_on_baseline(NAMES, change, healthy(), healthy(), USUAL)
     named = dict(zip(NAMES, found.tolist(), strict=True))
     assert named["change.driver.level"] == pytest.approx(0.0, abs=1e-6)
     assert named["change.driver.kurtosis"] == pytest.approx(0.0, abs=1e-6)

@@ -7,7 +7,7 @@ import pytest
 from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
 from sklearn.ensemble import ExtraTreesClassifier
 
-from gearsig.gap import LinearRule, Trees
+from gearsig.gap import ForestNodes, LinearRule
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +32,7 @@ def linear(rows: np.ndarray, causes: np.ndarray) -> LinearDiscriminantAnalysis:
 
 def test_trees_say_what_the_forest_says(forest: ExtraTreesClassifier) -> None:
     new = np.random.default_rng(4).normal(size=(100, 12))
-    found = np.array([Trees.of(forest).probabilities(row) for row in new])
+    found = np.array([ForestNodes.of(forest).probabilities(row) for row in new])
     assert found == pytest.approx(forest.predict_proba(new), abs=0.03)  # shares in 15ths, thresholds in half precision
 
 

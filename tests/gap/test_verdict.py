@@ -17,10 +17,10 @@ from gearsig.gap import (
     Interval,
     OperatingCondition,
     PlaceKind,
-    is_settled,
-    rivals,
+    inseparable_effects,
+    names_single_effect,
     unbounded_fits,
-    within_the_floor,
+    with_unknown_within_floor,
 )
 from tests.gap.example_report import (
     cannot_separate_report,
@@ -70,15 +70,15 @@ def test_what_cannot_be_told_apart_is_named_until_it_is_nearly_all_that_effects_
     def with_chances(*chances: float) -> list[GapCause]:
         return [replace(cause, probability=p) for cause, p in zip((first, second, third), chances, strict=True)]
 
-    assert rivals(with_chances(0.49, 0.45, 0.06)) == names
-    assert rivals(with_chances(0.9, 0.06, 0.04)) == names
-    assert rivals(with_chances(0.43, 0.35, 0.22)) == (*names, third.name)
+    assert inseparable_effects(with_chances(0.49, 0.45, 0.06)) == names
+    assert inseparable_effects(with_chances(0.9, 0.06, 0.04)) == names
+    assert inseparable_effects(with_chances(0.43, 0.35, 0.22)) == (*names, third.name)
     three = replace(report, inseparable=(*names, third.name))
     assert three.verdict[1].count(" or ") == 1
     assert three.verdict[1].count(",") == 1
     others = [replace(third, name=f"other {i}", probability=0.1) for i in range(6)]
-    assert len(rivals([replace(first, probability=0.3), second, *others])) == 4
-    assert rivals([]) == ()
+    assert len(inseparable_effects([replace(first, probability=0.3), second, *others])) == 4
+    assert inseparable_effects([]) == ()
 
 
 def test_what_is_next_says_only_what_was_computed() -> None:
@@ -193,10 +193,10 @@ def test_a_fit_that_any_severity_serves_is_a_warning() -> None:
 
 def test_a_gap_within_the_floor_has_no_unknown_cause() -> None:
     found = {UNKNOWN: 0.6, NONE: 0.3, "unbalance": 0.1}
-    assert within_the_floor(found, Interval(0.5, 0.4, 0.6)) == pytest.approx(
+    assert with_unknown_within_floor(found, Interval(0.5, 0.4, 0.6)) == pytest.approx(
         {NONE: 0.9, "unbalance": 0.1, UNKNOWN: 0.0}
     )
-    assert within_the_floor(found, Interval(0.9, 0.7, 1.1)) == found
+    assert with_unknown_within_floor(found, Interval(0.9, 0.7, 1.1)) == found
 
 
 def at(*points: tuple[float, float]) -> tuple[ConditionFacts, ...]:
@@ -208,9 +208,9 @@ def test_where_one_effect_alone_is_likely_no_recording_is_asked_for() -> None:
     report = replace(effect_report(), next_recordings=(), references=("healthy.h5",))
     first, *others = report.causes
     sure = (replace(first, probability=0.996), *(replace(cause, probability=0.001) for cause in others))
-    assert is_settled(sure)
-    assert not is_settled(report.causes)
-    assert not is_settled(sure[:1])
+    assert names_single_effect(sure)
+    assert not names_single_effect(report.causes)
+    assert not names_single_effect(sure[:1])
     assert "further apart" not in replace(report, causes=sure).verdict[3]
 
 

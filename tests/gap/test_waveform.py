@@ -7,7 +7,7 @@ import pytest
 
 from gearsig.gap import SIDEBAND_OFFSETS as OFFSETS
 from gearsig.gap import (
-    Added,
+    AddedEffect,
     GapEffect,
     SimulatedWaveform,
     compare_waveform,
@@ -40,7 +40,7 @@ def noise_alone(seed: int) -> np.ndarray:
 
 
 def compared(observed: np.ndarray, simulated: np.ndarray, severity: float = 1.0, **how: float) -> SimulatedWaveform:
-    found = compare_waveform(Added("root_crack", severity, {"gear": "driver"}), simulated, observed, NOISE, **how)  # type: ignore[arg-type]
+    found = compare_waveform(AddedEffect("root_crack", severity, {"gear": "driver"}), simulated, observed, NOISE, **how)  # type: ignore[arg-type]
     assert found is not None
     return found
 
@@ -91,7 +91,7 @@ def test_the_severity_is_that_of_the_right_size_and_its_interval_holds_it() -> N
 def test_one_severity_grows_as_the_fullest_set_does() -> None:
     def with_length(length: float, severity: float) -> SimulatedWaveform:
         found = compare_waveform(
-            Added("tooth_spall", severity, {"length_mm": length}),
+            AddedEffect("tooth_spall", severity, {"length_mm": length}),
             course(0.0, 0.03 * length, severity**2),
             course(1.0, 0.06, 0.25),
             NOISE,
@@ -114,7 +114,7 @@ def test_where_any_severity_fits_nothing_bounds_it() -> None:
 
 
 def test_where_nothing_was_seen_or_simulated_there_is_no_match() -> None:
-    added = Added("root_crack", 1.0, {"gear": "driver"})
+    added = AddedEffect("root_crack", 1.0, {"gear": "driver"})
     nothing = 0.0 * course(0.0, 0.05)
     assert compare_waveform(added, course(0.0, 0.05), nothing, NOISE) is None
     assert compare_waveform(added, nothing, course(0.0, 0.05), NOISE) is None
@@ -137,7 +137,7 @@ def test_uneven_pitch_is_the_course_of_one_tooth_with_any_pattern() -> None:
     pattern = spread * (rng.normal(size=half) + 1j * rng.normal(size=half)) / np.sqrt(2.0)
     both_sides = np.concatenate([np.conj(pattern[::-1]), pattern])
     seen = 3.0 * both_sides * course(0.0, 0.05)
-    added = Added("pitch_error", 1.0, {"gear": "driver", "tooth": 1.0})
+    added = AddedEffect("pitch_error", 1.0, {"gear": "driver", "tooth": 1.0})
     every = compare_waveform(added, course(0.0, 0.05), seen, NOISE, n_teeth=n_teeth)
     assert every is not None
     assert every.correlation == pytest.approx(1.0, abs=0.01)
@@ -157,7 +157,7 @@ def test_a_pitch_error_of_one_tooth_tells_behind_from_ahead_and_one_tooth_from_a
     hypotheses = {"behind": (course(0.0, 0.05), 0), "ahead": (-course(0.0, 0.05), 0), "all": (course(0.0, 0.05), 29)}
     levels = {}
     for name, (simulated, n_teeth) in hypotheses.items():
-        compared = compare_waveform(Added("pitch_error", 1.0, {}), simulated, seen, NOISE, n_teeth=n_teeth)
+        compared = compare_waveform(AddedEffect("pitch_error", 1.0, {}), simulated, seen, NOISE, n_teeth=n_teeth)
         assert compared is not None
         levels[name] = float(compared.levels.max())
     assert levels["ahead"] > max(levels["behind"], levels["all"]) + 3.0
@@ -178,8 +178,8 @@ def effect(**how: object) -> GapEffect:
 
 
 def test_between_two_lengths_of_a_spall_lie_its_profiles_and_none_between_widths() -> None:
-    def spall(length: float, width: float) -> tuple[Added, np.ndarray]:
-        return Added("spall", width, {"gear": "driver", "length": length}), width * two_steps(length)
+    def spall(length: float, width: float) -> tuple[AddedEffect, np.ndarray]:
+        return AddedEffect("spall", width, {"gear": "driver", "length": length}), width * two_steps(length)
 
     trials = [spall(0.26, 10.0), spall(0.2, 10.0), spall(0.2, 20.0)]
     found = list(with_profiles_between(trials, effect(profile_varies_with="length"), 20))
@@ -192,7 +192,7 @@ def test_between_two_lengths_of_a_spall_lie_its_profiles_and_none_between_widths
 
 def test_a_profile_that_moves_with_the_severity_is_between_where_it_has_moved_half_way() -> None:
     chips = [
-        (Added("chip", height, {"gear": "driver"}), height * course(0.0, 0.05, later_pitches=-0.2 * height))
+        (AddedEffect("chip", height, {"gear": "driver"}), height * course(0.0, 0.05, later_pitches=-0.2 * height))
         for height in (1.0, 2.0)
     ]
     for moves, low, high in ((0.1, 0.99, 1.0), (0.0, -1.0, 0.9)):

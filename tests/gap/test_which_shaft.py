@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from gearsig.gap import (
     SIDES,
     SIGNS,
-    Added,
+    AddedEffect,
     BearingFrame,
     Condition,
     ConditionFacts,
@@ -22,7 +22,7 @@ from gearsig.gap import (
     OperatingCondition,
     PlaceKind,
     ReducedRecording,
-    at_its_tooth,
+    at_recorded_tooth,
     cause_place,
     determined_options,
     gear_frame,
@@ -113,7 +113,7 @@ def twin():
     return gap_simulator("cracked").twin_of(PAIR)
 
 
-def run(*added: Added, noise: int, point: OperatingCondition) -> ReducedRecording:
+def run(*added: AddedEffect, noise: int, point: OperatingCondition) -> ReducedRecording:
     recording = twin().run(point, added, seed=0, duration_s=1.5, sampling_rate_hz=12800.0, noise=noise)
     assert recording.rig is not None
     return reduce_recording(recording, recording.rig)
@@ -124,7 +124,7 @@ def healthy(point: OperatingCondition) -> ReducedRecording:
     return run(noise=1, point=point)
 
 
-def simulated(*added: Added, point: OperatingCondition = POINT) -> dict[str, float]:
+def simulated(*added: AddedEffect, point: OperatingCondition = POINT) -> dict[str, float]:
     now, reference = run(*added, noise=2, point=point), healthy(point)
     return Condition(ConditionFacts("now", point, 0.0, 0.0, 0.0), now, reference, reference, load_learned()).over_floors
 
@@ -164,7 +164,7 @@ def test_a_healthy_machine_has_no_signs_on_either_shaft() -> None:
 
 
 FRAME = GearFrame(GearPair("stage 1", "input", "output", 29, 47), ("input", "output"), (29, 47), ())
-CRACK = Added("root_crack", 2.0, {"gear": "driver", "tooth": 1.0})
+CRACK = AddedEffect("root_crack", 2.0, {"gear": "driver", "tooth": 1.0})
 
 
 def tooth_place(tooth: int | None, shaft: str = "input") -> GapPlace:
@@ -173,23 +173,23 @@ def tooth_place(tooth: int | None, shaft: str = "input") -> GapPlace:
 
 def test_the_tooth_is_the_recordings() -> None:
     assert place_of(CRACK, FRAME, [tooth_place(8)]) == "tooth 8 of the gear on the input shaft"
-    assert at_its_tooth(CRACK, FRAME, [tooth_place(8)]).options == {"gear": "driver", "tooth": 8.0}
+    assert at_recorded_tooth(CRACK, FRAME, [tooth_place(8)]).options == {"gear": "driver", "tooth": 8.0}
 
 
 def test_without_a_mark_there_is_an_angle_and_the_simulated_tooth_stays() -> None:
     assert place_of(CRACK, FRAME, [tooth_place(None)]) == "87° of the input shaft"
-    assert at_its_tooth(CRACK, FRAME, [tooth_place(None)]) == CRACK
+    assert at_recorded_tooth(CRACK, FRAME, [tooth_place(None)]) == CRACK
 
 
 def test_a_burst_on_the_other_shaft_says_nothing() -> None:
     assert place_of(CRACK, FRAME, [tooth_place(8, "output")]) == "one tooth of the gear on the input shaft"
-    assert at_its_tooth(CRACK, FRAME, [tooth_place(8, "output")]) == CRACK
+    assert at_recorded_tooth(CRACK, FRAME, [tooth_place(8, "output")]) == CRACK
 
 
 def test_bearings_of_one_type_on_a_shaft_cannot_be_told_apart() -> None:
     alike = [BearingFrame(name, 0, 3.5, 5.5, 2.3, 0.4) for name in ("near", "far")]
     frame = replace(FRAME, bearings=(*alike, BearingFrame("wheel", 1, 2.2, 3.4, 1.4, 0.25)))
-    race = Added("bearing_outer_race", 0.3, {"bearing": "near"})
+    race = AddedEffect("bearing_outer_race", 0.3, {"bearing": "near"})
     assert place_of(race, frame, ()) == "near or far"
     seen = GapPlace(PlaceKind.ENVELOPE, "envelope lines", 20.0, 9.0, 5.0, 0.9, orders=(2.203,))
     assert place_of(race, frame, [seen]) == "wheel"
@@ -198,9 +198,9 @@ def test_bearings_of_one_type_on_a_shaft_cannot_be_told_apart() -> None:
 
 
 def test_other_places() -> None:
-    assert place_of(Added("eccentricity", 30.0, {"gear": "driven"}), FRAME, ()) == "the gear on the output shaft"
-    assert place_of(Added("misalignment", 1.0, {"shaft": "driven"}), FRAME, ()) == "the output shaft"
-    assert place_of(Added("bearing_clearance", 9.0, {"bearing": "NDE"}), FRAME, ()) == "NDE"
-    assert place_of(Added("torque_ripple", 5.0, {"order": 6.0}), FRAME, ()) == "order 6"
-    assert place_of(Added("backlash", 100.0), FRAME, ()) == ""
-    assert at_its_tooth(Added("backlash", 100.0), FRAME, [tooth_place(3)]) == Added("backlash", 100.0)
+    assert place_of(AddedEffect("eccentricity", 30.0, {"gear": "driven"}), FRAME, ()) == "the gear on the output shaft"
+    assert place_of(AddedEffect("misalignment", 1.0, {"shaft": "driven"}), FRAME, ()) == "the output shaft"
+    assert place_of(AddedEffect("bearing_clearance", 9.0, {"bearing": "NDE"}), FRAME, ()) == "NDE"
+    assert place_of(AddedEffect("torque_ripple", 5.0, {"order": 6.0}), FRAME, ()) == "order 6"
+    assert place_of(AddedEffect("backlash", 100.0), FRAME, ()) == ""
+    assert at_recorded_tooth(AddedEffect("backlash", 100.0), FRAME, [tooth_place(3)]) == AddedEffect("backlash", 100.0)

@@ -1,7 +1,7 @@
 """The kinematic model: everything that is put into a signal, as plain numbers.
 
 What it represents: vibration that is a known function of shaft angle (mesh harmonics with modulation, a damaged tooth,
-bearing knocks, shaft orders), passed through fixed filters, with noise.
+bearing impacts, shaft orders), passed through fixed filters, with noise.
 
 What it does not represent: dynamics. Nothing here follows from masses, stiffness or load: amplitudes do not change with
 torque, damage does not change stiffness, backlash and friction do not exist, resonances are excited only through the
@@ -22,7 +22,7 @@ from sims.measure import ColouredNoise, MainsHum, Tachometer
 from tests.kinematic.speed import SpeedProfile
 
 # --------------------
-# A local defect in a rolling bearing: knocks at the ball-pass order, with slip.
+# A local defect in a rolling bearing: impacts at the ball-pass order, with slip.
 # --------------------
 
 
@@ -33,9 +33,9 @@ _ORDER_OF = {"outer": "BPFO", "inner": "BPFI"}
 class BearingFault:
     """A local defect on one race.
 
-    The angle between two knocks is that of the kinematics times 1 + s ε, ε standard normal and independent: the train
+    The angle between two impacts is that of the kinematics times 1 + s ε, ε standard normal and independent: the train
     is not periodic but drifts, as slipping rolling elements make it. An inner-race defect turns through the load zone:
-    its knocks are weighted with (1 + cos 2πθ)/2 of its shaft's angle θ.
+    its impacts are weighted with (1 + cos 2πθ)/2 of its shaft's angle θ.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class BearingFault:
     slip_fraction : float
         s, 0 to 0.2; 0.01 is usual.
     impulse_spread : float
-        Standard deviation of the knocks over their mean.
+        Standard deviation of the impacts over their mean.
 
     Notes
     -----
@@ -75,7 +75,7 @@ class BearingFault:
 def knock_angles(
     order: float, slip_fraction: float, first_rev: float, last_rev: float, rng: np.random.Generator
 ) -> FloatArray:
-    """Shaft angles of the knocks in revolutions: a random first one, then steps of (1 + s ε)/order, never negative."""
+    """Shaft angles of the impacts in revolutions: a random first one, then steps of (1 + s ε)/order, never negative."""
     n = int(np.ceil((last_rev - first_rev) * order * 1.2)) + 20
     steps = np.maximum(1 + slip_fraction * rng.standard_normal(n), 0.0) / order
     angles = first_rev + rng.uniform() / order + np.concatenate([[0.0], np.cumsum(steps)])
@@ -340,7 +340,7 @@ def shaft_vibration(part: ShaftOrder, shaft_rev: FloatArray, speed_rpm: FloatArr
 
 
 # --------------------
-# A damaged tooth: a knock at each engagement and a local change of the mesh vibration.
+# A damaged tooth: an impact at each engagement and a local change of the mesh vibration.
 # --------------------
 
 
@@ -349,7 +349,7 @@ class ToothDamage:
     """One damaged tooth on one gear.
 
     Severity is in plain numbers: the first amplitude of the ring-down, and how far the mesh vibration dips while the
-    tooth is engaged. A crack mostly dips (lower stiffness); a chip or a spall mostly knocks.
+    tooth is engaged. A crack mostly dips (lower stiffness); a chip or a spall mostly impacts.
 
     Parameters
     ----------
@@ -363,7 +363,7 @@ class ToothDamage:
     resonance_hz, damping_ratio : float
         The mode that rings.
     impulse_spread : float
-        Standard deviation of the knocks over their mean; negative draws are set to 0.
+        Standard deviation of the impacts over their mean; negative draws are set to 0.
     mesh_dip_fraction : float
         Part of the mesh amplitude that is missing at the middle of the engagement, 0 to 1.
     width_teeth : float
@@ -393,8 +393,8 @@ def passages(angle_rev: float, first_rev: float, last_rev: float) -> FloatArray:
     return np.arange(np.ceil(first_rev - angle_rev), np.floor(last_rev - angle_rev) + 1) + angle_rev
 
 
-def knocks(n: int, mean: float, spread: float, rng: np.random.Generator) -> FloatArray:
-    """Strengths of `n` knocks: Gaussian about `mean`, not below 0."""
+def impacts(n: int, mean: float, spread: float, rng: np.random.Generator) -> FloatArray:
+    """Strengths of `n` impacts: Gaussian about `mean`, not below 0."""
     strengths: FloatArray = np.maximum(mean * (1 + spread * rng.standard_normal(n)), 0.0)
     return strengths
 

@@ -17,8 +17,8 @@ from tests.kinematic.model import (
     between_teeth,
     engagement_window,
     harmonic_sum,
+    impacts,
     knock_angles,
-    knocks,
     load_zone_weight,
     modulation_terms,
     passages,
@@ -29,7 +29,7 @@ from tests.kinematic.model import (
 from tests.kinematic.speed import SpeedProfile, time_at_revolutions
 
 # --------------------
-# Trains of decaying oscillations: what a structure answers to short knocks.
+# Trains of decaying oscillations: what a structure answers to short impacts.
 # --------------------
 
 
@@ -114,7 +114,7 @@ def simulate_kinematic(
     model : KinematicModel
     sampling_rate_hz, duration_s : float
     rng : numpy.random.Generator
-        Tooth-to-tooth variation, knock strengths, slip, noise and tachometer jitter are drawn from it, in this order.
+        Tooth-to-tooth variation, impact strengths, slip, noise and tachometer jitter are drawn from it, in this order.
 
     Returns
     -------
@@ -180,7 +180,7 @@ class _KinematicRun:
             ratio = ratio_of(self.rig, damage.shaft)
             shaft_rev = self.reference_rev * ratio
             angles = passages(damage.angle_rev, shaft_rev[0], shaft_rev[-1])
-            strengths = knocks(len(angles), damage.impulse_mps2, damage.impulse_spread, self.rng)
+            strengths = impacts(len(angles), damage.impulse_mps2, damage.impulse_spread, self.rng)
             total += self.ring(angles / ratio, strengths, damage.resonance_hz, damage.damping_ratio)
         for fault in self.model.bearing_faults:
             total += self.bearing(fault)
@@ -220,7 +220,7 @@ class _KinematicRun:
         ratio = ratio_of(self.rig, bearing.shaft)
         shaft_rev = self.reference_rev * ratio
         angles = knock_angles(orders[fault.order_name], fault.slip_fraction, shaft_rev[0], shaft_rev[-1], self.rng)
-        strengths = knocks(len(angles), fault.impulse_mps2, fault.impulse_spread, self.rng)
+        strengths = impacts(len(angles), fault.impulse_mps2, fault.impulse_spread, self.rng)
         strengths = strengths * load_zone_weight(fault.race, angles)
         self.drawn[f"{fault.bearing}: {fault.order_name} order"] = orders[fault.order_name]
         if len(angles) > 1:

@@ -160,7 +160,7 @@ def test_energy_is_not_defined_without_an_inertia() -> None:
 
 @pytest.mark.parametrize(("preset", "most_false"), [("manipulator_formula", 0.0), ("manipulator_table", 0.3)])
 def test_blows_in_the_vibration_are_the_first_impacts_of_each_series(preset: str, most_false: float) -> None:
-    """Rebounds drown in the ringing; what begins a series does not. Soft teeth knock where pairs take up their load."""
+    """Rebounds drown in the ringing; what begins a series does not. Soft teeth strike where pairs take up load."""
     recording = start_stop(preset, 10_000.0)
     blows = find_bursts(recording.values("vibration"), 10_000.0)
     true = contacts(recording)

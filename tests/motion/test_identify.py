@@ -41,7 +41,7 @@ def drive(preset: str, seed: int = 0, **parameters: float | str) -> Recording:
 def test_without_noise_everything_is_recovered(preset: str) -> None:
     fitted = found(drive(preset, **QUIET))
     for name, true in (TRUE | {"stiffness_n_per_m_lambda": STIFFNESS[preset]}).items():
-        assert fitted.parameter(name).is_told, name
+        assert fitted.parameter(name).is_determined, name
         assert fitted.parameter(name).value == pytest.approx(true, rel=0.02), name
 
 
@@ -75,7 +75,7 @@ def test_intervals_hold_the_truth() -> None:
 def test_noise_takes_away_what_is_small_first() -> None:
     """Encoders of 16 bits: play and load are still told; pinion and friction of the teeth are not."""
     fitted = found(drive("manipulator_formula", encoder_counts=65536, angle_noise_urad=20))
-    told = {p.name for p in fitted.parameters if p.is_told}
+    told = {p.name for p in fitted.parameters if p.is_determined}
     assert {"half_backlash_um", "driven_inertia_kg_m2", "load_friction_nm"} <= told
     assert not {"friction_coefficient", "driver_inertia_kg_m2"} & told
     assert "hardly depends" in fitted.parameter("friction_coefficient").why_not
@@ -83,11 +83,11 @@ def test_noise_takes_away_what_is_small_first() -> None:
 
 def test_continuous_rotation_tells_neither_play_nor_damping() -> None:
     fitted = found(continuous())
-    assert not fitted.parameter("half_backlash_um").is_told
+    assert not fitted.parameter("half_backlash_um").is_determined
     assert "only one flank" in fitted.parameter("half_backlash_um").why_not
-    assert not fitted.parameter("restitution").is_told
-    assert not fitted.parameter("motor_inertia_kg_m2").is_told
-    assert fitted.parameter("driven_inertia_kg_m2").is_told
+    assert not fitted.parameter("restitution").is_determined
+    assert not fitted.parameter("motor_inertia_kg_m2").is_determined
+    assert fitted.parameter("driven_inertia_kg_m2").is_determined
 
 
 @pytest.mark.slow
@@ -95,10 +95,10 @@ def test_stiffness_from_one_flank_is_not_told() -> None:
     """A torque that a filter has smoothed makes the teeth seem twenty times stiffer, if nothing tells the zero."""
     both = {"mode": "continuous", "slow_channels": "filtered"}
     fitted = found(drive("manipulator_formula", **both)).parameter("stiffness_n_per_m_lambda")
-    assert not fitted.is_told
+    assert not fitted.is_determined
     assert "only one flank" in fitted.why_not
     stopped = found(drive("manipulator_formula", slow_channels="filtered")).parameter("stiffness_n_per_m_lambda")
-    assert stopped.is_told
+    assert stopped.is_determined
     assert stopped.value == pytest.approx(1.8366e10, rel=0.06)
 
 

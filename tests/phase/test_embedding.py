@@ -12,8 +12,8 @@ from gearsig.phase import (
     delay_embedding,
     delay_vectors,
     embedding_dimension,
-    nearest_apart,
-    spaced,
+    evenly_spaced_indices,
+    nearest_beyond_theiler_window,
 )
 from gearsig.recording import Channel, Recording
 from tests.phase.systems import henon, logistic, lorenz, narrow_band_noise, quasi_periodic, rossler
@@ -118,7 +118,7 @@ def test_a_channel_is_embedded_with_its_unit():
 def test_neighbours_equal_brute_force(norm):
     points = delay_vectors(lorenz(600, 0.02)[:, 0].copy(), 8, 3)
     references = np.arange(0, len(points), 7)
-    distance, index = nearest_apart(points, np.arange(len(points)), references, 40, norm)
+    distance, index = nearest_beyond_theiler_window(points, np.arange(len(points)), references, 40, norm)
     for i, d, j in zip(references, distance, index, strict=True):
         all_distances = np.linalg.norm(points - points[i], ord=norm, axis=1)
         all_distances[max(0, i - 40) : i + 41] = np.inf
@@ -167,8 +167,8 @@ def test_exact_repetition_is_named():
     points = delay_vectors(x, 1, 3)
     library, references = np.arange(len(points)), np.arange(0, len(points), 7)
     with pytest.raises(RefusalError, match="exactly the same points"):
-        nearest_apart(points, library, references, 10)
-    distance, index = nearest_apart(points, library, references, 10, equal_counts=True)
+        nearest_beyond_theiler_window(points, library, references, 10)
+    distance, index = nearest_beyond_theiler_window(points, library, references, 10, equal_counts=True)
     assert not distance.any()
     assert np.all((index - references) % 10 == 0)
 
@@ -201,9 +201,9 @@ def test_same_as_from_all_distances(seed, d, theiler, norm, equal_counts, smooth
     else:
         points = rng.normal(size=(900, d))
         points[800:] = points[:100]  # pairs of equal points
-    library, references = spaced(900, 600), spaced(900, 150)
+    library, references = evenly_spaced_indices(900, 600), evenly_spaced_indices(900, 150)
     expected = all_distances(points, library, references, theiler, norm, equal_counts=equal_counts)
-    found, index = nearest_apart(points, library, references, theiler, norm, equal_counts=equal_counts)
+    found, index = nearest_beyond_theiler_window(points, library, references, theiler, norm, equal_counts=equal_counts)
     np.testing.assert_allclose(found, expected, rtol=1e-12)
     assert np.all(np.abs(index - references) > theiler)
 
@@ -211,10 +211,12 @@ def test_same_as_from_all_distances(seed, d, theiler, norm, equal_counts, smooth
 def test_what_never_comes_back_is_refused():
     drift = np.column_stack([np.arange(8000.0), np.zeros(8000)])
     with pytest.raises(RefusalError, match="does not come back"):
-        nearest_apart(drift, np.arange(8000), spaced(8000, 100), 2000)
+        nearest_beyond_theiler_window(drift, np.arange(8000), evenly_spaced_indices(8000, 100), 2000)
 
 
 def test_exact_repetition_is_refused_as_such():
     t = np.arange(6000) % 3
     with pytest.raises(RefusalError, match="exactly the same points"):
-        nearest_apart(np.column_stack([t, t]).astype(float), np.arange(6000), spaced(6000, 100), 10)
+        nearest_beyond_theiler_window(
+            np.column_stack([t, t]).astype(float), np.arange(6000), evenly_spaced_indices(6000, 100), 10
+        )

@@ -15,12 +15,12 @@ from gearsig.phase import (
     TwoMotions,
     bifurcation_diagram,
     coexistence_ranges,
+    coexistence_values,
     constant_period_lock,
     find_lock,
     phase_plane,
     poincare_section,
     section_period,
-    values_apart,
 )
 from gearsig.recording import Channel, Recording
 from gearsig.rig import ConstantSpeed, GearPair, Rig, Shaft
@@ -212,7 +212,7 @@ def test_branches_that_go_on_from_their_last_state_show_hysteresis():
         BifurcationDiagram(np.array(values), s, "f", "Hz", "x", "m", np.array(values), (1,) * 10, "period", s)
         for s in (np.array([sizes[branch, f] for f in values]) for branch in ("up", "down"))
     )
-    apart = values_apart(up, down)
+    apart = coexistence_values(up, down)
     # One harmonic: the small motion exists where (ω² - 1)³ > 27/4 · 3/4 F², the large one up to ω² = 1 + 3/4 (F/cω)².
     lowest, highest = np.sqrt(1.0 + (81.0 / 16.0 * 0.4**2) ** (1.0 / 3.0)) / (2 * np.pi), 2.0 / (2 * np.pi)
     assert len(apart) >= 2
@@ -223,11 +223,11 @@ def test_branches_that_go_on_from_their_last_state_show_hysteresis():
 def test_apart_needs_two_diagrams_of_the_same_with_extents():
     diagram = bifurcation_diagram([(1.0, _map_section(np.ones(9)))], parameter="r")
     assert diagram.extents.tolist() == [0.2]
-    assert values_apart(diagram, diagram).tolist() == []
+    assert coexistence_values(diagram, diagram).tolist() == []
     with pytest.raises(InputError, match="without extents"):
-        values_apart(diagram, replace(diagram, extents=np.empty(0)))
+        coexistence_values(diagram, replace(diagram, extents=np.empty(0)))
     with pytest.raises(InputError, match="diagrams of x and y"):
-        values_apart(diagram, replace(diagram, axis_name="y"))
+        coexistence_values(diagram, replace(diagram, axis_name="y"))
 
 
 def _branch(values, sizes):

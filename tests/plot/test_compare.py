@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gearsig.comparison import Agreement, BandLevel, LevelPair, LineLevel, Repeated
+from gearsig.comparison import Agreement, BandLevel, LevelPair, LineLevel, RepeatableValue
 from gearsig.errors import InputError
 from gearsig.orders import SynchronousAverage
 from gearsig.plot import average_overlay_figure, band_levels_figure, order_overlay_figure
@@ -61,7 +61,7 @@ def test_averages_share_an_axis_unless_one_would_be_a_flat_line(
 
 
 def test_bands_show_their_agreement_where_they_have_one() -> None:
-    alike = Agreement(Repeated(0.9, 0.01), Repeated(0.95, 0.01), 0.3, 20)
+    alike = Agreement(RepeatableValue(0.9, 0.01), RepeatableValue(0.95, 0.01), 0.3, 20)
     bands = [BandLevel(f"{i}", i, i + 1, "order", LEVEL, alike) for i in range(5)]
     figure = band_levels_figure(bands, "m/s^2")
     assert figure.axes[0].get_ylabel() == "level (dB re 1 m/s²)"

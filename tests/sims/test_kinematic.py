@@ -181,7 +181,7 @@ def test_bearing_on_another_shaft_turns_at_that_shafts_speed():
     loud = np.flatnonzero(np.abs(x.values("a1")) > 1.0)
     starts = loud[np.diff(loud, prepend=-1000) > 50]
     assert 98 <= len(starts) <= 101
-    # 4 knocks per revolution at 12.5 revolutions per second.
+    # 4 impacts per revolution at 12.5 revolutions per second.
     np.testing.assert_allclose(np.diff(starts), RATE / 50, atol=1.1)
 
 

@@ -6,7 +6,7 @@ import pytest
 from gearsig.angle import ShaftAngle
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Channel, Recording
-from gearsig.spectra import TurnSums, enhanced_envelope, order_coherence, spectral_coherence
+from gearsig.spectra import NonuniformTransform, enhanced_envelope, order_coherence, spectral_coherence
 
 FS = 10_000.0
 N = (1 << 16) + 1
@@ -79,7 +79,7 @@ def test_sums_over_unequal_angles_are_exact():
     rng = np.random.default_rng(2)
     theta, p = rng.random(400), rng.normal(size=400) + 1j * rng.normal(size=400)
     exact = np.exp(-2j * np.pi * np.outer(np.arange(71), theta)) @ p
-    assert TurnSums(theta, 70)(p) == pytest.approx(exact, abs=1e-8 * np.abs(p).sum())
+    assert NonuniformTransform(theta, 70)(p) == pytest.approx(exact, abs=1e-8 * np.abs(p).sum())
 
 
 def test_bad_input_names_the_remedy():

@@ -14,14 +14,14 @@ from gearsig.spectra import (
     kurtogram_envelope,
     noise_floor,
     prepared_signal,
-    splitter,
+    splitting_filters,
 )
 
 FS = 20_000.0
 DATA = Path(__file__).parents[3] / "shared" / "data" / "bearing_races"
 
 
-def knocks(n: int, rng: np.random.Generator, *, resonance_hz=6000.0, rate_hz=97.0, noise=0.3) -> np.ndarray:
+def impacts(n: int, rng: np.random.Generator, *, resonance_hz=6000.0, rate_hz=97.0, noise=0.3) -> np.ndarray:
     """Return damped impulses with one per cent of slip, in noise."""
     x = noise * rng.normal(size=n)
     at = np.cumsum(FS / rate_hz * (1 + 0.01 * rng.normal(size=int(n * rate_hz / FS) - 1)))
@@ -47,7 +47,7 @@ def responses(split, frequencies: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("n_parts", [2, 3])
 def test_filters_split_the_band_at_half_the_amplitude(n_parts):
-    s = splitter(n_parts)
+    s = splitting_filters(n_parts)
     borders = np.arange(n_parts + 1) / (2 * n_parts)
     middles = (borders[1:] + borders[:-1]) / 2
     assert responses(s, middles).diagonal() == pytest.approx(1.0, abs=1e-3)
@@ -117,7 +117,7 @@ def test_standard_error_is_that_of_noise():
 
 @pytest.mark.parametrize("resonance_hz", [2300.0, 6000.0, 8800.0])
 def test_best_band_holds_the_resonance(resonance_hz):
-    x = knocks(60_001, np.random.default_rng(1), resonance_hz=resonance_hz)
+    x = impacts(60_001, np.random.default_rng(1), resonance_hz=resonance_hz)
     band = kurtogram(recording_of(x), "a").best_band(narrowest_hz=300)
     assert band.low_hz <= resonance_hz <= band.high_hz
     assert kurtogram(x, FS).warnings(band) == ()
@@ -125,7 +125,7 @@ def test_best_band_holds_the_resonance(resonance_hz):
 
 def test_envelope_spectrum_in_its_own_band_shows_the_rate():
     chosen = kurtogram_envelope(
-        recording_of(knocks(60_001, np.random.default_rng(2))), "a", highest_modulation_hz=400.0
+        recording_of(impacts(60_001, np.random.default_rng(2))), "a", highest_modulation_hz=400.0
     )
     assert chosen.band.high_hz - chosen.band.low_hz >= 1200
     assert chosen.envelope.band_hz == chosen.band.band_hz
@@ -144,7 +144,7 @@ def test_one_shock_is_remarked_upon():
 
 def test_tones_removed_uncovers_impulses_beside_a_mesh_line():
     rng = np.random.default_rng(4)
-    x = knocks(60_000, rng, noise=0.2)
+    x = impacts(60_000, rng, noise=0.2)
     t = np.arange(len(x)) / FS
     # The mesh line lies a line's third off the grid, at a steady speed, in the impulses' own band.
     buried = x + 3.0 * np.cos(2 * np.pi * 6000.1 * t)
@@ -173,7 +173,7 @@ def test_kurtosis_ignores_gain_and_mean(n, gain, mean):
 
 
 def test_float32_and_one_sample_more_or_less():
-    x = knocks(50_001, np.random.default_rng(8)).astype(np.float32)
+    x = impacts(50_001, np.random.default_rng(8)).astype(np.float32)
     k = kurtogram(x, FS, n_levels=4)
     assert kurtogram(x.astype(np.float64), FS, n_levels=4).kurtosis == pytest.approx(k.kurtosis, abs=1e-12)
     for shorter in (x[:-1], x[:-2]):
@@ -222,7 +222,7 @@ def test_bearing_race_is_named_through_the_kurtograms_own_band(file, race_hz, ot
 
 
 def test_a_band_may_be_given_and_has_the_kurtosis_of_the_tree_there():
-    x = knocks(200_000, np.random.default_rng(1))
+    x = impacts(200_000, np.random.default_rng(1))
     chosen = kurtogram_envelope(recording_of(x), "a")
     given_one = kurtogram_envelope(recording_of(x), "a", band_hz=chosen.band.band_hz)
     assert given_one.band.band_hz == chosen.band.band_hz
@@ -247,7 +247,7 @@ def test_a_modulation_that_no_envelope_shows_is_refused(highest_hz):
 
 
 def test_the_reason_names_narrower_bands_of_more_kurtosis():
-    x = knocks(2**17, np.random.default_rng(5))
+    x = impacts(2**17, np.random.default_rng(5))
     narrow = kurtogram_envelope(recording_of(x), "a")
     assert narrow.reason == "It has the largest kurtosis."
     x += 30.0 * (np.arange(len(x)) % 40_000 < 4000) * np.cos(2 * np.pi * 2000.0 / FS * np.arange(len(x)))

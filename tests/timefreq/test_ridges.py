@@ -17,11 +17,13 @@ from gearsig.timefreq import (
     UniformSignal,
     best_path,
     component,
+    crossing_segments,
     cwt,
     cwt_map,
     inverse,
-    lowest_possible,
-    meetings,
+    lowest_analysable,
+    maxima_of_separate_paths,
+    reconnected_paths,
     ridges,
     squeezed_cwt,
     squeezed_cwt_map,
@@ -29,8 +31,6 @@ from gearsig.timefreq import (
     squeezed_stft_map,
     stft,
     stft_map,
-    tops_of_parted_paths,
-    untangled,
 )
 from tests.marks import further
 
@@ -169,13 +169,13 @@ def test_tails_are_exchanged_only_where_that_is_smoother():
     level = [np.zeros(200), np.zeros(200)]
     up, down = 0.3 * t, 60 - 0.3 * t
     bounced = [np.minimum(up, down), np.maximum(up, down)]
-    a, b = untangled(bounced, level, 6.0, 3.0)
+    a, b = reconnected_paths(bounced, level, 6.0, 3.0)
     assert a == pytest.approx(up, abs=0.5)
     assert b == pytest.approx(down, abs=0.5)
-    a, b = untangled([up, down], level, 6.0, 3.0)
+    a, b = reconnected_paths([up, down], level, 6.0, 3.0)
     assert np.array_equal(a, up)
     assert np.array_equal(b, down)
-    assert [(m.start, m.stop) for m in meetings(up, down, 6.0)] == [(90, 111)]
+    assert [(m.start, m.stop) for m in crossing_segments(up, down, 6.0)] == [(90, 111)]
 
 
 def test_level_decides_where_shape_does_not():
@@ -183,7 +183,7 @@ def test_level_decides_where_shape_does_not():
     near = [30 + 2 / np.cosh((t - 100) / 12), 30 - 2 / np.cosh((t - 100) / 12)]
     wide = [p + np.where(np.abs(t - 100) > 40, 1, 0) * s * 8 for p, s in zip(near, (1, -1), strict=True)]
     weak_then_strong = np.where(t < 100, -2.0, 0.0)
-    a, _ = untangled(wide, [weak_then_strong, weak_then_strong[::-1]], 6.0, 30.0)
+    a, _ = reconnected_paths(wide, [weak_then_strong, weak_then_strong[::-1]], 6.0, 30.0)
     assert a[0] > 30 > a[-1]
 
 
@@ -318,7 +318,7 @@ def test_a_ridge_in_noise_of_more_power_is_followed(transform, seed: int, course
 
 def test_paths_that_would_meet_beyond_the_map_part_at_its_edge():
     beyond = [np.array([19.0, 20.5, 21.0]), np.array([17.0, 19.5, 20.0])]
-    upper, lower = tops_of_parted_paths(np.ones((18, 3)), beyond, 0)
+    upper, lower = maxima_of_separate_paths(np.ones((18, 3)), beyond, 0)
     assert np.all((lower >= 0) & (lower <= upper) & (upper <= 17))
 
 
@@ -407,7 +407,7 @@ def test_a_ridge_at_the_lowest_line_has_a_component():
     """The band's lower half would need a longer signal; the upper half is there."""
     n = 1000
     signal = UniformSignal(np.cos(2 * np.pi * 8.0 * np.arange(n) / 2000.0), 2000.0)
-    lowest = lowest_possible(signal, Morse())
+    lowest = lowest_analysable(signal, Morse())
     at = np.array([0.0, n / 2000.0])
     ridge = Ridge(at, np.full(2, max(lowest, 8.0)), np.ones(2), np.zeros(2, dtype=bool), "frequency", "")
     assert np.isfinite(component(signal, ridge).values).all()

@@ -152,7 +152,7 @@ def text_as_stated(file: ChosenFile) -> str:
     return tomli_w.dumps(table)
 
 
-def show_machine(file: ChosenFile, channels: Sequence[str] = (), *, is_told: bool = False) -> None:
+def show_machine(file: ChosenFile, channels: Sequence[str] = (), *, is_reported: bool = False) -> None:
     """Show the form, what follows from it, and TOML to give and take.
 
     Parameters
@@ -160,7 +160,7 @@ def show_machine(file: ChosenFile, channels: Sequence[str] = (), *, is_told: boo
     file : ChosenFile
     channels : sequence of str
         Of the recording, where it could be read.
-    is_told : bool
+    is_reported : bool
         Whether the page already says what is wrong with the machine as it stands.
     """
     if st.session_state.pop(_CHANGED, False):  # the verdict above rests on it, not this part of the page alone
@@ -180,7 +180,7 @@ def show_machine(file: ChosenFile, channels: Sequence[str] = (), *, is_told: boo
         first, follows = st.columns((5, 8), gap="medium")
         edited = _form(file, table, text, channels, first, speed)
         with follows:
-            _show_consequences(edited, shown_already=_rig_of(table) if is_told else None)
+            _show_consequences(edited, shown_already=_rig_of(table) if is_reported else None)
     described, changed = _rig_of(edited), text if edited == table else tomli_w.dumps(edited)
     if described != _rig_of(table) or (edited != table and isinstance(described, str)):
         with st.container(horizontal=True, key="take"):

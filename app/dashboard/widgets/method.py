@@ -30,7 +30,7 @@ from app.dashboard.widgets.texts import (
     show_unknown_speed,
     show_warnings,
 )
-from app.dashboard.work import Kept, kept
+from app.dashboard.work import CachedFunction, kept
 from gearsig.angle import ShaftAngle
 from gearsig.diagnosis import Analysis, CannotTell, ChannelAnalysis, with_known_angle
 from gearsig.errors import GearsigError, InputError, RefusalError
@@ -354,7 +354,7 @@ MEMORY_LIMIT_MB, N_PREPARED = 256.0, 4
 """What is kept of a segment between two looks at it, and of how many segments."""
 
 
-def cached(n_kept: int, words: str) -> Callable[[Callable[P, R]], Kept[P, R]]:
+def cached(n_kept: int, words: str) -> Callable[[Callable[P, R]], CachedFunction[P, R]]:
     """Compute a function beside the page and keep its last answers, told apart by the content of its arguments.
 
     Answers are frozen, so that sessions may share them. Streamlit's own hash samples large arrays, and two segments of

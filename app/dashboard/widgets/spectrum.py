@@ -32,7 +32,7 @@ from gearsig.plot import (
     Scale,
     decibel_text,
     displayed_values,
-    is_sound,
+    is_sound_pressure,
     level_name,
     marks_of,
     polar_figure,
@@ -40,7 +40,7 @@ from gearsig.plot import (
     value_limits,
     with_unit,
 )
-from gearsig.report import circled_text, speed_is_constant, verdict_picture, zero_text
+from gearsig.report import circle_legend, speed_is_constant, verdict_picture, zero_text
 from gearsig.spectra import LARGEST_SLIP, Spectrum
 
 SCALES: dict[str, Scale] = {"Logarithmic": "log", "Linear": "linear", "dB": "decibel"}
@@ -94,7 +94,7 @@ def show_spectrum(
     """
     spectra = (spectra,) if isinstance(spectra, Spectrum) else spectra
     first = spectra[0]
-    if scale == "Logarithmic" and is_sound(first.unit):
+    if scale == "Logarithmic" and is_sound_pressure(first.unit):
         scale = "dB"  # in which sound is read
     label, chosen = scale, list(KIND_NAMES)
     if not plain:
@@ -145,7 +145,7 @@ def show_spectrum(
     many = len(spectra) == 1 and first.index_of(high) - first.index_of(low) > 2 * N_COLUMNS
     st.caption(
         f"Resolution {first.resolution:.4g} {first.axis_unit}, {capitalised(first.window)} window{averages}."
-        f"{joined if many else ''}{circled_text(marked)} "
+        f"{joined if many else ''}{circle_legend(marked)} "
         "Drag to zoom, double click for all."
     )
     return low, high

@@ -237,8 +237,8 @@ def _bad_contact(scene: textbook.SyntheticScene, rng: np.random.Generator) -> Fl
 
 FOREIGN: dict[str, Callable[[textbook.SyntheticScene, np.random.Generator], FloatArray]] = {
     "rolling element": _rolling_element,
-    "knocks at a strange order": _strange_impacts,
-    "knocks once per revolution": _once_per_revolution,
+    "impacts at a strange order": _strange_impacts,
+    "impacts once per revolution": _once_per_revolution,
     "tone at a strange order": _strange_tone,
     "ghost line": _ghost,
     "whirl": _whirl,
@@ -248,7 +248,7 @@ FOREIGN: dict[str, Callable[[textbook.SyntheticScene, np.random.Generator], Floa
     "loose foot": _loose_foot,
     "belt": _belt,
     "motor field": _motor_field,
-    "random knocks": _random_impacts,
+    "random impacts": _random_impacts,
     "swelling noise": _swelling_noise,
     "steady noise": _steady_noise,
     "bad contact": _bad_contact,

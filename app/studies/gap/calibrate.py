@@ -27,12 +27,12 @@ from gearsig.gap import (
     NAMING,
     NONE,
     UNKNOWN,
+    EffectClassifier,
     Features,
     GapCalibration,
     GapEffect,
     Learned,
     Population,
-    Recogniser,
     gap_size,
     group_probabilities,
     joint_probabilities,
@@ -215,12 +215,12 @@ def _attributed(
     learned = load_learned()
     changes = [_change(population, learned, row, with_reference=with_reference) for row in rows]
     loads = [float(population.loads_n_per_mm[row]) for row in rows]
-    recogniser = learned.recognisers[with_reference]
-    return attributed_case(str(population.causes[rows[0]]), changes, loads, recogniser, simulator)
+    classifier = learned.classifiers[with_reference]
+    return attributed_case(str(population.causes[rows[0]]), changes, loads, classifier, simulator)
 
 
 def attributed_case(
-    cause: str, changes: Sequence[Features], loads: Sequence[float], recogniser: Recogniser, simulator: str
+    cause: str, changes: Sequence[Features], loads: Sequence[float], classifier: EffectClassifier, simulator: str
 ) -> AttributedCase:
     """Return what forests say of one machine's change at one or several operating points, without trials.
 
@@ -229,13 +229,13 @@ def attributed_case(
     cause : str
     changes, loads : sequences
         Of each point; load of the teeth in N/mm.
-    recogniser : Recogniser
+    classifier : EffectClassifier
     simulator : str
     """
     effects = CrackedPair().gap_effects().values()
-    by_condition = [recogniser.probabilities(c, load, effects) for c, load in zip(changes, loads, strict=True)]
-    forest = joint_probabilities(by_condition, list(loads), recogniser.causes)
-    size = max(gap_size(change, recogniser.floor).structural.value for change in changes)
+    by_condition = [classifier.probabilities(c, load, effects) for c, load in zip(changes, loads, strict=True)]
+    forest = joint_probabilities(by_condition, list(loads), classifier.causes)
+    size = max(gap_size(change, classifier.floor).structural.value for change in changes)
     return AttributedCase((cause,), forest, {}, size, len(changes), simulator)
 
 

@@ -37,14 +37,14 @@ from gearsig.gap import (
     INDEPENDENT,
     NONE,
     UNKNOWN,
+    EffectClassifier,
     Features,
-    Recogniser,
+    clipped_discriminant_input,
     labelled_support,
     load_gap_calibration,
     load_learned,
     soft_size,
     with_labelled,
-    within_reach,
     without_machines_of,
 )
 from sims.blind import CATALOGUE, MECHANICAL, Scene, draw_case, measure, run, scene_of
@@ -163,11 +163,11 @@ def score(raw: Path) -> None:
     simulators = table["simulator"].astype(str)
     for simulator in np.unique(simulators):
         with without_machines_of(simulator):
-            recogniser = load_learned().recognisers[True]
+            classifier = load_learned().classifiers[True]
         rows = np.flatnonzero(simulators == simulator)
-        cases = [_case(table, int(row), recogniser) for row in rows]
+        cases = [_case(table, int(row), classifier) for row in rows]
         for n in COUNTS:
-            typer.echo(f"{simulator}, {n} labelled of each effect: {_scored(cases, recogniser, n)}")
+            typer.echo(f"{simulator}, {n} labelled of each effect: {_scored(cases, classifier, n)}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,18 +179,18 @@ class _Case:
     probabilities: Mapping[str, float]
 
 
-def _case(table: Mapping[str, Any], i: int, recogniser: Recogniser) -> _Case:
+def _case(table: Mapping[str, Any], i: int, classifier: EffectClassifier) -> _Case:
     values, scatter = (table[key][i].astype(np.float64) for key in ("change", "change_scatter"))
-    change, load = Features(recogniser.floor.names, values, scatter), float(table["load_n_per_mm"][i])
-    floor = recogniser.floor
-    size = soft_size(floor.names, floor.over(change)) / floor.whole_of(floor.names)
+    change, load = Features(classifier.floor.names, values, scatter), float(table["load_n_per_mm"][i])
+    floor = classifier.floor
+    size = soft_size(floor.names, floor.over(change)) / floor.floor_size(floor.names)
     calibration = load_gap_calibration(with_reference=True)
-    probabilities = calibration.probabilities(recogniser.probabilities(change, load), {}, size)
-    row = within_reach(recogniser.input_row(change, load))
+    probabilities = calibration.probabilities(classifier.probabilities(change, load), {}, size)
+    row = clipped_discriminant_input(classifier.input_row(change, load))
     return _Case(int(table["rig"][i]), str(table["label"][i]), size, row, probabilities)
 
 
-def _scored(cases: Sequence[_Case], recogniser: Recogniser, n: int) -> str:
+def _scored(cases: Sequence[_Case], classifier: EffectClassifier, n: int) -> str:
     rng = np.random.default_rng(SEED)
     right, sure, loss = list[bool](), list[bool](), list[float]()
     for case in cases:
@@ -206,7 +206,7 @@ def _scored(cases: Sequence[_Case], recogniser: Recogniser, n: int) -> str:
             drawn = [same_cause[i] for i in rng.permutation(len(same_cause))[:n]]
             if drawn:
                 rows = np.array([labelled_case.row for labelled_case in drawn])
-                ratios[cause] = labelled_support(recogniser.labels.log_ratios(case.row, rows, cause))
+                ratios[cause] = labelled_support(classifier.labels.log_ratios(case.row, rows, cause))
         posterior = with_labelled(case.probabilities, ratios, {})
         first = next(iter(posterior))
         right.append(first == case.cause)

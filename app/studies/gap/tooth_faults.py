@@ -24,7 +24,7 @@ from app.studies.gap.calibrate import STRONG
 from gearsig.errors import GearsigError, RefusalError
 from gearsig.gap import (
     TOOTH_FAULTS,
-    Added,
+    AddedEffect,
     Interval,
     OperatingCondition,
     attribute,
@@ -110,7 +110,7 @@ def simulated(case: BlindCase, source: str, seed: int, *, with_run_up: bool = Fa
     twin = simulator.twin_of(case.rig.description(first.stated_rpm, first.stated_nm))
     specimen = int(rng.integers(1, 2**31))
 
-    def run(rpm: float, nm: float, added: Sequence[Added], noise: int) -> Recording:
+    def run(rpm: float, nm: float, added: Sequence[AddedEffect], noise: int) -> Recording:
         made = twin.run(
             OperatingCondition(rpm, nm),
             added,

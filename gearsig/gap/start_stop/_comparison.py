@@ -13,7 +13,7 @@ from gearsig.checks import FloatArray
 from gearsig.errors import GearsigError, RefusalError
 from gearsig.gap._evidence import CRACK
 from gearsig.gap._features import jackknife_variance
-from gearsig.gap._simulator import Added, DriveFacts, DriveSimulator, DriveTwin, GapEffect
+from gearsig.gap._simulator import AddedEffect, DriveFacts, DriveSimulator, DriveTwin, GapEffect
 from gearsig.gap.start_stop._attribution import (
     HALF,
     N_PLACEBOS,
@@ -117,7 +117,7 @@ class SimulatedDrive:
         """See `DriveTwin.worn_curve_um`."""
         return self.twin.worn_curve_um(self.healthy.deflection_um, depth_um, N_PLACES)
 
-    def features(self, *added: Added) -> CycleFeatures:
+    def features(self, *added: AddedEffect) -> CycleFeatures:
         """Run the drive with effects and return what its cycles tell."""
         return _of_all(self._cycles(added))
 
@@ -125,7 +125,7 @@ class SimulatedDrive:
         """Return the drive with another torque of the motor."""
         return replace(self, twin=self.twin.at_torque(factor))
 
-    def _cycles(self, added: Sequence[Added]) -> PreparedCycles:
+    def _cycles(self, added: Sequence[AddedEffect]) -> PreparedCycles:
         return cut_cycles(measure_motion(self.twin.run(added), use={"force": ""}))
 
 
@@ -368,7 +368,7 @@ def predict(
         changes = {}
         for severity in grid.severities:
             try:
-                features = _features_with(compared, Added(name, severity, options))
+                features = _features_with(compared, AddedEffect(name, severity, options))
             except GearsigError:  # it cannot run: a load that cannot be moved, say
                 continue
             change = change_of(features, drive.healthy, drive.shape, spot)
@@ -380,7 +380,7 @@ def predict(
     return causes
 
 
-def _features_with(compared: DriveComparison, added: Added) -> CycleFeatures:
+def _features_with(compared: DriveComparison, added: AddedEffect) -> CycleFeatures:
     """Return what a drive with a cause tells."""
     drive, spot = compared.drive, compared.spot
     healthy, teeth = drive.healthy, drive.healthy.teeth_um.copy()

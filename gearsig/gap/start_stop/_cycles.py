@@ -271,7 +271,7 @@ def robust_least_squares(
 ) -> tuple[FloatArray, Mask]:
     """Solve y = A x by least squares without samples far off: blows, slipped counts.
 
-    Far off is said by the scatter of a sample's own group: the back flank knocks while the drive flank runs smoothly,
+    Far off is said by the scatter of a sample's own group: the back flank impacts while the drive flank runs smoothly,
     and without noise all of it would lie far off.
 
     Parameters

@@ -47,7 +47,7 @@ from gearsig.gap._report import (
     named_cause,
     severity_unit,
 )
-from gearsig.gap._simulator import Added, DriveSimulator, GapEffect, OperatingCondition
+from gearsig.gap._simulator import AddedEffect, DriveSimulator, GapEffect, OperatingCondition
 from gearsig.gap.start_stop._attribution import (
     RIPPLE,
     DriveEvidence,
@@ -175,7 +175,7 @@ def _cause(
     return replace(
         base,
         severity=fitted.severity,
-        fitted=Added(name, float(f"{fitted.severity.value:.4g}"), evidence.predicted[name].options),
+        fitted=AddedEffect(name, float(f"{fitted.severity.value:.4g}"), evidence.predicted[name].options),
         place=places.get(name, ""),
         shrinkage=fitted.shrinkage,
         evidence=_evidence(fitted, compared),
@@ -344,7 +344,7 @@ def _phases(compared: DriveComparison) -> list[GapPlace]:
     return sorted(places, key=lambda place: -place.change_db)[:3]
 
 
-def _torque_curves(compared: DriveComparison, fitted: Added | None) -> tuple[SpectrumCurves, ...]:
+def _torque_curves(compared: DriveComparison, fitted: AddedEffect | None) -> tuple[SpectrumCurves, ...]:
     """Return the torque by order of the pinion while running; none without torque."""
     cycles, now, baseline = compared.now, compared.features.ripple, compared.baseline.ripple
     if cycles.motion.torque_nm is None or not np.all(np.isfinite(now)) or not np.all(np.isfinite(baseline)):
@@ -374,7 +374,7 @@ def _torque_curves(compared: DriveComparison, fitted: Added | None) -> tuple[Spe
 
 
 def _tooth_curves(
-    compared: DriveComparison, fitted: Added | None, fits: Mapping[str, FittedDriveCause]
+    compared: DriveComparison, fitted: AddedEffect | None, fits: Mapping[str, FittedDriveCause]
 ) -> tuple[AngleCurves, ...]:
     """Return what each tooth of the pinion yields beyond the median one, 1 + (extra/floor)²: healthy ones are 1."""
     now, baseline, spot = compared.features.teeth_um, compared.baseline.teeth_um, compared.spot
@@ -412,7 +412,7 @@ def _next_recordings(
         """Return the predicted change of another drive, where the cause is expected to show."""
         if name in (WEAR, CRACK, TORQUE_GAIN):
             return fits[name].predicted
-        added = Added(name, fits[name].severity.value, evidence.predicted[name].options)
+        added = AddedEffect(name, fits[name].severity.value, evidence.predicted[name].options)
         change = change_of(drive.features(added), drive.healthy, compared.drive.shape, compared.spot)
         return np.where(np.isin(NAMES, effects[name].shows_in), np.nan_to_num(change), 0.0)
 

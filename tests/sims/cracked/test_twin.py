@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from gearsig.errors import InputError, RefusalError
-from gearsig.gap import Added, OperatingCondition, Twin, reduce_recording
+from gearsig.gap import AddedEffect, OperatingCondition, Twin, reduce_recording
 from gearsig.recording import Recording
 from gearsig.rig import Bearing, EncoderChannel, GearPair, OperatingPoint, Rig, Sensor, Shaft, TachometerChannel
 from sims import simulate
@@ -46,14 +46,14 @@ def twin(rig: Rig = RIG) -> CrackedTwin:
     return made
 
 
-def run(added: tuple[Added, ...] = (), *, seed: int = 0, noise: int = 0, duration_s: float = 0.3) -> Recording:
+def run(added: tuple[AddedEffect, ...] = (), *, seed: int = 0, noise: int = 0, duration_s: float = 0.3) -> Recording:
     return twin().run(POINT, added, seed=seed, noise=noise, duration_s=duration_s, sampling_rate_hz=FS)
 
 
 @pytest.mark.slow
 def test_a_tooth_breaks_while_the_healthy_machine_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     """What is recorded then is what a machine records that was broken from its static balance on."""
-    made, crack = twin().quiet(), (Added("root_crack", 2.0, {"gear": "driver", "tooth": 3.0}),)
+    made, crack = twin().quiet(), (AddedEffect("root_crack", 2.0, {"gear": "driver", "tooth": 3.0}),)
     healthy, going_on = (made.run(POINT, a, seed=1, duration_s=0.3, sampling_rate_hz=FS) for a in ((), crack))
 
     def from_the_static_balance(self: CrackedTwin, *asked: Any) -> tuple[Any, Any]:
@@ -113,7 +113,7 @@ def test_ordinary_gears_can_be_made(teeth: tuple[int, int], angle_deg: float) ->
     assert mesh.pair.contact_ratio > 1.1
 
 
-def machine_of(made: CrackedTwin, *added: Added):  # type: ignore[no-untyped-def]  # of the machine's room
+def machine_of(made: CrackedTwin, *added: AddedEffect):  # type: ignore[no-untyped-def]  # of the machine's room
     return CrackedPair().prepare(SimulationSetup(made.preset(POINT, added)), np.random.default_rng(0)).machine
 
 
@@ -173,7 +173,7 @@ def test_a_third_bearing_of_a_shaft_takes_part_when_it_is_wanted() -> None:
     more = (*RIG.bearings, Bearing("P2", "pinion", 9, 7.94, 39.04), Bearing("P3", "pinion", 8, 7.94, 39.04))
     made = twin(replace(RIG, bearings=more))
     assert [b.bearing.name for b in machine_of(made).bearings][:3] == ["P1", "P2", "W1"]
-    hurt = machine_of(made, Added("bearing_outer_race", 0.3, {"bearing": "P3"}))
+    hurt = machine_of(made, AddedEffect("bearing_outer_race", 0.3, {"bearing": "P3"}))
     assert hurt.bearings[0].bearing.name == "P3"
     assert hurt.bearings[0].defect is not None
 
@@ -301,9 +301,9 @@ def test_a_twin_pickles_and_its_key_follows_what_is_known_of_the_rig() -> None:
 
 
 ADDED = (
-    Added("root_crack", 2.0, {"gear": "driven", "tooth": 7.0}),
-    Added("pitch_error", 4.0, {"gear": "driver"}),
-    Added("bearing_outer_race", 0.4, {"bearing": "W1"}),
+    AddedEffect("root_crack", 2.0, {"gear": "driven", "tooth": 7.0}),
+    AddedEffect("pitch_error", 4.0, {"gear": "driver"}),
+    AddedEffect("bearing_outer_race", 0.4, {"bearing": "W1"}),
 )
 
 
@@ -353,7 +353,7 @@ def test_further_sensors_sit_over_the_bearings_that_have_none_and_leave_the_mach
     assert more.with_further_sensors()[1] == places
 
 
-def driver_orders(added: Added, machine: CrackedTwin) -> np.ndarray:
+def driver_orders(added: AddedEffect, machine: CrackedTwin) -> np.ndarray:
     """Peak accelerations of the driver's orders on the sensor over it, in m/s²."""
     recording = machine.run(POINT, (added,), seed=0, noise=1, duration_s=2.0, sampling_rate_hz=FS)
     return np.abs(reduce_recording(recording, machine.rig, ["acc pinion"]).channels["acc pinion"].lines[0].mean(axis=0))
@@ -361,7 +361,7 @@ def driver_orders(added: Added, machine: CrackedTwin) -> np.ndarray:
 
 def order_one(unbalance_g_mm: float, machine: CrackedTwin) -> float:
     """Of the driver, in m/s²."""
-    return float(driver_orders(Added("unbalance", unbalance_g_mm, {"gear": "driver"}), machine)[1])
+    return float(driver_orders(AddedEffect("unbalance", unbalance_g_mm, {"gear": "driver"}), machine)[1])
 
 
 def test_a_quiet_machine_has_no_resonances_that_were_drawn() -> None:
@@ -386,7 +386,9 @@ def test_on_its_mounts_a_quiet_machine_shakes_as_force_over_mass_and_in_proporti
 @pytest.mark.slow
 def test_on_its_mounts_a_quiet_machine_pitches_under_a_coupling_s_moment_twice_a_turn() -> None:
     quiet = twin().quiet()
-    slight, strong = (driver_orders(Added("misalignment", beta, {"shaft": "driver"}), quiet) for beta in (1.0, 4.0))
+    slight, strong = (
+        driver_orders(AddedEffect("misalignment", beta, {"shaft": "driver"}), quiet) for beta in (1.0, 4.0)
+    )
     assert strong[2] / slight[2] == pytest.approx(4.0, rel=0.05)
     # β T/(2 l) on either bearing of the driver, turning as 1 + cos 2θ; a = F l/2/(M (l/2)²) · l/2 for both together.
     distance_m = 1e-3 * float(quiet.preset(POINT).parameters["bearing_distance_mm"])
@@ -394,7 +396,7 @@ def test_on_its_mounts_a_quiet_machine_pitches_under_a_coupling_s_moment_twice_a
     expected = 2.0 * force_n / (BODY_KG * quiet.nominal.size**2)
     assert expected / 3.0 < strong[2] < 3.0 * expected
     assert max(strong[1], strong[3]) < 0.02 * strong[2]  # nor does the start leave anything on other orders
-    assert driver_orders(Added("misalignment", 4.0, {"shaft": "driver"}), twin())[2] < 0.05 * strong[2]
+    assert driver_orders(AddedEffect("misalignment", 4.0, {"shaft": "driver"}), twin())[2] < 0.05 * strong[2]
 
 
 def test_a_quiet_machine_s_gears_are_nearly_even() -> None:

@@ -273,10 +273,10 @@ def test_standard_teeth_have_the_known_contact_ratio() -> None:
 @given(angle=st.floats(-50.0, 50.0), flank=st.sampled_from([1.0, -1.0]))
 def test_model_and_rig_count_the_same_pairs(angle: float, flank: float) -> None:
     """The model's pairs come and go over a twentieth of a pitch, the rig's at once: alike away from there."""
-    from sims.forging import position, weight, younger_pair
+    from sims.forging import later_pair, position, weight
 
     k = drive_numbers(drive())
-    p, _ = position(k, angle, flank, younger_pair(k, angle, flank))
+    p, _ = position(k, angle, flank, later_pair(k, angle, flank))
     smooth = weight(k, p)[0] + weight(k, p + 1.0)[0]
     u = float(STANDARD.position(np.array(angle), flank))
     if min(abs(u - edge) for edge in (0.0, STANDARD.contact_ratio - 1.0, 1.0)) > 0.026:

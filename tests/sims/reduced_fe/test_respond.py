@@ -363,8 +363,8 @@ def test_a_spall_on_the_outer_race_knocks_as_often_as_elements_pass():
     order = bearing.orders()["BPFO"]
     depth = pair.machine.bearings[0].stiffness_n_per_m
     assert 1e-3 < np.abs(change).max() * depth / (170.0 / 0.0705 / 2.0) < 1.0  # part of the bearing's load
-    knocks = np.abs(change) > 0.5 * np.abs(change).max()
-    begun = np.count_nonzero(knocks[1:] & ~knocks[:-1])
+    impacts = np.abs(change) > 0.5 * np.abs(change).max()
+    begun = np.count_nonzero(impacts[1:] & ~impacts[:-1])
     assert abs(begun - order) <= 0.35 * order + 1.0
 
 

@@ -9,7 +9,7 @@ import pytest
 
 import sims
 from gearsig.errors import InputError, RefusalError
-from gearsig.gap import Added, OperatingCondition
+from gearsig.gap import AddedEffect, OperatingCondition
 from gearsig.rig import Bearing, GearPair, OperatingPoint, Rig, Sensor, Shaft
 from sims import simulate
 from sims.effects import EffectSetting, effect, effects
@@ -160,7 +160,7 @@ RIG = Rig(
     (Sensor("acc", "acceleration", "m/s^2", "over P1, vertical"),),
     OperatingPoint("wheel", 756.0, torque_nm=100.0),
 )
-CRACK = Added("root_crack", 2.0, {"gear": "driver", "tooth": 4.0})
+CRACK = AddedEffect("root_crack", 2.0, {"gear": "driver", "tooth": 4.0})
 
 
 @pytest.fixture(scope="module")
@@ -205,13 +205,13 @@ def test_an_effect_alone_makes_the_difference(twin, of_twin):
 
 @pytest.mark.slow
 def test_a_small_spall_in_a_bearing_knocks_as_in_the_other_model(twin, of_twin):
-    """The knock's force is that of the rolling element's load, and bearing and sensor are the same in both."""
+    """The impact's force is that of the rolling element's load, and bearing and sensor are the same in both."""
     other = gap_simulator("cracked").twin_of(RIG)
     baselines = of_twin.samples[0], run(other).samples[0]
     for race in ("outer", "inner"):
-        spall = Added(f"bearing_{race}_race", 0.08, {"bearing": "P1"})
-        knocks = (run(t, (spall,)).samples[0] for t in (twin, other))
-        change = [np.std(knock - baseline) for knock, baseline in zip(knocks, baselines, strict=True)]
+        spall = AddedEffect(f"bearing_{race}_race", 0.08, {"bearing": "P1"})
+        impacts = (run(t, (spall,)).samples[0] for t in (twin, other))
+        change = [np.std(impact - baseline) for impact, baseline in zip(impacts, baselines, strict=True)]
         assert change[0] == pytest.approx(change[1], rel=0.1)
 
 

@@ -17,12 +17,12 @@ from gearsig.gap import (
     Features,
     Learned,
     Population,
+    balanced_source_weights,
+    columns_with_shafts_swapped,
     contrast_rows,
-    even_weights,
     learn,
     load_learned,
     load_population,
-    mirrored,
     population_file,
     read_learned,
     textbook_rules,
@@ -73,8 +73,8 @@ def rows(population: Population, *, with_reference: bool) -> list[Features]:
 @pytest.mark.parametrize("with_reference", [True, False])
 def test_machines_that_nothing_was_learned_from_are_recognised(learned: Learned, *, with_reference: bool) -> None:
     others = drawn(4, 2)
-    recogniser = learned.recognisers[with_reference]
-    found = [recogniser.probabilities(change, 100.0) for change in rows(others, with_reference=with_reference)]
+    classifier = learned.classifiers[with_reference]
+    found = [classifier.probabilities(change, 100.0) for change in rows(others, with_reference=with_reference)]
     right = [max(p, key=p.__getitem__) == cause for p, cause in zip(found, others.causes, strict=True)]
     assert np.mean(right) > 0.8
     assert all(sum(p.values()) == pytest.approx(1.0) for p in found)
@@ -88,7 +88,7 @@ def test_a_file_says_the_same(learned: Learned, tmp_path: Path) -> None:
     assert (again.feature_names, again.change_names) == (learned.feature_names, learned.change_names)
     for flag in (True, False):
         for change in rows(drawn(1, 3), with_reference=flag):
-            before, after = (one.recognisers[flag].probabilities(change, 50.0) for one in (learned, again))
+            before, after = (one.classifiers[flag].probabilities(change, 50.0) for one in (learned, again))
             assert after == pytest.approx(before, abs=0.02)
             assert max(after, key=after.__getitem__) == max(before, key=before.__getitem__)
     path.write_bytes(path.read_bytes()[:-300])
@@ -98,7 +98,7 @@ def test_a_file_says_the_same(learned: Learned, tmp_path: Path) -> None:
 def test_other_features_than_were_learned_of_are_an_error(learned: Learned) -> None:
     change = rows(drawn(1, 3), with_reference=True)[0]
     with pytest.raises(InputError, match="belongs to other features"):
-        learned.recognisers[True].probabilities(replace(change, names=change.names[::-1]))
+        learned.classifiers[True].probabilities(replace(change, names=change.names[::-1]))
 
 
 def test_what_ships_knows_every_effect_and_is_small() -> None:
@@ -118,7 +118,7 @@ def test_a_reference_lowers_the_floor() -> None:
 
 def test_rarer_sources_count_more_each_and_less_together() -> None:
     sources, causes = np.array(["a"] * 9 + ["b"] + ["a"] * 5), np.array(["x"] * 10 + ["y"] * 5)
-    weights = even_weights(sources, causes)
+    weights = balanced_source_weights(sources, causes)
     assert weights[9] == pytest.approx(3.0 * weights[0])
     assert weights[:9].sum() > weights[9]
     assert weights.mean() == pytest.approx(1.0)
@@ -173,7 +173,7 @@ FEATURES = load_learned().feature_names
 
 @pytest.mark.parametrize("names", [NAMES, FEATURES])
 def test_exchanging_the_shafts_twice_changes_nothing(names: tuple[str, ...]) -> None:
-    exchanged = mirrored(names)
+    exchanged = columns_with_shafts_swapped(names)
     np.testing.assert_array_equal(exchanged[exchanged], np.arange(len(names)))
     assert names[exchanged[names.index("sideband.driver.1")]] == "sideband.driven.1"
     assert names[exchanged[names.index("mesh.total")]] == "mesh.total"

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from gearsig.cache import read_arrays, write_whole
 from gearsig.checks import FloatArray, closest_match_hint
 from gearsig.errors import InputError
-from gearsig.gap._change import beyond_the_mesh, contrast_rows, counted_from_the_mesh
+from gearsig.gap._change import change_relative_to_mesh, contrast_rows, counted_from_the_mesh
 from gearsig.gap._features import Features
 from gearsig.gap._floors import FLOOR_IN_DEVIATIONS, StructuralFloor
 from gearsig.gap._report import UNKNOWN
@@ -31,7 +31,7 @@ LEAF = -1
 
 
 @dataclass(frozen=True)
-class Trees:
+class ForestNodes:
     """Trees one after another, their nodes numbered throughout, depth first: a node's left branch follows it.
 
     Parameters
@@ -51,7 +51,7 @@ class Trees:
     shares: NDArray[np.uint8]
 
     @classmethod
-    def of(cls, forest: Any) -> Trees:
+    def of(cls, forest: Any) -> ForestNodes:
         """Return those of a fitted forest of scikit-learn, whose trees are numbered depth first, left before right."""
         trees = [estimator.tree_ for estimator in forest.estimators_]
         roots = np.cumsum([0, *(tree.node_count for tree in trees[:-1])]).astype(np.int32)
@@ -147,7 +147,7 @@ class LabelSpace:
     Parameters
     ----------
     directions : array, (n_columns, k)
-        Of a recogniser's input.
+        Of a classifier's input.
     causes : tuple of str
     means : array, (n_causes, k)
     between : array, (k,)
@@ -201,7 +201,7 @@ def fit_label_space(rows: FloatArray, causes: NDArray[np.str_], machines: NDArra
     Parameters
     ----------
     rows : array, (n, n_columns)
-        Input of a recogniser.
+        Input of a classifier.
     causes : array of str, (n,)
     machines : int array, (n,)
     """
@@ -228,8 +228,8 @@ def fit_label_space(rows: FloatArray, causes: NDArray[np.str_], machines: NDArra
 
 
 # --------------------
-# The textbook's rules: effects bring their signs along, as features of `once` and `change_once`; of several rules for a
-# cause the strongest counts.
+# The textbook's rules: effects bring their signs along, as features of `feature_values` and `change_feature_values`; of
+# several rules for a cause the strongest counts.
 # --------------------
 
 
@@ -302,7 +302,7 @@ MIN_LOAD_N_PER_MM = 0.01
 
 
 @dataclass(frozen=True)
-class Recogniser:
+class EffectClassifier:
     """A fitted forest with the floors that its input is measured in.
 
     Parameters
@@ -310,7 +310,7 @@ class Recogniser:
     causes : tuple of str
         Of the probabilities.
     floor : StructuralFloor
-    trees : Trees
+    trees : ForestNodes
     usual_load_n_per_mm : float
         Of the teeth, where a rig does not say.
     labels : LabelSpace
@@ -321,7 +321,7 @@ class Recogniser:
 
     causes: tuple[str, ...]
     floor: StructuralFloor
-    trees: Trees
+    trees: ForestNodes
     usual_load_n_per_mm: float
     labels: LabelSpace
     linear: LinearRule | None = None
@@ -343,7 +343,7 @@ class Recogniser:
         row = self.input_row(change, tooth_load_n_per_mm)
         shares = self.trees.probabilities(row)
         if self.linear is not None:
-            linear_shares = self.linear.probabilities(within_reach(row))
+            linear_shares = self.linear.probabilities(clipped_discriminant_input(row))
             shares = (1.0 - LINEAR_SHARE) * shares + LINEAR_SHARE * linear_shares
             shares = shares * self._rule_factors(change, textbook_rules(effects))
         shares = np.maximum(shares, MIN_PROBABILITY)
@@ -393,7 +393,7 @@ def input_rows(
     names = [floor.names[i] for i in kept]
     distances = floor.from_centre(floor.names, changes)[:, kept]
     scatters = np.hypot(floor.of(names) / FLOOR_IN_DEVIATIONS, scatter[:, kept])
-    held = contrast_rows(names, beyond_the_mesh(names, distances) / scatters)
+    held = contrast_rows(names, change_relative_to_mesh(names, distances) / scatters)
     further = np.ones(held.shape[1], dtype=bool)
     further[: 2 * len(names)] = np.tile(counted_from_the_mesh(names) != 0.0, 2)  # the others are as they were
     return np.column_stack(
@@ -406,7 +406,7 @@ def input_rows(
     )
 
 
-def within_reach(rows: FloatArray) -> FloatArray:
+def clipped_discriminant_input(rows: FloatArray) -> FloatArray:
     """Return input of the linear discriminant, cut where it would count for too much."""
     reached: FloatArray = np.clip(rows, -LINEAR_REACH, LINEAR_REACH)
     return reached
@@ -435,27 +435,27 @@ class Learned:
     feature_names : tuple of str
     credibility : array, (n_features,)
         How much of what the simulation says of each feature holds for healthy machines, 0 to 1.
-    recognisers : mapping
+    classifiers : mapping
         With a reference (True) and without (False).
     """
 
     feature_names: tuple[str, ...]
     credibility: FloatArray
-    recognisers: Mapping[bool, Recogniser] = field(repr=False)
+    classifiers: Mapping[bool, EffectClassifier] = field(repr=False)
 
     @property
     def change_names(self) -> tuple[str, ...]:
         """Of changes against a reference; the features' names come first."""
-        return self.recognisers[True].floor.names
+        return self.classifiers[True].floor.names
 
     @property
     def causes(self) -> tuple[str, ...]:
         """That can be recognised, those of no effect among them."""
-        return self.recognisers[True].causes
+        return self.classifiers[True].causes
 
     def floor(self, *, with_reference: bool) -> StructuralFloor:
         """Return how far healthy machines lie from themselves on another day, or from their simulation."""
-        return self.recognisers[with_reference].floor
+        return self.classifiers[with_reference].floor
 
 
 def write_learned(learned: Learned, path: Path) -> None:
@@ -471,19 +471,19 @@ def write_learned(learned: Learned, path: Path) -> None:
         "credibility": learned.credibility.astype(np.float32),
     }
     for flag, way in _WAYS.items():
-        recogniser = learned.recognisers[flag]
-        arrays_of_recogniser = {key: getattr(recogniser.trees, key) for key in _TREES} | {
-            "causes": np.array(recogniser.causes),
-            "usual_load_n_per_mm": np.float64(recogniser.usual_load_n_per_mm),
-            "floor_names": np.array(recogniser.floor.names),
-            "floors": recogniser.floor.values.astype(np.float32),
-            "centres": np.asarray(recogniser.floor.centres, dtype=np.float32),
-            "largest": np.float64(recogniser.floor.whole_of(recogniser.floor.names)),
-            "labels": np.array(recogniser.labels.causes),
+        classifier = learned.classifiers[flag]
+        arrays_of_recogniser = {key: getattr(classifier.trees, key) for key in _TREES} | {
+            "causes": np.array(classifier.causes),
+            "usual_load_n_per_mm": np.float64(classifier.usual_load_n_per_mm),
+            "floor_names": np.array(classifier.floor.names),
+            "floors": classifier.floor.values.astype(np.float32),
+            "centres": np.asarray(classifier.floor.centres, dtype=np.float32),
+            "largest": np.float64(classifier.floor.floor_size(classifier.floor.names)),
+            "labels": np.array(classifier.labels.causes),
         }
-        arrays_of_recogniser |= {key: getattr(recogniser.labels, key).astype(np.float32) for key in _LABELS}
-        if recogniser.linear is not None:
-            arrays_of_recogniser |= {key: getattr(recogniser.linear, key).astype(np.float16) for key in _LINEAR}
+        arrays_of_recogniser |= {key: getattr(classifier.labels, key).astype(np.float32) for key in _LABELS}
+        if classifier.linear is not None:
+            arrays_of_recogniser |= {key: getattr(classifier.linear, key).astype(np.float16) for key in _LINEAR}
         arrays |= {f"{way}/{key}": array for key, array in arrays_of_recogniser.items()}
     write_whole(path, lambda file: np.savez_compressed(file, allow_pickle=False, **arrays))
 
@@ -495,13 +495,13 @@ def read_learned(path: Path) -> Learned | None:
         return None
     try:
         names = tuple(map(str, arrays["feature_names"]))
-        recognisers = {flag: _recogniser(arrays, way) for flag, way in _WAYS.items()}
-        return Learned(names, arrays["credibility"].astype(np.float64), recognisers)
+        classifiers = {flag: _recogniser(arrays, way) for flag, way in _WAYS.items()}
+        return Learned(names, arrays["credibility"].astype(np.float64), classifiers)
     except (KeyError, TypeError, ValueError):
         return None
 
 
-def _recogniser(arrays: Mapping[str, Any], way: str) -> Recogniser:
+def _recogniser(arrays: Mapping[str, Any], way: str) -> EffectClassifier:
     stored = {key.removeprefix(f"{way}/"): array for key, array in arrays.items() if key.startswith(f"{way}/")}
     floor = StructuralFloor(
         tuple(map(str, stored["floor_names"])),
@@ -512,5 +512,5 @@ def _recogniser(arrays: Mapping[str, Any], way: str) -> Recogniser:
     linear = LinearRule(*(stored[key].astype(np.float64) for key in _LINEAR)) if _LINEAR[0] in stored else None
     directions, *remaining = (stored[key].astype(np.float64) for key in _LABELS)
     labels = LabelSpace(directions, tuple(map(str, stored["labels"])), *remaining)
-    trees, usual_load = Trees(*(stored[key] for key in _TREES)), float(stored["usual_load_n_per_mm"])
-    return Recogniser(tuple(map(str, stored["causes"])), floor, trees, usual_load, labels, linear)
+    trees, usual_load = ForestNodes(*(stored[key] for key in _TREES)), float(stored["usual_load_n_per_mm"])
+    return EffectClassifier(tuple(map(str, stored["causes"])), floor, trees, usual_load, labels, linear)
