@@ -120,9 +120,7 @@ def test_the_reference_stands_beside_recording_and_simulation() -> None:
     without = spectrum_curves(knocking(), healthy())[0]
     assert not len(without.reference)
     assert not len(without.reference_floor)
-    driver = spectrum_curves(healthy(), knocking(), reference=reference)[
-        0
-    ]  # it is the simulation that has impacts
+    driver = spectrum_curves(healthy(), knocking(), reference=reference)[0]  # it is the simulation that has impacts
     assert np.nanmax(np.abs(gap_by_order(against_reference(driver), driver.reference))) < 6.0
     assert np.nanmax(np.abs(gap_by_order(driver, driver.before))) > 10.0
 
