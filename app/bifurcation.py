@@ -83,7 +83,7 @@ def measured(run: SteadyRun, branch: Branch, *, phase_cycles: float = 0.0, with_
     return Measured(run.value, section, period, run.settled_s, run.separated_share, motion, exponent, k)
 
 
-def parameter_words(branch: Branch) -> tuple[str, str]:
+def parameter_text(branch: Branch) -> tuple[str, str]:
     """Name and unit of what is varied, for people."""
     from sims.effects import effect
     from sims.effects import effects as known_effects
@@ -382,7 +382,7 @@ def write_results(request: BifurcationRequest, values: Values, folder: Path) -> 
 
 def diagrams(branch: Branch, values: Values) -> dict[str, phase.BifurcationDiagram]:
     """Return the diagram of each branch that has points."""
-    parameter, unit = parameter_words(branch)
+    parameter, unit = parameter_text(branch)
     sections = {name: [(m.value, m.section) for m in measured_of(kept)] for name, kept in values.items()}
     return {
         name: phase.bifurcation_diagram(points, parameter=parameter, unit=unit)

@@ -221,7 +221,7 @@ class Job:
         if (self.folder / ERROR).exists():
             raise error_from_json((self.folder / ERROR).read_text(encoding="utf-8"))
         if not (self.folder / RESULTS / JSON).exists():
-            raise JobFailedError(f"the diagnosis ended without a result ({self._last_words()})")
+            raise JobFailedError(f"the diagnosis ended without a result ({self._last_message()})")
         return read_gap_json(self.folder / RESULTS / JSON)
 
     def result(self, name: str) -> bytes | None:
@@ -233,7 +233,7 @@ class Job:
         """Stop, and remove the folder."""
         self._end()
 
-    def _last_words(self) -> str:
+    def _last_message(self) -> str:
         if (self._process.returncode or 0) < 0:  # nobody but a signal from outside ends it so
             return "its process was killed: perhaps the memory ran out; a shorter recording needs less"
         lines = (self.folder / LOG).read_text(encoding="utf-8", errors="replace").strip().splitlines()

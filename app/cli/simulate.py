@@ -360,7 +360,7 @@ def _print_bifurcation(request: BifurcationRequest, values: Values, output: Path
         typer.echo(f"{study.NAMES[name]}, {point.value:g}: {point.reason}", err=True)
     if len(reasons) > MAX_REASONS:
         typer.echo(f"… and {len(reasons) - MAX_REASONS} more: see {paths[2].name}", err=True)
-    unit = study.parameter_words(request.branch)[1]
+    unit = study.parameter_text(request.branch)[1]
     for name, kept in values.items():
         points = study.measured_of(kept)
         periods = sorted({point.period for point in points})

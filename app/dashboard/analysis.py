@@ -23,7 +23,7 @@ from app.dashboard.widgets.crack import show_crack
 from app.dashboard.widgets.machine import machine_text, show_machine
 from app.dashboard.widgets.method import MethodPage, cached, show_method
 from app.dashboard.widgets.spectrum import show_average, show_spectrum
-from app.dashboard.widgets.texts import as_typed, in_page_words, show_error, show_facts, show_table, show_unknown_speed
+from app.dashboard.widgets.texts import as_typed, in_page_text, show_error, show_facts, show_table, show_unknown_speed
 from app.dashboard.widgets.verdict import show_verdict
 from gearsig import plot
 from gearsig.angle import resample_to_angle
@@ -330,7 +330,7 @@ def show_channels(analysis: Analysis) -> None:
     """Show chosen channels over a window of time, and the table of channels with their problems."""
     recording = analysis.recording
     for warning in recording.warnings:
-        st.warning(as_typed(in_page_words(warning)), icon=":material/warning:")
+        st.warning(as_typed(in_page_text(warning)), icon=":material/warning:")
     _show_quality(analysis)
     names = address.ask(
         st.multiselect,
@@ -632,7 +632,7 @@ def analysed(file: ChosenFile, chosen: Chosen) -> Analysis | None:
         return analysis_of(chosen.request, chosen.content, chosen.reference)
     except GearsigError as error:
         show_error(error)
-        speaks_of_form = in_page_words(str(error)) != str(error)
+        speaks_of_form = in_page_text(str(error)) != str(error)
         if machine_text(file) or chosen.request.pulses is not None or speaks_of_form:
             show_machine(file, is_reported=True)
         return None

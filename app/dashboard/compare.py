@@ -30,7 +30,14 @@ from app.dashboard.widgets.chooser import (
     simulated_file,
 )
 from app.dashboard.widgets.spectrum import show_revolutions, show_spectrum
-from app.dashboard.widgets.texts import as_typed, capitalised, show_checks, show_table, show_warnings, show_words
+from app.dashboard.widgets.texts import (
+    as_typed,
+    capitalised,
+    show_checks,
+    show_table,
+    show_warnings,
+    show_wrapping_table,
+)
 from app.dashboard.work import kept
 from gearsig.comparison import (
     ALIGN,
@@ -329,7 +336,7 @@ def show_comparison(comparison: Comparison, rig: Rig | None) -> None:
                 view(comparison, channel)
     with st.expander("Agreement in numbers", icon=":material/table:"):
         rows = channel_rows(channel)
-        show_words({"agreement": [name for name, _ in rows], "value": [text for _, text in rows]})
+        show_wrapping_table({"agreement": [name for name, _ in rows], "value": [text for _, text in rows]})
     show_warnings(comparison.notes, quiet=True)
 
 

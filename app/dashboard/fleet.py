@@ -227,7 +227,7 @@ def _choose_series(series: DataFrame, machine: str, point: str) -> Row:
     label = "Indicator, the worst first"
     names = [_series_name(row) for row in rows]
     address.begin(key, "indicator", 0, address.one_of({name: i for i, name in enumerate(names)}))
-    place = st.selectbox(label, range(len(rows)), format_func=lambda i: _series_words(rows[i]), key=key) or 0
+    place = st.selectbox(label, range(len(rows)), format_func=lambda i: _series_text(rows[i]), key=key) or 0
     address.put("indicator", names[place])  # by name: tomorrow another one may be the worst
     return rows[place]
 
@@ -237,7 +237,7 @@ def _series_name(row: Row) -> str:
     return f"{row['name']} ({of})"
 
 
-def _series_words(row: Row) -> str:
+def _series_text(row: Row) -> str:
     change = change_text(row["change"], in_db=bool(row["in_db"]))
     return f"{series_level(row)}{', ' + change if change else ''}: {_series_name(row)}"
 
@@ -280,7 +280,7 @@ def _show_trend(fleet: Fleet, row: Row, over: str) -> None:
         related = fleet.trend_over(over, row["machine"], row["name"], **only)
         shown, changed = next((of for of in related if of.trend.band == row["band"]), related[0]), ""
     panel, marked = trend_panel(shown)
-    key = f"{over} of {row['machine']} {row['point']} {_series_words(row)}"
+    key = f"{over} of {row['machine']} {row['point']} {_series_text(row)}"
     show_lines(panel, key, marked=marked, legend=True)
     st.caption(as_typed(shown.text + changed))
 
@@ -291,7 +291,7 @@ def _show_recordings(recordings: DataFrame, of: str) -> None:
     dates = [f"{row['date']:%Y-%m-%dT%H:%M}" for row in rows]
     looks: dict[str, Any] = {"name": "recording", "first": 0, "key": state.source_key("fleet recording", of)}
     looks |= {"read": address.one_of({date: i for i, date in enumerate(dates)}), "written": dates.__getitem__}
-    looks |= {"format_func": lambda i: _recording_words(rows[i])}
+    looks |= {"format_func": lambda i: _recording_text(rows[i])}
     with st.container(horizontal=True, vertical_alignment="bottom"):
         place = address.ask(st.selectbox, "Recording", range(len(rows)), **looks)
         is_asked = st.button("Open its analysis", icon=":material/troubleshoot:", type="primary")
@@ -300,7 +300,7 @@ def _show_recordings(recordings: DataFrame, of: str) -> None:
         state.go_to("analysis")
 
 
-def _recording_words(row: Row) -> str:
+def _recording_text(row: Row) -> str:
     date = f"{row['date']:%Y-%m-%d %H:%M}".removesuffix(" 00:00")
     return f"{date}: {row['reason'] or row['verdict'] or row['outcome']}"
 

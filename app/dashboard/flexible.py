@@ -14,7 +14,7 @@ from app.dashboard import address
 from app.dashboard.components import component_of
 from app.dashboard.theme import is_dark
 from app.dashboard.widgets.charts import download, encoded, show_figure, show_map
-from app.dashboard.widgets.texts import as_typed, capitalised, show_words
+from app.dashboard.widgets.texts import as_typed, capitalised, show_wrapping_table
 from app.dashboard.work import kept
 from app.gear_body import GearBodyStudy
 from app.papers import PAPERS, Paper, paper
@@ -210,7 +210,7 @@ def show_publications() -> None:
     for item in publication.figures:
         st.subheader(as_typed(capitalised(f"{item.answers}: {item.title}")), anchor=False)
         show_figure(item.figure, item.title, f"publication {name} {item.answers}")
-        show_words(
+        show_wrapping_table(
             {
                 "the publication says": [claim.statement for claim in item.claims],
                 "the model gives": [claim.number for claim in item.claims],
@@ -219,7 +219,7 @@ def show_publications() -> None:
         )
     if publication.unanswered:
         st.subheader("Figures without an answer", anchor=False)
-        show_words({"figure": list(publication.unanswered), "why": list(publication.unanswered.values())})
+        show_wrapping_table({"figure": list(publication.unanswered), "why": list(publication.unanswered.values())})
 
 
 TABS = {"One gear": show_gear, "Pair": show_pair, "Publications": show_publications}

@@ -304,12 +304,12 @@ def kept(
     """
 
     def decorate(function: Callable[P, R]) -> CachedFunction[P, R]:
-        made: CachedFunction[P, R] = CachedFunction(function, n_kept, words, key or _in_words, grace_s)
+        made: CachedFunction[P, R] = CachedFunction(function, n_kept, words, key or _described, grace_s)
         update_wrapper(made, function)
         return made
 
     return decorate
 
 
-def _in_words(*arguments: object, **named: object) -> str:
+def _described(*arguments: object, **named: object) -> str:
     return repr((arguments, named))

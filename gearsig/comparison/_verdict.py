@@ -430,7 +430,7 @@ def _speed_texts(simulated_side: ComparedSide, recorded_side: ComparedSide) -> l
             if not side.angle.is_steady(STEADY)
         ]
         text = (
-            f"{_speed_words(simulated_side, 'The simulation')}, {_speed_words(recorded_side, 'the recording')}: levels "
+            f"{_speed_text(simulated_side, 'The simulation')}, {_speed_text(recorded_side, 'the recording')}: levels "
             "of the "
             f"{' and of the '.join(unsteady)} are means over all speeds. At each of them orders meet other resonances, "
             "and an average need not repeat: parts at one speed compare better."
@@ -454,7 +454,7 @@ def _speed_texts(simulated_side: ComparedSide, recorded_side: ComparedSide) -> l
     return []
 
 
-def _speed_words(side: ComparedSide, name: str) -> str:
+def _speed_text(side: ComparedSide, name: str) -> str:
     if side.angle.is_steady(STEADY):
         return f"{name} turns at {side.angle.mean_speed_rpm:.5g} rpm"
     low, high = side.angle.speed_range_rpm

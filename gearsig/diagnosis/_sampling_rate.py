@@ -417,11 +417,11 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
     def of_one_part(factor: float) -> float:
         """Return the least of one race at a factor; without races, of a part of any order: what is near fractions."""
         if not races:
-            return _of_a_stranger(strong_to(ranges[factor]), factor)
+            return _of_unknown_part(strong_to(ranges[factor]), factor)
         return min(evidence(factor, ranges[factor], at=[race]) for race in races)
 
-    def has_stranger(highest: float, enough: float) -> bool:
-        return _of_a_stranger(strong_to(highest)) <= enough
+    def has_unknown_part(highest: float, enough: float) -> bool:
+        return _of_unknown_part(strong_to(highest)) <= enough
 
     ones = [*races, *((2 * part, by) for part, by in parts if by and (part, by) not in races)]
     usual, common = _factors(signals.recording.sampling_rate_hz, with_parts=bool(parts))
@@ -457,7 +457,7 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
             return None
     # Where no race is described, one or another part may make impacts: that asks for no mistake, and its order may be
     # near a fraction of the shaft's. So may one that nobody described beside the shaft's own orders.
-    if (not races or factor < 1) and has_stranger(ranges[factor], sums[factor] if races else AS_GOOD * best):
+    if (not races or factor < 1) and has_unknown_part(ranges[factor], sums[factor] if races else AS_GOOD * best):
         return None
     for milder in sorted(f for f in factors if f in usual and 1 < f <= factor / FAR_APART):
         of_one = of_one_part(milder)
@@ -544,7 +544,7 @@ def _of_the_left(strong: StrongSpectra, factor: float, races: Sequence[tuple[flo
     return min(left.log_p(1.0, at, CLOSE_TOLERANCE) for at in ((), *ones))
 
 
-def _of_a_stranger(strong: StrongSpectra, factor: float = 1.0) -> float:
+def _of_unknown_part(strong: StrongSpectra, factor: float = 1.0) -> float:
     """Return lg p of shafts and one part of unknown order, that of a strong line, at a factor times the stated rate.
 
     Its impacts are as strong all along, or modulated by the shaft. Where impacts are of no known order and

@@ -472,7 +472,7 @@ def write_learned(learned: Learned, path: Path) -> None:
     }
     for flag, way in _WAYS.items():
         classifier = learned.classifiers[flag]
-        arrays_of_recogniser = {key: getattr(classifier.trees, key) for key in _TREES} | {
+        arrays_of_classifier = {key: getattr(classifier.trees, key) for key in _TREES} | {
             "causes": np.array(classifier.causes),
             "usual_load_n_per_mm": np.float64(classifier.usual_load_n_per_mm),
             "floor_names": np.array(classifier.floor.names),
@@ -481,10 +481,10 @@ def write_learned(learned: Learned, path: Path) -> None:
             "largest": np.float64(classifier.floor.floor_size(classifier.floor.names)),
             "labels": np.array(classifier.labels.causes),
         }
-        arrays_of_recogniser |= {key: getattr(classifier.labels, key).astype(np.float32) for key in _LABELS}
+        arrays_of_classifier |= {key: getattr(classifier.labels, key).astype(np.float32) for key in _LABELS}
         if classifier.linear is not None:
-            arrays_of_recogniser |= {key: getattr(classifier.linear, key).astype(np.float16) for key in _LINEAR}
-        arrays |= {f"{way}/{key}": array for key, array in arrays_of_recogniser.items()}
+            arrays_of_classifier |= {key: getattr(classifier.linear, key).astype(np.float16) for key in _LINEAR}
+        arrays |= {f"{way}/{key}": array for key, array in arrays_of_classifier.items()}
     write_whole(path, lambda file: np.savez_compressed(file, allow_pickle=False, **arrays))
 
 
@@ -495,13 +495,13 @@ def read_learned(path: Path) -> Learned | None:
         return None
     try:
         names = tuple(map(str, arrays["feature_names"]))
-        classifiers = {flag: _recogniser(arrays, way) for flag, way in _WAYS.items()}
+        classifiers = {flag: _classifier_from(arrays, way) for flag, way in _WAYS.items()}
         return Learned(names, arrays["credibility"].astype(np.float64), classifiers)
     except (KeyError, TypeError, ValueError):
         return None
 
 
-def _recogniser(arrays: Mapping[str, Any], way: str) -> EffectClassifier:
+def _classifier_from(arrays: Mapping[str, Any], way: str) -> EffectClassifier:
     stored = {key.removeprefix(f"{way}/"): array for key, array in arrays.items() if key.startswith(f"{way}/")}
     floor = StructuralFloor(
         tuple(map(str, stored["floor_names"])),

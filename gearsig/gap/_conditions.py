@@ -34,7 +34,7 @@ from gearsig.gap._reduction import (
     NOMINAL_REVOLUTIONS,
     ReducedRecording,
     reduce_recording,
-    shaft_words,
+    shaft_text,
 )
 from gearsig.gap._report import ConditionFacts
 from gearsig.gap._simulator import AddedEffect, OperatingCondition, Twin, as_tried
@@ -421,7 +421,7 @@ def tooth_count_mismatch_text(now: ReducedRecording, name: str, reference: Reduc
         stated, shares = now.frame.teeth[side], _explained(now, side)
         best = max(shares, key=shares.__getitem__, default=stated)
         if shares.get(stated, 1.0) < HARDLY_EXPLAINED and shares.get(best, 0.0) > WELL_EXPLAINED:
-            shaft = shaft_words(now.frame, side)
+            shaft = shaft_text(now.frame, side)
             message = (
                 f"{name}: the teeth do not fit. What repeats with {shaft} does so {best} times a revolution, and the "
                 f"rig file gives its gear {stated} teeth. Unless it is a recording of another machine, the rig file is "
@@ -481,7 +481,7 @@ def swapped_recordings_text(now: ReducedRecording, reference: ReducedRecording, 
             place = (at / len(changed) + (0.5 - load_calibration().lag_pitches) / difference.teeth) % 1.0
             tooth = f"Tooth {int(place * difference.teeth) + 1}" if now.marks[side] else "One tooth"
             message = (
-                f"{name}: recording and reference may have been exchanged. {tooth} of {shaft_words(now.frame, side)} "
+                f"{name}: recording and reference may have been exchanged. {tooth} of {shaft_text(now.frame, side)} "
                 f"(at {360.0 * place:.0f}°) stands {prominence_db:.0f} dB above the median tooth in the reference, "
                 f"and is {lost_db:.0f} dB weaker in the recording; damage adds such a burst and takes none away. If "
                 "so, what is named is what the reference has: give the two the other way round."
@@ -721,7 +721,7 @@ def _condition(
     condition = Condition(facts, now, simulated(twin, facts, now), reference, learned, path)
     if reference is not None:
         messages += pattern_mismatch_text(now, reference, name)
-        messages += _strange_reference(condition)
+        messages += _mismatched_reference(condition)
     return condition, messages
 
 
@@ -791,7 +791,7 @@ def _messages_of_recording(prepared: PreparedRecording, facts: ConditionFacts) -
     return texts
 
 
-def _strange_reference(condition: Condition) -> list[str]:
+def _mismatched_reference(condition: Condition) -> list[str]:
     """Say so where the reference itself is far from the simulation of a healthy machine."""
     change = difference_features(condition.baseline, condition.simulated, condition.learned.credibility)
     size = gap_size(change, condition.learned.floor(with_reference=False)).structural.value

@@ -13,7 +13,7 @@ from gearsig.gap._change import turned_difference
 from gearsig.gap._features import MAX_SHAFT_ORDERS, SIDEBANDS, STEPS_PER_TOOTH, floor_ratio
 from gearsig.gap._floors import StructuralFloor
 from gearsig.gap._places import changed_pattern, pattern_of_recording
-from gearsig.gap._reduction import DRIVEN, DRIVER, N_MESH_HARMONICS, ReducedRecording, shaft_words
+from gearsig.gap._reduction import DRIVEN, DRIVER, N_MESH_HARMONICS, ReducedRecording, shaft_text
 from gearsig.gap._report import AngleCurves, AverageCurves, SpectrumCurves
 from gearsig.prepared import circular_correlation
 from gearsig.rig import SIDES
@@ -107,7 +107,7 @@ def _of_average(side: int, now: ReducedRecording, beside: Mapping[str, ReducedRe
     floors = {name: np.sqrt(_RARE * (noise[:n] + level[:n])) for name, (_, level) in levels.items()}
     amplitudes = {name: np.sqrt(level[:n]) for name, (level, _) in levels.items()}
     return SpectrumCurves(
-        f"average over {shaft_words(now.frame, side)}",
+        f"average over {shaft_text(now.frame, side)}",
         unit,
         np.arange(n) * now.frame.shaft_orders[side],
         np.sqrt(power[:n]),

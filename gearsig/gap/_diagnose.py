@@ -32,7 +32,7 @@ from gearsig.gap._report import (
     Interval,
     LabelledFacts,
     NextRecording,
-    fitted_words,
+    fitted_text,
     in_order,
     likeliest_first,
     most_probable_two,
@@ -296,7 +296,7 @@ def diagnose_gap(
         twin_toml=""
         if fitted is None
         else twin.preset_toml(
-            clearest.facts.point, (fitted,), (fitted_words(causes[0], fitted.severity, clearest.facts.name),)
+            clearest.facts.point, (fitted,), (fitted_text(causes[0], fitted.severity, clearest.facts.name),)
         ),
         warnings=(*warnings, *unbounded_fits(causes, outcome)),
         labelled=labels,

@@ -9,7 +9,7 @@ import numpy as np
 from gearsig.gap._features import ECHO_LAGS_PITCHES, N_QUARTERS
 from gearsig.gap._floors import family_members
 from gearsig.gap._prediction import Fit, ObservedChange
-from gearsig.gap._reduction import GearFrame, shaft_words
+from gearsig.gap._reduction import GearFrame, shaft_text
 from gearsig.gap._report import Evidence
 from gearsig.rig import SIDES
 
@@ -275,10 +275,10 @@ def feature_text(name: str, frame: GearFrame) -> str:
         return f"mesh harmonic {detail} over all"
     if first in _OF_A_SHAFT and side in SIDES:
         kind, table = _OF_A_SHAFT[first]
-        return f"{shaft_words(frame, SIDES.index(side))}: {kind}{table[detail]}"
+        return f"{shaft_text(frame, SIDES.index(side))}: {kind}{table[detail]}"
     if first == "floor":
         return f"floor, band {detail}" if side == "band" else f"kurtosis of the floor, band {detail}"
     where = "envelope" if first == "envelope" else "lines"
     if remainder.endswith("_shaft"):
-        return f"{where}: orders of {shaft_words(frame, SIDES.index(remainder.removesuffix('_shaft')))}"
+        return f"{where}: orders of {shaft_text(frame, SIDES.index(remainder.removesuffix('_shaft')))}"
     return f"{where}: {_CYCLIC[remainder]}"

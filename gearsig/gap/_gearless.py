@@ -26,7 +26,7 @@ from gearsig.diagnosis import (
 from gearsig.errors import RefusalError
 from gearsig.formatting import enumerated, named, percent, signed
 from gearsig.gap._conditions import Stage, readable
-from gearsig.gap._places import band_words, hertz
+from gearsig.gap._places import band_text, hertz
 from gearsig.gap._report import (
     NONE,
     UNKNOWN,
@@ -381,7 +381,7 @@ def place_of_unexpected(part: UnexpectedFinding, rig: Rig, *, name: str = "") ->
     order = where.order or NAN
     frequency = "" if where.frequency_hz is None else f", {hertz(where.frequency_hz)}"  # none where the speed varies
     over = f"{part.over_floor_db:.0f} dB over their floor" + (
-        f" in {band_words(where.band_hz)}" if where.band_hz else ""
+        f" in {band_text(where.band_hz)}" if where.band_hz else ""
     )
     since = "" if part.rise_db is None else f", {signed(part.rise_db)} dB over the reference"
     in_recording = f", in {name}" if name else ""
@@ -583,7 +583,7 @@ def _spectra(unexpected: Sequence[UnexpectedFinding], every: Sequence[ExaminedRe
         return ()
     highest = N_SHOWN * (families[0].finding.where.order or NAN) if families else NAN
     kept = spectrum.positions <= (highest if np.isfinite(highest) else spectrum.positions[-1])
-    label = f"envelope of {channel.channel}, {band_words(band)}" + (f", {name}" if len(every) > 1 else "")
+    label = f"envelope of {channel.channel}, {band_text(band)}" + (f", {name}" if len(every) > 1 else "")
     nothing = np.zeros(0)
     return (
         SpectrumCurves(

@@ -30,7 +30,7 @@ from gearsig.gap._features import (
     tooth_energy,
 )
 from gearsig.gap._floors import Family, family_members, family_size
-from gearsig.gap._reduction import DRIVER, N_MAINS_HARMONICS, N_MESH_HARMONICS, GearFrame, ReducedRecording, shaft_words
+from gearsig.gap._reduction import DRIVER, N_MAINS_HARMONICS, N_MESH_HARMONICS, GearFrame, ReducedRecording, shaft_text
 from gearsig.gap._report import GapPlace, PlaceKind, scaled
 from gearsig.gap._simulator import GapEffect
 from gearsig.prepared import MAINS_TOLERANCE
@@ -195,7 +195,7 @@ def hertz(frequency_hz: float) -> str:
     return f"{frequency_hz / 1e3:.2g} kHz" if frequency_hz >= 999.5 else f"{frequency_hz:.3g} Hz"
 
 
-def band_words(band_hz: tuple[float, float]) -> str:
+def band_text(band_hz: tuple[float, float]) -> str:
     """Return "300 Hz to 2.1 kHz"."""
     low, high = (hertz(edge) for edge in band_hz)
     if low[-3:] == high[-3:]:
@@ -259,7 +259,7 @@ def locate_envelope(condition: Condition) -> GapPlace:
     family = max(family, *_shafts(condition, levels), key=lambda candidate: candidate.rise_db)
     bands = now.bands_hz * len(names)
     change = sign * family.rise_db
-    title = f"envelope lines {family.words}, {by_decibels(change)} in {band_words(bands[family.row])}"
+    title = f"envelope lines {family.words}, {by_decibels(change)} in {band_text(bands[family.row])}"
     channel = names[family.row // len(now.bands_hz)]
     return GapPlace(PlaceKind.ENVELOPE, title, change, orders=family.orders, band_hz=bands[family.row], channel=channel)
 
@@ -294,7 +294,7 @@ def line_within(condition: Condition, band_hz: tuple[float, float], change_db: f
     order = float(orders[peak])
     levels = _residual_levels(condition)
     rise = float((levels.now - levels.baseline)[row, min(peak, len(levels.taken) - 1)])
-    place = _line(condition, _StrongestRise(_order_words(condition, order), rise, (order,), row), 1.0)
+    place = _line(condition, _StrongestRise(_named_order_text(condition, order), rise, (order,), row), 1.0)
     # What no average of the gears holds of the mesh, as it swells and fades, is theirs all the same.
     is_of_the_mesh = _mesh_harmonic(condition, order) is not None
     return replace(place, kind=PlaceKind.BAND, band_hz=band_hz) if is_of_the_mesh else place
@@ -396,7 +396,7 @@ def _shafts(condition: Condition, levels: LineLevels) -> list[_StrongestRise]:
         lines = np.rint(order * np.arange(1, N_SHAFT_FAMILY + 1) / levels.step).astype(np.intp)
         means = rise[:, lines[lines < rise.shape[1]]].mean(axis=1)
         felt = abs(condition.over_floors[f"envelope.{SIDES[side]}_shaft"]) > 1.0
-        words = f"at multiples of {shaft_words(condition.now.frame, side)}"
+        words = f"at multiples of {shaft_text(condition.now.frame, side)}"
         families.append(
             _StrongestRise(words, float(means.max()) if felt else 0.0, _multiples(order, 3), int(np.argmax(means)))
         )
@@ -415,7 +415,7 @@ def _strongest(condition: Condition, levels: LineLevels, *, fundamental: bool) -
     if fundamental:
         line = _fundamental(levels.now[row], line)
     order = line * levels.step
-    return _StrongestRise(_order_words(condition, order), change, (order,), row)
+    return _StrongestRise(_named_order_text(condition, order), change, (order,), row)
 
 
 def _mesh_harmonic(condition: Condition, order: float) -> int | None:
@@ -425,14 +425,14 @@ def _mesh_harmonic(condition: Condition, order: float) -> int | None:
     return k if abs(order - k * mesh) <= 1.5 * condition.now.order_step else None
 
 
-def _order_words(condition: Condition, order: float) -> str:
+def _named_order_text(condition: Condition, order: float) -> str:
     """Return whose order it is by itself, without a family of multiples."""
     frame, step = condition.now.frame, 1.5 * condition.now.order_step
     if (k := _mesh_harmonic(condition, order)) is not None:
         return f"at order {order:.4g}, {'that' if k == 1 else f'{k} times that'} of the mesh"
     for side, turns in enumerate(frame.shaft_orders):
         if abs(order - max(round(order / turns), 1) * turns) <= min(step, 0.1 * turns):
-            return f"at order {order:.4g}, a multiple of {shaft_words(frame, side)}"
+            return f"at order {order:.4g}, a multiple of {shaft_text(frame, side)}"
     for bearing in condition.now.frame.bearings:
         for kind, of_family in bearing.families.items():
             if -SLIP < order / of_family - 1.0 < UPWARDS:
@@ -540,7 +540,7 @@ def locate_sidebands(condition: Condition, side: int) -> GapPlace | None:
         return None
     row, best, change = strongest
     lines = _largest_lines(now.synchronous[row] - before.synchronous[row], groups[best])
-    title = f"sidebands of {shaft_words(frame, side)} about {_times(best + 1)}mesh, {by_decibels(change)}"
+    title = f"sidebands of {shaft_text(frame, side)} about {_times(best + 1)}mesh, {by_decibels(change)}"
     carrier = (best + 1) * teeth
     title += _spacing_text([abs(line - carrier) for line in lines])
     orders = tuple(float(line * frame.shaft_orders[side]) for line in lines)
@@ -560,7 +560,7 @@ def locate_shaft(condition: Condition, side: int) -> GapPlace | None:
         return None
     row, best, change = strongest
     order = groups[best][0]
-    title = f"order {order} of {shaft_words(frame, side)}, {by_decibels(change)}"
+    title = f"order {order} of {shaft_text(frame, side)}, {by_decibels(change)}"
     change_order = (order * frame.shaft_orders[side],)
     return GapPlace(PlaceKind.SHAFT, title, change, orders=change_order, channel=_channel(condition, row))
 
@@ -663,7 +663,7 @@ def locate_band(condition: Condition) -> GapPlace:
     if tone is not None:
         return tone
     quantity = "noise" if kind == "band" else "kurtosis of the noise"
-    title = f"{quantity} between {band_words(band).replace(' to ', ' and ')}, {by_decibels(change)}"
+    title = f"{quantity} between {band_text(band).replace(' to ', ' and ')}, {by_decibels(change)}"
     channel = _most_changed_channel(condition, int(number) - 1, kurtosis=kind != "band")
     return GapPlace(PlaceKind.BAND, title, change, band_hz=band, channel=channel, follows=kind != "band")
 
@@ -786,7 +786,7 @@ def locate_tooth(condition: Condition, side: int) -> GapPlace | None:
     pattern = (
         changed_pattern(now, condition.baseline, side) if condition.has_reference else pattern_of_recording(now, side)
     )
-    shaft, name = shaft_words(frame, side), list(now.channels)[int(np.argmax(pattern.energy.max(axis=1)))]
+    shaft, name = shaft_text(frame, side), list(now.channels)[int(np.argmax(pattern.energy.max(axis=1)))]
     if pattern.synchronous_share < MIN_SYNCHRONOUS_SHARE:
         return None
     if pattern.prominence < STANDS_OUT:

@@ -207,11 +207,11 @@ def learn(population: Population, *, n_trees: int = N_TREES) -> Learned:
     return Learned(
         population.feature_names,
         population.credibility,
-        {flag: fit_recogniser(population, with_reference=flag, n_trees=n_trees) for flag in (False, True)},
+        {flag: fit_classifier(population, with_reference=flag, n_trees=n_trees) for flag in (False, True)},
     )
 
 
-def fit_recogniser(population: Population, *, with_reference: bool, n_trees: int = N_TREES) -> EffectClassifier:
+def fit_classifier(population: Population, *, with_reference: bool, n_trees: int = N_TREES) -> EffectClassifier:
     """Fit to a population, and to the same with driver and driven gear exchanged.
 
     Extremely randomised trees: P. Geurts, D. Ernst, L. Wehenkel, "Extremely randomized trees", 2006. The linear

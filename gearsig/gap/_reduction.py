@@ -83,7 +83,7 @@ class GearFrame:
         return 1.0, self.teeth[0] / self.teeth[1]
 
 
-def shaft_words(frame: GearFrame, side: int) -> str:
+def shaft_text(frame: GearFrame, side: int) -> str:
     """Return "the input shaft" or "shaft 2"."""
     name = frame.shafts[side]
     if "shaft" in name.lower():

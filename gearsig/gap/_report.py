@@ -618,7 +618,7 @@ def evidence_direction_text(evidence: Evidence) -> str:
     return "further than predicted" if evidence.is_further else "speaks against it"
 
 
-def fitted_words(cause: GapCause, severity: float, recording: str) -> str:
+def fitted_text(cause: GapCause, severity: float, recording: str) -> str:
     """Return what a twin's file says of the effect in it: severity, its fit, what it was fitted to, probability."""
     within = f"interval of the fit {cause.severity.words()}; " if cause.severity else ""
     size = f"{severity:.3g} {cause.unit}".rstrip()
@@ -776,7 +776,7 @@ def _which(report: GapReport) -> str:
     if report.outcome is GapOutcome.UNKNOWN:
         return _which_unknown(report)
     if report.outcome is GapOutcome.CANNOT_SEPARATE and report.inseparable is not None:
-        return f"Which: {_kind_and_rivals(report, report.inseparable)}; these recordings cannot tell them apart."
+        return f"Which: {_kind_and_inseparable(report, report.inseparable)}; these recordings cannot tell them apart."
     size = f", {_severity(first, first.severity)}" if first.severity and not first.severity.is_unbounded else ""
     if report.kind is not None and report.kind.probability - first.probability >= MIN_SURER:
         return f"Which: {_kind(report.kind)}: {first.title}{size} (probability {odds})."
@@ -794,7 +794,7 @@ def _kind(kind: GapKind) -> str:
     return f"{kind.title}{place} ({odds_text(kind.probability)})"
 
 
-def _kind_and_rivals(report: GapReport, rivals: Sequence[str]) -> str:
+def _kind_and_inseparable(report: GapReport, rivals: Sequence[str]) -> str:
     """Return the kind of fault with what of it is likeliest, then what else may be; without a kind, all of them."""
     if report.kind is None:
         return _or_text(report, rivals)

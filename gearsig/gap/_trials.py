@@ -35,7 +35,7 @@ from gearsig.gap._prediction import (
     predicted_on_baseline,
     shrinkage,
 )
-from gearsig.gap._reduction import ComplexArray, GearFrame, ReducedRecording, reduce_recording, shaft_words
+from gearsig.gap._reduction import ComplexArray, GearFrame, ReducedRecording, reduce_recording, shaft_text
 from gearsig.gap._report import ConditionFacts, GapCause, GapPlace, GapStep, Interval, PlaceKind, Shrinkage
 from gearsig.gap._simulator import AddedEffect, GapEffect, HasFurtherSettings, OperatingCondition, Twin, as_tried
 from gearsig.gap._waveform import (
@@ -746,7 +746,7 @@ def place_of(added: AddedEffect, frame: GearFrame, places: Sequence[GapPlace]) -
     if side not in SIDES:
         return ""
     shaft = frame.shafts[SIDES.index(str(side))]
-    words = shaft_words(frame, SIDES.index(str(side)))
+    words = shaft_text(frame, SIDES.index(str(side)))
     if "tooth" not in options:
         return f"the gear on {words}" if "gear" in options else words
     tooth_place = _tooth_place(shaft, places)
@@ -795,7 +795,7 @@ def cause_place(
         return place_of(tried.fit.added, frame, places)
     if name in TOOTH_FAULTS and len(gears) == 1:
         return place_of(AddedEffect(name, 0.0, {"gear": gears.pop(), "tooth": 1.0}), frame, places)
-    either = " or ".join(shaft_words(frame, side) for side in range(len(SIDES)))
+    either = " or ".join(shaft_text(frame, side) for side in range(len(SIDES)))
     return f"{either} (which cannot be told)"
 
 

@@ -496,7 +496,7 @@ def _number_of(colour: str) -> int | str:
     return -1 if colour in {colour_code.upper() for colour_code in quiet} else colour
 
 
-def _words_of(axes: Axes) -> str:
+def _text_of(axes: Axes) -> str:
     named = {*_names_of_upright_lines(axes).values(), *(str(line.get_label()) for line in axes.lines)}
     words = [axes.get_title(loc="left"), *(text.get_text() for text in axes.texts)]
     return " · ".join(word for word in words if word and word not in named)
@@ -539,7 +539,7 @@ def _level_panel(axes: Axes) -> LevelPanel:
         levels = np.asarray(mesh.get_array(), dtype=np.float64)
         unit = mesh.colorbar.ax.get_ylabel() if mesh.colorbar is not None else ""
         low, high = (float(np.max(limit)) for limit in mesh.get_clim())
-        is_logarithmic, words = axes.get_yscale() == "log", _words_of(axes)
+        is_logarithmic, words = axes.get_yscale() == "log", _text_of(axes)
         names = (_x_label(axes), _y_label(axes), unit)
         return LevelPanel(levels, *_axes_of_mesh(mesh), *names, is_logarithmic, span=high - low or 1.0, title=words)
     image = axes.images[0]
@@ -551,7 +551,7 @@ def _level_panel(axes: Axes) -> LevelPanel:
     span = float(np.nanmax(values) - np.nanmin(values)) or 1.0
     names = (axes.get_xlabel(), axes.get_ylabel(), unit)
     return LevelPanel(
-        values, at, positions, *names, span=span, title=_words_of(axes), square=axes.get_aspect() in ("equal", 1.0)
+        values, at, positions, *names, span=span, title=_text_of(axes), square=axes.get_aspect() in ("equal", 1.0)
     )
 
 
@@ -610,7 +610,7 @@ def _line_panel(axes: Axes, names: Mapping[tuple[str, bool], str]) -> LinePanel:
         limits,
         spans,
         is_plane,
-        _words_of(axes),
+        _text_of(axes),
     )
 
 

@@ -279,11 +279,11 @@ def further_seats(installed: Installed) -> tuple[SensorSeat, ...]:
             name = f"further {number}"
             while name in names:
                 name += "'"
-            seats.append(SensorSeat(name, number, "vertical", f"{_bearing_words(bearing, number)}, vertical"))
+            seats.append(SensorSeat(name, number, "vertical", f"{_bearing_description(bearing, number)}, vertical"))
     return tuple(seats[: MAX_SENSORS - len(installed.sensors)])
 
 
-def _bearing_words(bearing: Bearing, number: int) -> str:
+def _bearing_description(bearing: Bearing, number: int) -> str:
     shaft = bearing.shaft if "shaft" in bearing.shaft.lower() else f"the {bearing.shaft} shaft"
     if bearing.name.startswith(UNLISTED):
         return f"the {'free' if number % 2 == 0 else 'drive'} end of {shaft}"

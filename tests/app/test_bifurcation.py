@@ -14,7 +14,7 @@ from app.bifurcation import (
     load,
     measured,
     motion_lines,
-    parameter_words,
+    parameter_text,
     run_folder,
     save,
     value_path,
@@ -183,7 +183,7 @@ def test_a_value_on_disk_is_what_was_saved(tmp_path):
 )
 def test_what_is_varied_is_named_for_people(name, words):
     value = 1e8 if "stiffness" in name else 0.5
-    assert parameter_words(branch(name, (value,))) == words
+    assert parameter_text(branch(name, (value,))) == words
 
 
 @pytest.mark.slow

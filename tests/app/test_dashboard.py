@@ -14,7 +14,7 @@ from app.dashboard import compiled, state
 from app.dashboard.analysis import VIEWS
 from app.dashboard.cached import command_of
 from app.dashboard.state import ChosenFile
-from app.dashboard.widgets.texts import in_page_words
+from app.dashboard.widgets.texts import in_page_text
 from gearsig.recording import write_recording
 from gearsig.rig import write_rig
 from sims import simulate
@@ -339,7 +339,7 @@ def test_units_are_written_as_in_print() -> None:
     page = opened(tab="Machine")  # whose rig file says m/s^2
     assert any("unit" in table.value and "m/s²" in set(table.value["unit"]) for table in page.dataframe)
     assert not [b for b in page.button if b.label.startswith("Analyse")]
-    assert in_page_words("the file says g, the rig file m/s^2") == "the file says g, the rig file m/s²"
+    assert in_page_text("the file says g, the rig file m/s^2") == "the file says g, the rig file m/s²"
 
 
 def test_the_report_is_looked_at_before_it_is_taken() -> None:

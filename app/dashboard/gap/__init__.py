@@ -33,7 +33,7 @@ from app.dashboard.widgets.charts import (
     zoomed_range,
 )
 from app.dashboard.widgets.spectrum import show_revolutions
-from app.dashboard.widgets.texts import as_typed, capitalised, show_checks, show_warnings, show_words
+from app.dashboard.widgets.texts import as_typed, capitalised, show_checks, show_warnings, show_wrapping_table
 from app.dashboard.widgets.verdict import Colour
 from app.gap_job import JSON, PAGE, TWIN, Job, private_folder
 from gearsig.cache import cache_folder, keep
@@ -401,9 +401,11 @@ def _show_where(finished: Finished) -> None:
         st.caption(WITHOUT_FLOORS)
     if rows and not report.is_simulated:
         sensors = [place.channel for place in report.places]
-        show_words({"place": [row.title for row in rows], "level": [row.change for row in rows], "sensor": sensors})
+        show_wrapping_table(
+            {"place": [row.title for row in rows], "level": [row.change for row in rows], "sensor": sensors}
+        )
     elif rows:
-        show_words(
+        show_wrapping_table(
             {
                 "share": [percent(place.share) for _, place in both],
                 "place": [row.title for row in rows],
@@ -506,7 +508,7 @@ def _show_which(finished: Finished) -> None:
         st.warning(as_typed(text), icon=":material/call_split:")
     rows = cause_rows(report)
     severities = {"severity (interval of the fit)": [row.severity for row in rows]} if report.is_simulated else {}
-    show_words(
+    show_wrapping_table(
         {
             "probability": [row.percent for row in rows],
             "cause": [row.title for row in rows],
@@ -529,7 +531,7 @@ def _show_evidence(row: CauseRow, finished: Finished) -> None:
         if figure.of == row.name:
             _show_figure(finished, figure)
     if row.evidence:
-        show_words(
+        show_wrapping_table(
             {
                 "feature": [item.feature for item in row.evidence],
                 "predicted (dB)": [item.predicted for item in row.evidence],
@@ -553,7 +555,9 @@ def _show_how_far(finished: Finished) -> None:
         )
         labels, left, intervals, taken = zip(*rows, strict=True)
         simulators = [label if i == 0 else f"+ {label}" for i, label in enumerate(labels)]
-        show_words({"simulator": simulators, "remaining gap": left, "90 % interval": intervals, "change": taken})
+        show_wrapping_table(
+            {"simulator": simulators, "remaining gap": left, "90 % interval": intervals, "change": taken}
+        )
     else:
         st.markdown("No effect was added to the simulator. The gap stays as it is.")
     _show_figures(finished, "how far")
@@ -569,10 +573,10 @@ def _show_next(finished: Finished) -> None:
     if rows:
         st.markdown("What to record next, to tell the likeliest causes apart. Distances are in structural floors.")
         columns = zip(("at", "tells apart", "distance there", "now"), zip(*rows, strict=True), strict=True)
-        show_words({name: list(values) for name, values in columns})
+        show_wrapping_table({name: list(values) for name, values in columns})
     names = ("recording", "speed (rpm)", "torque (N·m)", "revolutions", "length (s)", "sampling rate (Hz)")
     facts = condition_rows(report)
-    show_words({name: [row[i] for row in facts] for i, name in enumerate(names)})
+    show_wrapping_table({name: [row[i] for row in facts] for i, name in enumerate(names)})
     simulator = simulator_title(report.simulator) if report.simulator else "none"
     st.caption(as_typed(f"Rig: {report.rig}. Simulator: {simulator}. Healthy references: {references_text(report)}."))
 

@@ -86,7 +86,7 @@ def show_machines(
     setup: Setup, healthy: LaboratoryRun, faulty: LaboratoryRun | None, *, whole_s: float | None = None
 ) -> None:
     """Show both machines; `whole_s` is the length that follows a preview."""
-    views.say_sliders()
+    views.mark_slider_values()
     shown = faulty or healthy
     head, buttons = st.columns((3, 2), vertical_alignment="top")
     with head:

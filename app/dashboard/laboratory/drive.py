@@ -18,7 +18,7 @@ from app.dashboard.laboratory.setup import (
     shown_name,
     shown_unit,
 )
-from app.dashboard.laboratory.views import say_sliders, show_metrics, show_title
+from app.dashboard.laboratory.views import mark_slider_values, show_metrics, show_title
 from app.dashboard.widgets.charts import show_figure
 from app.dashboard.widgets.texts import as_typed, capitalised, show_table
 from app.dashboard.work import kept
@@ -316,7 +316,7 @@ def show_drive(preset: Preset) -> None:
 
 def _show_drives(setup: Setup) -> None:
     healthy, faulty = run_drive(setup.healthy), faulty_of(setup, run_drive)
-    say_sliders()
+    mark_slider_values()
     head, buttons = st.columns((3, 2), vertical_alignment="top")
     with head:
         show_title(setup, is_shown=faulty is not None)

@@ -411,7 +411,7 @@ NUMBERS: dict[str, tuple[str, Number]] = {
 }
 
 
-def say_sliders() -> None:
+def mark_slider_values() -> None:
     """Say which numbers the results are of: the page's script fades them while a slider beside stands elsewhere."""
     st.html(f'<i class="of-page of-sliders" data-values="{escape(json.dumps(slider_values()))}"></i>')
 

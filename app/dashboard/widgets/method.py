@@ -23,7 +23,7 @@ from app.dashboard.widgets import charts
 from app.dashboard.widgets.texts import (
     as_typed,
     capitalised,
-    in_page_words,
+    in_page_text,
     one_line,
     show_error,
     show_table,
@@ -277,7 +277,7 @@ def _asked_number(page: MethodPage, option: MethodOption, known: Any) -> Any:
 def _asked_span(page: MethodPage, option: MethodOption, known: Any) -> tuple[float, float] | None:
     if not known:
         text = page.ask(
-            st.text_input, option.label, name=option.name, first="", read=_two_numbers_in_words,
+            st.text_input, option.label, name=option.name, first="", read=_two_numbers_text,
             placeholder=option.empty, about=option.about, width=width_px(option.label, option.empty),
         )  # fmt: skip
         return two_numbers(text, option.label)
@@ -297,7 +297,7 @@ def two_numbers(text: str | None, label: str) -> tuple[float, float] | None:
     return first, second
 
 
-def _two_numbers_in_words(texts: list[str]) -> str:
+def _two_numbers_text(texts: list[str]) -> str:
     two_numbers(texts[0], "")
     return address.words(texts)
 
@@ -437,10 +437,10 @@ def show_method(name: str, analysis: Analysis, channel: ChannelAnalysis) -> None
 
 def _show_refusal(error: RefusalError) -> None:
     """Show that the recording allows no answer: a result like others, and no mistake of the user's."""
-    reason = capitalised(in_page_words(error.reason).rstrip("."))
+    reason = capitalised(in_page_text(error.reason).rstrip("."))
     lines = [f"**It cannot be told from this segment.** {as_typed(reason)}."]
     if error.remedy:
-        lines.append(f"What to do: {as_typed(in_page_words(error.remedy).rstrip('.'))}.")
+        lines.append(f"What to do: {as_typed(in_page_text(error.remedy).rstrip('.'))}.")
     st.info("\n\n".join(lines), icon=":material/help:")
 
 

@@ -143,14 +143,14 @@ _FILE = re.compile(r"(?:rig|rig\.toml)|[^\[\]]*: (\w+)")
 def show_error(error: GearsigError) -> None:
     """Show an error of the input; texts in it may come from the file."""
     if not isinstance(error, InputError):
-        st.error(as_typed(in_page_words(str(error))), icon=":material/help:")
+        st.error(as_typed(in_page_text(str(error))), icon=":material/help:")
         return
-    what = as_typed(in_page_words(error.what))
+    what = as_typed(in_page_text(error.what))
     lines = [f"**{as_typed(place_in_form(error.where))}**: {what}" if error.where else what]
     if error.allowed:
-        lines.append(f"Allowed: {as_typed(in_page_words(error.allowed))}")
+        lines.append(f"Allowed: {as_typed(in_page_text(error.allowed))}")
     if error.remedy:
-        lines.append(f"What to do: {as_typed(in_page_words(error.remedy))}")
+        lines.append(f"What to do: {as_typed(in_page_text(error.remedy))}")
     st.error("\n\n".join(lines), icon=":material/error:")
 
 
@@ -174,12 +174,12 @@ def place_in_form(where: str) -> str:
     return _PLACES.get(where, where)
 
 
-def in_page_words(text: str) -> str:
+def in_page_text(text: str) -> str:
     """Return a text with the page's names of what the command line calls by its options, and rig files by their keys.
 
     Examples
     --------
-    >>> in_page_words("add a [[shaft]] with that name"), in_page_words("speed_rpm must be given")
+    >>> in_page_text("add a [[shaft]] with that name"), in_page_text("speed_rpm must be given")
     ('add a row of Shafts with that name', 'Speed (rpm) must be given')
     """
     for option, place in _PLACES.items():
@@ -193,7 +193,7 @@ def show_warnings(warnings: Sequence[str], *, quiet: bool = False) -> None:
     """Show what an answer says about itself, as one warning or quietly as small print; names in it come from files."""
     if not warnings:
         return
-    lines = [as_typed(in_page_words(text)) for text in warnings]
+    lines = [as_typed(in_page_text(text)) for text in warnings]
     text = lines[0] if len(lines) == 1 else "\n".join(f"- {line}" for line in lines)
     if quiet:
         st.caption(text)
@@ -211,7 +211,7 @@ def show_checks(checks: Iterable[tuple[bool, str]]) -> None:
 
 def show_unknown_speed(reason: CannotTell) -> None:
     """Say why there is no speed and what would give it."""
-    remedy = f"\n\nWhat would give it: {as_typed(in_page_words(reason.remedy))}" if reason.remedy else ""
+    remedy = f"\n\nWhat would give it: {as_typed(in_page_text(reason.remedy))}" if reason.remedy else ""
     hint = "\n\nA constant speed, or a file of tachometer pulses' times, can be given under *Machine*."
     st.info(f"The speed is not known: {as_typed(reason.reason)}{remedy}{hint}", icon=":material/help:")
 
@@ -261,7 +261,7 @@ def number_text(value: float, form: str) -> str:
     return "" if value is None or isnan(value) else with_minus(format(value, form)).replace("e-", "e−")
 
 
-def show_words(columns: Mapping[str, Sequence[Any]], *, border: bool | Literal["horizontal"] = True) -> None:
+def show_wrapping_table(columns: Mapping[str, Sequence[Any]], *, border: bool | Literal["horizontal"] = True) -> None:
     """Show a short table whose cells wrap; nothing where it has no rows. Texts may come from files."""
     import pandas as pd
 

@@ -11,7 +11,7 @@ import streamlit as st
 from app.dashboard import state
 from app.dashboard.widgets.charts import show_lines
 from app.dashboard.widgets.spectrum import offer_ring, show_ring, show_spectrum
-from app.dashboard.widgets.texts import as_typed, in_page_words, one_line
+from app.dashboard.widgets.texts import as_typed, in_page_text, one_line
 from gearsig.diagnosis import BEARING_PARTS, CHANGED, Analysis, Finding, Kind, Outcome
 from gearsig.formatting import counted, enumerated, readable
 from gearsig.plot import marks_of
@@ -92,9 +92,9 @@ def _show_words(analysis: Analysis) -> None:
         with st.container(horizontal=True, vertical_alignment="center"):
             show_kind(analysis.outcome)
             st.caption(" · ".join(facts), width="content")
-        st.subheader(as_typed(in_page_words(headline)), anchor=False)
+        st.subheader(as_typed(in_page_text(headline)), anchor=False)
         if rest:
-            st.caption(as_typed(in_page_words(rest)))
+            st.caption(as_typed(in_page_text(rest)))
     with st.container(key="verdict-grounds"):
         _show_grounds(analysis)
 
@@ -218,10 +218,10 @@ def _show_card(finding: Finding) -> None:
                 st.markdown(sureness, width="content")
             if card.where:
                 st.caption(_places(card), width="content")
-        st.markdown(f"**{as_typed(in_page_words(card.title))}**")
+        st.markdown(f"**{as_typed(in_page_text(card.title))}**")
         _show_measures(card)
         if card.evidence:
-            st.caption("\n".join(f"- {as_typed(in_page_words(sentence))}" for sentence in card.evidence))
+            st.caption("\n".join(f"- {as_typed(in_page_text(sentence))}" for sentence in card.evidence))
 
 
 def _sureness(card: FindingCard) -> str:
@@ -239,6 +239,6 @@ def _show_measures(card: FindingCard) -> None:
         ("how sure", card.confidence_basis),
         ("surer with", card.surer),
     ]
-    text = "  \n".join(f":small[:gray[{name}:] {as_typed(in_page_words(value))}]" for name, value in lines if value)
+    text = "  \n".join(f":small[:gray[{name}:] {as_typed(in_page_text(value))}]" for name, value in lines if value)
     if text:
         st.markdown(text)

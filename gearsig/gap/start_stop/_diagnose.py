@@ -41,7 +41,7 @@ from gearsig.gap._report import (
     NextRecording,
     PlaceKind,
     SpectrumCurves,
-    fitted_words,
+    fitted_text,
     in_order,
     most_probable_two,
     named_cause,
@@ -120,7 +120,7 @@ def diagnose_start_stop(
     first, pair, is_named = causes[0], most_probable_two(causes), outcome in NAMING
     fitted = first.fitted if is_named else None
     repeated = compared.change / _repeatability_limit(compared)
-    note = () if fitted is None else (fitted_words(first, fitted.severity, compared.name),)
+    note = () if fitted is None else (fitted_text(first, fitted.severity, compared.name),)
     return GapReport(
         rig="" if recordings[0].rig is None else recordings[0].rig.name,
         simulator=simulator.name,
