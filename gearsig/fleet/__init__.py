@@ -1,4 +1,8 @@
-"""Recordings of many machines over time: a store of results, trends with limits and alarms, a watch on folders."""
+"""Recordings of many machines over time: a store of results, trends with limits and alarms, a watch on folders.
+
+`open_fleet` opens or makes a store, a `Fleet` with `add`, `indicators`, `status`, `trend` and `export`. `fleet_changes`
+tells what is new since the last report, and `watch` takes new files as they appear.
+"""
 
 from gearsig.fleet._add import FAILED, AddedRecording, AddResult, AnalysisOptions
 from gearsig.fleet._changes import (

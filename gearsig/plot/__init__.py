@@ -1,4 +1,10 @@
-"""Figures of results; no arithmetic beyond display units."""
+"""Figures of results; no arithmetic beyond display units.
+
+A method with its figure is one call: `order_spectrum(recording, "a1")`, `order_map`, `envelope_spectrum`, `kurtogram`,
+`stft`, `cwt`, … of the methods' own names. A result is drawn by `figure_of(result)`, or, with limits, marks and titles,
+by the function named after it: `spectrum_figure`, `order_map_figure`, `time_frequency_figure`, `average_figure`, ….
+`figure_svg` and `embed` write a figure, `marks_of` gives a rig's expected lines.
+"""
 
 from gearsig.plot._average import average_figure, polar_figure
 from gearsig.plot._comparison import average_overlay_figure, band_levels_figure, order_overlay_figure

@@ -1,4 +1,9 @@
-"""Recordings: channels over time, readers, quality of the data."""
+"""Recordings: channels over time, readers, quality of the data.
+
+`read_recording` reads a file of any format of `gearsig.recording.formats`, `write_recording` writes one; a
+`Recording` carries samples, `Channel` names and units, its rig and its `Provenance`. `find_problems` looks for
+clipping, dropouts, hum and the like.
+"""
 
 from gearsig.recording._limits import check_memory, container_free_bytes, free_memory_bytes
 from gearsig.recording._quality import MAINS_HZ, MAINS_WANDER, ChannelProblem, find_problems

@@ -1,4 +1,8 @@
-"""How deep a crack in a tooth root is: millimetres and percent with an interval, or why that cannot be told."""
+"""How deep a crack in a tooth root is: millimetres and percent with an interval, or why that cannot be told.
+
+`estimate_crack` answers with a `CrackEstimate`, `NoCrackSeen` or a refusal; its `Calibration` comes from simulated
+cracks, by `python -m app.studies.crack_severity`.
+"""
 
 from gearsig.severity._estimate import (
     LARGEST_TORQUE_CHANGE,

@@ -1,4 +1,9 @@
-"""Spectra over frequency: amplitude, power, envelope, cepstrum."""
+"""Spectra over frequency: amplitude, power, envelope, cepstrum.
+
+`amplitude_spectrum`, `power_density`, `cepstrum`; `band_envelope` and `envelope_spectrum`, with `kurtogram` and
+`compare_bands` to choose the band; `spectral_coherence` and `enhanced_envelope`; `minimum_entropy_deconvolution` and
+`multipoint_deconvolution`. Results are a `Spectrum` with its axis, unit and `Scaling`.
+"""
 
 from gearsig.spectra._amplitude import (
     Preparation,

@@ -1,4 +1,8 @@
-"""The measurement chain: from a machine's motion to a recording; see `sims.measure`."""
+"""The measurement chain: from a machine's motion to a recording.
+
+A `MeasurementChain` passes a `Motion` through paths (`ModalPath`), sensors (`Accelerometer`, `Encoder`, `Tachometer`),
+`AntiAlias` filter and `Converter`, with `ColouredNoise` and `MainsHum`.
+"""
 
 from sims.measure._chain import AntiAlias, MeasuredChannel, MeasurementChain, Motion, plain, ratio_of_rates
 from sims.measure._sensors import (

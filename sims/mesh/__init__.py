@@ -1,4 +1,8 @@
-"""Shared gear physics: involute geometry, flanks, faults, friction and mesh stiffness of spur and helical pairs."""
+"""Shared gear physics: involute geometry, flanks, faults, friction and mesh stiffness of spur and helical pairs.
+
+`GearGeometry` and `PairGeometry` with `ToothFaults` (`RootCrack`, `ToothSpall`, `ToothChip`) make a `mesh_stiffness`
+over one mesh cycle, or the `mesh_table` that simulators integrate with.
+"""
 
 from sims.mesh._faults import (
     CRACK_LAWS,
