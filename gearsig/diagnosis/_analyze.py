@@ -62,10 +62,10 @@ from gearsig.recording import CONDITION_CHANNEL, Recording, names_without_number
 from gearsig.rig import EncoderChannel, Rig, TachometerChannel
 
 MINIMUM_SAMPLES = 256
-"""Below it no spectrum has a noise floor to compare with."""
+"""With fewer samples no spectrum has a noise floor to compare with."""
 
 LARGEST_VALUE = 1e60
-"""Beyond it, fourth powers leave the range of floating point numbers; no unit makes vibration so large."""
+"""Above it, fourth powers leave the range of floating point numbers; no unit makes vibration values that large."""
 
 
 def analyze(
@@ -82,31 +82,31 @@ def analyze(
     Parameters
     ----------
     recording : Recording or PreparedRecording
-        Its rig, if any, tells what the machine is.
+        Its rig, if any, describes the machine.
     rig : Rig or None
         Used where the recording carries none.
     settings : AnalysisSettings or None
     reference : Recording, PreparedRecording or None
-        Of the same machine when it was healthy, same sensors, speed and load: cracks of a millimetre show against it,
+        Of the same machine when healthy, with the same sensors, speed and load: cracks of a millimetre show against it,
         and indicators are compared with it.
     torque_nm : float or None
-        For the depth of a crack, instead of the operating point's: of the shaft that this names, else of the
-        reference shaft.
+        For the depth of a crack, in place of the operating point's: on the shaft that the operating point names, else
+        on the reference shaft.
     on_stage : callable or None
         Called with a few words as each stage begins.
 
     Returns
     -------
     Analysis
-        Findings, most important first; what cannot be told is a finding with its reason, not an error. A machine that
-        starts, stops or reverses is examined for backlash and impacts instead: see `gearsig.diagnosis`.
+        Findings, most important first; a question that cannot be answered is a finding with its reason, not an error.
+        A machine that starts, stops or reverses is examined for backlash and impacts instead: see `gearsig.diagnosis`.
 
     Raises
     ------
     InputError
         If there is no vibration channel, the record is shorter than 256 samples, or the reference has none of its
-        channels or is the recording itself. Names that differ by a record's number only are one channel's, and so
-        are those of the only vibration channels of both, unless only a sensor's number differs.
+        channels or is the recording itself. Names that differ only by a record's number are the same channel; so are
+        the only vibration channels of both records, unless only a sensor's number differs.
     """
     prepared = prepare(recording, rig)
     instance_of(settings, AnalysisSettings | None, "settings")
@@ -124,7 +124,7 @@ def analyze(
 
 
 Shown = tuple[AnalysisSignals, Sequence[BandEnvelope]]
-"""What an analysis looked at."""
+"""The signals that an analysis used."""
 
 
 def _examined(
@@ -134,9 +134,9 @@ def _examined(
     torque_nm: float | None,
     announce: Callable[[str], object],
 ) -> tuple[Analysis, Shown | None]:
-    """Return the analysis, and what it looked at where channels live and the machine turns."""
-    # What ends an analysis early comes first, cheapest first: a machine that starts and stops has no orders, and no
-    # spectrum helps where every channel is dead.
+    """Return the analysis, and the signals it used if channels are live and the machine turns."""
+    # Checks that end an analysis early come first, cheapest first: a machine that starts and stops has no orders, and
+    # no spectrum helps if every channel is dead.
     recording, known = prepared.recording, prepared.rig
     announce("finding the speed")
     findings, dead = detect_data_problems(prepared)
@@ -156,7 +156,7 @@ def _examined(
     if not (names := [name for name in recording.vibration_names() if name not in dead]):
         return ended([*findings, cannot_tell("all-channels-dead", "Every vibration channel is dead.")])
 
-    # Signals are computed once, then looked at by all detectors; without an angle only those over frequency are there.
+    # Signals are computed once for all detectors; without an angle only those over frequency exist.
     announce("averages and spectra")
     usable = angle if isinstance(angle, ShaftAngle) else None
     signals = compute_signals(prepared, names, usable, settings, has_reference=healthy is not None)
@@ -165,16 +165,16 @@ def _examined(
     announce("levels over speed")
     levels = order_levels(signals)
 
-    # A wrong sampling rate must be known before anything is called by its order. Pulses or an encoder were sampled with
-    # the vibration: then orders stay right, and only frequencies are wrong.
+    # A wrong sampling rate must be found before anything is identified by its order. If pulses or an encoder were
+    # sampled with the vibration, orders stay right and only frequencies are wrong.
     announce("gears, bearings and shafts")
     doubt = detect_sampling_rate(signals, angle, envelopes)
     if doubt is not None:
         findings.append(doubt)
     if doubt is not None and not isinstance(recording.speed_source, TachometerChannel | EncoderChannel):
-        return ended(findings)  # all orders are wrong, and what they would say
+        return ended(findings)  # all orders are wrong, and so is what they would show
     findings += detect_standstill(signals)
-    # The reference is analysed by itself, without one of its own: an unfit one is said to be so, and left out.
+    # The reference is analysed on its own, without a reference; an unfit one is reported and left out.
     if healthy is not None:
         announce("the reference")
     reference_analysis, then = _of_reference(healthy, settings)
@@ -189,12 +189,12 @@ def _examined(
     findings += [*_of_machine(signals, envelopes, own_bands, beside), *detect_resonances(levels)]
     findings += detect_vibration_zone(signals, found)
 
-    # Against the reference, findings that it shows as well step down before what has changed adds findings of its own.
+    # Findings that the reference shows as well are downgraded before changes add findings of their own.
     compared: tuple[LevelChange, ...] = ()
     changes: ChangedAverages = {}
     if beside is not None and reference_analysis is not None:
         findings, compared, changes = _against(findings, reference_analysis, beside)
-    # Doubts come last, when all that they could lower is there; the crack's depth takes no channel that they spoil.
+    # Warnings come last, when all that they could lower is there; the crack's depth uses no channel that they spoil.
     findings, unfit = lowered(findings, names), dead | spoiled(findings, names)
     crack: Answer | None = withheld_crack(findings, is_asked=healthy is not None and bool(known.pairs))
     if not unfit.issuperset(names):
@@ -222,7 +222,7 @@ def _examined(
 def _of_reference(
     healthy: PreparedRecording | None, settings: AnalysisSettings
 ) -> tuple[Analysis | None, Shown | None]:
-    """Return the reference's analysis and what it looked at, kept: many recordings come with the same reference."""
+    """Return the reference's analysis and the signals it used, kept because many recordings share a reference."""
     if healthy is None:
         return None, None
     _check_size(healthy.recording)
@@ -230,13 +230,13 @@ def _of_reference(
 
 
 Beside = tuple[AnalysisSignals, Sequence[BandEnvelope], AnalysisSignals, Sequence[BandEnvelope]]
-"""What was looked at in a recording and in its reference, the envelopes in the same bands."""
+"""Signals and envelopes of a recording, and those of its reference, the envelopes in the same bands."""
 
 
 def _against(
     findings: list[Finding], reference: Analysis, beside: Beside
 ) -> tuple[list[Finding], tuple[LevelChange, ...], ChangedAverages]:
-    """Return the findings beside those of the reference, with what has changed, and levels and averages compared."""
+    """Return the findings after comparison with the reference, the compared levels and the changed averages."""
     signals, _, then, _ = beside
 
     def measured(finding: Finding) -> LevelChange | None:
@@ -247,7 +247,7 @@ def _against(
     findings, changes = with_changed_teeth(with_clearest_band(findings, signals, then), signals, then)
     compared = level_changes(*beside)
     changed = change_findings(compared, signals, then, findings)
-    # What the comparison names of a shaft is not named again from the recording alone.
+    # What the comparison identifies on a shaft is not reported again from the recording alone.
     again = {HALF_ORDERS: {"looseness", "rub"}, OIL_WHIRL: {OIL_WHIRL}}
     named = {(f.code, f.where.shaft) for f in changed if f.is_claim}
     findings = [f for f in findings if not any((code, f.where.shaft) in named for code in again.get(f.code, ()))]
@@ -260,11 +260,11 @@ def _of_machine(
     own_bands: Sequence[KurtogramBand],
     beside: Beside | None,
 ) -> Iterator[Finding]:
-    """Yield what gears, bearings, shafts and single lines show."""
+    """Yield the findings on gears, bearings, shafts and single lines."""
     if not (signals.rig.pairs or signals.rig.bearings):
         title = "No gears and no bearings are described, so that none can be examined."
         surer = "A rig file with teeth and bearings; `gearsig rig example` prints one to start from."
-        if any(signals.rig.shaft_names):  # of a rotor in plain bearings there is nothing to add
+        if any(signals.rig.shaft_names):  # the rig of a rotor in plain bearings is complete
             surer = "Rolling bearings in the rig file, where there are any."
             if not signals.has_reference:
                 surer = "A recording of the rotor when it was healthy, given with --reference, or its rolling bearings."
@@ -289,7 +289,7 @@ def _of_machine(
 def with_known_angle(
     recording: Recording, angle: ShaftAngle | CannotTell, *, memory_limit_mb: float = MEMORY_LIMIT_MB
 ) -> PreparedRecording:
-    """Return a recording prepared with the angle that an analysis found, or with why there is none.
+    """Return a recording prepared with the angle that an analysis found, or with the reason why there is none.
 
     Parameters
     ----------
@@ -297,7 +297,7 @@ def with_known_angle(
         With its rig.
     angle : ShaftAngle or CannotTell
     memory_limit_mb : float
-        As of `PreparedRecording`.
+        As in `PreparedRecording`.
     """
     prepared = PreparedRecording(recording, memory_limit_mb=memory_limit_mb)
 
@@ -311,13 +311,13 @@ def with_known_angle(
 
 
 def _angle_of(prepared: PreparedRecording) -> ShaftAngle | CannotTell:
-    """Return the angle within the record's own time; pulses may go on before and after it, but do not count."""
+    """Return the angle over the record's duration; pulses before and after it do not count."""
     source = prepared.recording.provenance.source
     try:
         return prepared.shaft_angle
     except RefusalError as refusal:
         return CannotTell("What is the speed of the shafts?", refusal.reason, refusal.remedy)
-    except InputError as error:  # it names the channel; which file it is in is known here
+    except InputError as error:  # it names the channel; the file is known only here
         where = error.where if error.where.startswith(source) else f"{source}: {error.where}".removesuffix(": ")
         remedy = error.remedy or "check [speed] in the rig file, or state the speed by --speed-rpm"
         raise InputError(error.what, where=where, allowed=error.allowed, remedy=remedy) from None
@@ -328,7 +328,7 @@ def _indicators(
 ) -> Iterator[indicators.Indicator]:
     """Yield every indicator that the recording and the rig allow: per channel, per gear, per shaft, per bearing.
 
-    The reference is the healthy earlier record of those that need one.
+    The reference serves the indicators that need an earlier record of the healthy machine.
     """
     rig = signals.rig
     earlier = {turning.shaft: turning.separated for turning in reference.shafts} if reference is not None else {}
@@ -388,9 +388,10 @@ def _mesh_band(parts: SeparatedAverage, teeth: int) -> SynchronousAverage | None
 def _of_bearings(
     signals: AnalysisSignals, name: str, envelopes: Sequence[BandEnvelope]
 ) -> Iterator[indicators.Indicator]:
-    """Take the band whose envelope has the clearest lines, as a quiet one would only state its floor, and the widest.
+    """Yield the indicators of the band whose envelope has the clearest lines, and of the widest band.
 
-    The clearest is another one from recording to recording: over time, levels compare in the widest alone.
+    A quiet band would only give its floor. The clearest band varies between recordings, so levels compare over time
+    only in the widest.
     """
     of_channel = [e for e in envelopes if e.channel == name]
     if not of_channel:
@@ -430,10 +431,10 @@ def _check_vibration(recording: Recording) -> None:
 
 
 def with_matching_channel_names(recording: Recording, healthy: PreparedRecording) -> PreparedRecording:
-    """Return the reference with the recording's names of channels that differ by a record's number only.
+    """Return the reference with the recording's channel names where these differ only by a record's number.
 
-    Where both have only one vibration channel, it is taken for the same one under any other name. The renamed one is
-    kept with the other, and what is found in it too.
+    If each has only one vibration channel, these are taken to be the same, whatever their names. The renamed recording
+    is kept with the original, together with its results.
     """
     reference = healthy.recording
     theirs, ours = reference.vibration_names(), recording.vibration_names()
@@ -456,7 +457,7 @@ def _renamed(prepared: PreparedRecording, names: Mapping[str, str]) -> PreparedR
 
 
 def only_channel_assumed(reference: Recording, renamed: Recording) -> list[Finding]:
-    """Say that a reference's only vibration channel was taken for the recording's, where their names differ."""
+    """Report that a reference's only vibration channel was taken for the recording's, where their names differ."""
     before, after = reference.vibration_names(), renamed.vibration_names()
     if before == after or len(before) != 1:
         return []
@@ -482,7 +483,7 @@ def _check_reference(recording: Recording, reference: Recording) -> None:
 
 
 def _columns_remedy(recording: Recording, reference: Recording) -> str:
-    """Say which columns to name where one of both records is a column of its file, "runs.mat#2", and the other all."""
+    """Return which columns to name if one record is one column of its file, "runs.mat#2", and the other all of it."""
 
     def is_column(record: Recording) -> bool:
         return record.channel_names == (CONDITION_CHANNEL,) and re.search(r"#\d+$", record.name) is not None

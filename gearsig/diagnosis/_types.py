@@ -42,34 +42,34 @@ class Outcome(Enum):
 
 
 EXAMINED = ("no-tooth-local-damage", "no-crack-seen", "no-bearing-damage")
-"""Codes of findings that say that something was examined that would have shown a fault."""
+"""Codes of the findings that say that an examination found no fault where one would have shown."""
 
 MIN_CHANGE_DB = 6.0
 """Twice the reference's level: two recordings of one machine in one state differ by less (R. B. Randall,
 *Vibration-based Condition Monitoring*, 2nd ed., 2021, ch. 5: 6 to 8 dB are significant, 20 dB serious)."""
 
 CHANGED, UNCHANGED = "changed-since-reference", "unchanged-since-reference"
-"""Codes of the findings that levels have changed since the reference, or not."""
+"""Codes of the findings that say whether levels have changed since the reference."""
 
 LEVELS_MATCH = "Levels match the reference"
-"""Begins the title of the second of them."""
+"""Start of the title of an unchanged-since-reference finding."""
 
 REFERENCE_UNFIT, REFERENCE_NOT_HEALTHY = "reference-unfit", "reference-not-healthy"
-"""Codes of the findings that a given reference is not compared, and why; and that it shows a fault itself."""
+"""Codes of the findings that say why a given reference is not used, and that a reference itself shows a fault."""
 
 VIBRATION_ZONE = "vibration-zone"
-"""Code of the finding in which zone of ISO 20816-3 a machine vibrates; of the zones C and D a notice."""
+"""Code of the finding that gives a machine's vibration zone of ISO 20816-3; in zones C and D it is a notice."""
 
 HINDERING = (
     *("channel-clipped", "channel-stuck", "channel-dead", "channel-wrapped", "channel-stepped", "channel-reversed"),
     *("channel-hum", "speed-near-zero"),
 )
-"""Codes of data problems behind which a fault may hide."""
+"""Codes of data problems that may hide a fault."""
 
 
 @dataclass(frozen=True)
 class Where:
-    """The place of a finding; what does not apply is None or empty."""
+    """The location of a finding; fields that do not apply are None or empty."""
 
     channels: tuple[str, ...] = ()
     shaft: str = ""
@@ -88,8 +88,8 @@ class Where:
 class Strength:
     """The size of a finding against the floor it has to exceed.
 
-    `ratio_db` is 20 lg(value/floor) for amplitudes; None where a ratio has no meaning. `against` is what the floor is
-    called: a drawing's value is none.
+    `ratio_db` is 20 lg(value/floor) for amplitudes; None where a ratio has no meaning. `against` words the comparison,
+    since a drawing's value, for example, is not a floor.
     """
 
     value: float
@@ -114,13 +114,13 @@ class Finding(Result):
     where : Where
     strength : Strength or None
     confidence : float
-        0 to 1, that the statement is true.
+        Confidence that the statement is true, 0 to 1.
     confidence_basis : str
-        What the number rests on.
+        What the confidence rests on.
     evidence : tuple of str
-        The numbers behind the statement, one sentence each; also those that speak against it.
+        The numbers for and against the statement, one sentence each.
     surer : str
-        What would make it surer.
+        What would make the statement more certain.
     """
 
     code: str
@@ -135,20 +135,20 @@ class Finding(Result):
 
     @property
     def is_claim(self) -> bool:
-        """Whether it claims damage of the machine: a fault or a suspicion."""
+        """Whether it claims damage to the machine, i.e. is a fault or a suspicion."""
         return self.kind in (Kind.FAULT, Kind.SUSPICION)
 
 
 def cannot_tell(
     code: str, title: str, where: Where | None = None, *, evidence: tuple[str, ...] = (), surer: str = ""
 ) -> Finding:
-    """Return the finding that something cannot be told, or could not be examined."""
+    """Return the finding that a question cannot be answered, or that something could not be examined."""
     return Finding(code, Kind.CANNOT_TELL, title, where or Where(), evidence=evidence, surer=surer)
 
 
 @dataclass(frozen=True)
 class CannotTell:
-    """An answer that is not to be had from these data, and what would give it."""
+    """A question that these data cannot answer, and what would answer it."""
 
     question: str
     reason: str
@@ -157,7 +157,7 @@ class CannotTell:
 
 @dataclass(frozen=True)
 class OrderLevel:
-    """The level of one order over speed, as a Vold–Kalman filter takes it out of a run-up or run-down.
+    """The level of one order over speed, extracted from a run-up or run-down by a Vold–Kalman filter.
 
     Parameters
     ----------
@@ -166,14 +166,14 @@ class OrderLevel:
     order : float
         Of the reference shaft.
     speed_rpm : array, (n,)
-        Of the reference shaft, ascending; middles of equal steps.
+        Speed of the reference shaft, ascending; centres of equal steps.
     amplitude : array, (n,)
         Peak amplitude, root mean square over the times at that speed.
     unit : str
     bandwidth_orders : float
         Of the filter.
     pair, harmonic
-        Of a mesh; empty and 0 for another order.
+        Gear pair and harmonic of a mesh order; empty and 0 for other orders.
     """
 
     name: str
@@ -187,7 +187,7 @@ class OrderLevel:
 
     @property
     def frequency_hz(self) -> FloatArray:
-        """Where the order lies at each speed."""
+        """Frequency of the order at each speed, in Hz."""
         frequency: FloatArray = self.speed_rpm / 60.0 * self.order
         return frequency
 
@@ -219,11 +219,11 @@ class ChannelAnalysis(Result):
     averages : mapping
         (shaft, kind) → SynchronousAverage.
     kurtogram : Kurtogram or None
-        Of the channel without its tones, where impacts of a bearing were found in its own band.
+        Of the channel without its tones, if bearing impacts were found in the band selected from it.
     kurtogram_band : BandCandidate or None
-        The band it chooses.
+        The band selected from the kurtogram.
     order_levels : tuple of OrderLevel
-        Only where the speed runs through a range.
+        Only where the speed sweeps a range.
     """
 
     channel: str
@@ -241,7 +241,7 @@ class ChannelAnalysis(Result):
 
 @dataclass(frozen=True)
 class LevelChange:
-    """One level, in this recording and in the reference.
+    """One level in this recording and in the reference.
 
     Parameters
     ----------
@@ -256,15 +256,15 @@ class LevelChange:
     level_db, reference_db : float
         Mean over segments of each record, in dB re one unit (rms).
     repeatability_db : float
-        By how much the halves of the less steady record differ.
+        Difference between the halves of the less steady record.
     p_value : float
-        Of so large a change between two records of the same state, by what their segments scatter, after all levels
-        that were compared.
+        Probability of a change this large between two records of the same state, given the scatter of their segments,
+        corrected for the number of levels compared.
     is_change : bool
-        Whether it has changed by 6 dB or more, with so small a p-value as the settings ask for, and the louder record
-        shows it above what lies beside it.
+        Whether it changed by 6 dB or more, with a p-value as small as the settings require, and stands out from its
+        neighbours in the louder record.
     stands_out : bool
-        The last of these.
+        Whether it stands out from its neighbours in the louder record.
     """
 
     label: str
@@ -281,13 +281,13 @@ class LevelChange:
 
     @property
     def change_db(self) -> float:
-        """Level now less that of the reference."""
+        """Level now minus the reference's level, in dB."""
         return self.level_db - self.reference_db
 
 
 @dataclass(frozen=True)
 class Analysis(Result, rows="findings"):
-    """Everything `analyze` found out about one recording.
+    """Everything that `analyze` found in one recording.
 
     Parameters
     ----------
@@ -303,15 +303,15 @@ class Analysis(Result, rows="findings"):
     verdict : str
         One sentence.
     settings : mapping
-        The parameters that were in force, for the report.
+        The parameters used, for the report.
     crack : CrackEstimate, NoCrackSeen, CannotTell or None
-        Depth of a root crack; None where nobody asked and none is clear.
+        Depth of a root crack; None if nobody asked for it and no crack is clear.
     reference : Analysis or None
-        Of the recording of the healthy machine that was given to compare with.
+        Analysis of the recording of the healthy machine given for comparison.
     motion : StartStop or None
-        Of a machine that starts and stops, where its teeth could be examined.
+        For a machine that starts and stops, if its teeth could be examined.
     level_changes : tuple of LevelChange
-        Against the reference; empty without one, or where speeds are not known.
+        Changes since the reference; empty without one, or where speeds are unknown.
     """
 
     recording: Recording
@@ -329,23 +329,23 @@ class Analysis(Result, rows="findings"):
 
     @property
     def outcome(self) -> Outcome:
-        """What the findings come to, in one word."""
+        """The overall outcome of the findings."""
         return outcome_of(self.findings)
 
     @property
     def top_claim(self) -> Finding | None:
-        """The first fault, or without one the first suspicion: what the verdict is about; None without either."""
+        """The finding that the verdict is about: the first fault, else the first suspicion, else None."""
         claims = (finding for finding in self.findings if finding.is_claim)
         return min(claims, key=lambda finding: finding.kind is not Kind.FAULT, default=None)
 
     def teeth_on(self, shaft: str) -> int | None:
-        """Return the teeth of the gear on a shaft; of the gear that a finding names, where there are several."""
+        """Return the number of teeth of the gear on a shaft; of several gears, the one that a finding names."""
         gears = self.rig.gear_teeth(shaft) if self.rig is not None else {}
         pairs = (f.where.gear.rpartition("/")[0] for f in self.findings if f.where.gear.endswith(f"/{shaft}"))
         return gears.get(next((pair for pair in pairs if pair in gears), next(iter(gears), "")))
 
     def has_mark(self, shaft: str) -> bool:
-        """Whether angle 0 of a shaft is a mark on that very shaft: without one its teeth have no numbers."""
+        """Whether angle 0 of a shaft is a mark on that shaft; without one its teeth cannot be numbered."""
         return has_mark(self.recording, self.rig or Rig(), shaft)
 
     def _repr_html_(self) -> str:
@@ -355,9 +355,9 @@ class Analysis(Result, rows="findings"):
 
 
 def outcome_of(findings: Sequence[Finding]) -> Outcome:
-    """Return what findings come to; "no fault" only where all that the rig describes could be examined.
+    """Return the outcome of findings: "no fault" only where everything that the rig describes could be examined.
 
-    A machine in zone C or D of ISO 20816-3 is suspicious, whether anything shows the cause or not.
+    A machine in zone C or D of ISO 20816-3 is suspicious whether or not a cause is found.
     """
     kinds = {finding.kind for finding in findings}
     if Kind.FAULT in kinds:
@@ -371,16 +371,16 @@ def outcome_of(findings: Sequence[Finding]) -> Outcome:
 
 @dataclass(frozen=True)
 class AnalysisSettings:
-    """What `analyze` may be told.
+    """Settings of `analyze`.
 
     Parameters
     ----------
     false_alarm_probability : float
-        Of one test over everything it tries (all teeth, all fundamentals, all bands and channels).
+        Of one test as a whole, over everything it tries (all teeth, all fundamentals, all bands and channels).
     n_surrogates : int
         For the test of tooth-local energy.
     minimum_revolutions : int
-        Fewer revolutions than this are not averaged: 16 lower the noise by 12 dB, and give the jackknife its scatter.
+        Fewer revolutions are not averaged: 16 lower the noise by 12 dB and give the jackknife its scatter.
     bearing_slip : float
         Relative: bearings turn 1 to 2 % off their kinematic orders.
     highest_modulation_order : float
@@ -406,10 +406,10 @@ class AnalysisSettings:
 
 
 WITHOUT_REFERENCE = 0.95
-"""Upper limit for a fault claimed from one recording: what is there may have been there when the machine was new."""
+"""Upper limit of confidence in a fault claimed from one recording: it may be as old as the machine."""
 
 WITH_ASSUMED_DATA = 0.5
-"""Factor where the statement rests on data of the machine that are assumed."""
+"""Confidence factor for a statement that rests on assumed machine data."""
 
 
 def from_p_value(p_value: float, *, prior: float = 0.1, limit: float = WITHOUT_REFERENCE) -> float:
@@ -421,11 +421,11 @@ def from_p_value(p_value: float, *, prior: float = 0.1, limit: float = WITHOUT_R
     Parameters
     ----------
     p_value : float
-        0 to 1, after correction for everything that was tried.
+        0 to 1, corrected for everything that was tried.
     prior : float
         Probability of the effect before looking.
     limit : float
-        The result is cut here, for what no p-value knows of.
+        The result is capped here, for causes that no p-value covers.
 
     References
     ----------
@@ -442,7 +442,7 @@ def from_p_value(p_value: float, *, prior: float = 0.1, limit: float = WITHOUT_R
 
 
 def p_text(p_value: float) -> str:
-    """Write a p-value with one digit, none below 1e-6: no model of the noise is known so well in its tails.
+    """Write a p-value with one digit, none below 1e-6: no noise model is known that well in its tails.
 
     Examples
     --------

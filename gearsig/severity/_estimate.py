@@ -1,4 +1,4 @@
-"""How deep a crack in a tooth root is, from one recording and, far better, a reference of the healthy gears."""
+"""Depth of a crack in a tooth root, from one recording and, far better, a reference of the healthy gears."""
 
 from __future__ import annotations
 
@@ -52,10 +52,10 @@ from gearsig.severity._model import (
 )
 
 MIN_HARMONICS = 4
-"""Mesh harmonics below the highest order: with fewer, one resonance decides."""
+"""Mesh harmonics needed below the highest order: with fewer, one resonance decides."""
 
 SMALLEST_DIFFERENCE = 1e-9
-"""Of the largest line: two measurements never agree so well."""
+"""Relative to the largest line: two measurements never agree so well."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class GearEvidence:
     shape : array
         See `gearsig.severity.SHAPE`.
     agreement : float or None
-        Of the teeth's pattern with the reference's; None without one.
+        Of the tooth pattern with the reference's; None without a reference.
     """
 
     shaft: ShaftLines
@@ -98,9 +98,9 @@ def pair_lines(
     rig : Rig or None
         None: the recording's own.
     pair : GearPair
-        The pair whose teeth are looked at.
+        The pair whose teeth are examined.
     channels : sequence of str
-        Acceleration; their lines keep this order.
+        Acceleration channels; the lines keep their order.
 
     Returns
     -------
@@ -118,22 +118,22 @@ def gear_evidence(
     load_mpa: float,
     tip_relief_um: float | None = None,
 ) -> tuple[GearEvidence, ...]:
-    """Return the most conspicuous tooth of either gear, in what differs from the healthy gear where there is one.
+    """Return the most conspicuous tooth of each gear, in the difference from the healthy gear where there is one.
 
-    Mesh energies that the event is compared with are the geometric mean of both recordings'.
+    The event is compared with mesh energies that are the geometric mean of both recordings'.
 
     Parameters
     ----------
     now : sequence of ShaftLines
         Of both shafts.
     healthy : sequence of ShaftLines or None
-        Of the healthy machine at the same operating point. None: the tooth is sought among its neighbours.
+        Of the healthy machine at the same operating point. None: the tooth is compared with its neighbours.
     module_mm : float
         Normal module, mm.
     load_mpa : float
         Tangential force at the pitch circle per face width and module, MPa.
     tip_relief_um : float or None
-        Where it is known, µm.
+        In µm; None: unknown.
 
     Returns
     -------
@@ -194,7 +194,7 @@ PRESSURE_ANGLE_DEG = 20.0
 
 @dataclass(frozen=True)
 class PairFacts:
-    """A spur pair of which everything is known that the calibration needs.
+    """A spur gear pair for which all data that the calibration needs are known.
 
     Parameters
     ----------
@@ -214,20 +214,20 @@ class PairFacts:
 
 
 def pair_facts(rig: Rig, torque_nm: float | None) -> PairFacts:
-    """Return what is known of the rig's gear pair.
+    """Return the data of the rig's gear pair that the calibration needs.
 
     Parameters
     ----------
     rig : Rig
     torque_nm : float or None
-        Of the shaft that the rig's operating point names; None: the operating point's own.
+        On the shaft that the rig's operating point names; None: the operating point's torque.
 
     Raises
     ------
     InputError
         If the torque is not above zero.
     RefusalError
-        If there is not exactly one pair, something is missing, or the pressure angle is another one.
+        If there is not exactly one pair, data are missing, or the pressure angle is not the calibration's.
     """
     if torque_nm is not None:
         positive(torque_nm, "torque_nm", "N m")
@@ -263,14 +263,14 @@ def pair_facts(rig: Rig, torque_nm: float | None) -> PairFacts:
 
 
 def acceleration_channels(recording: Recording, chosen: tuple[str, ...], whose: str = "") -> tuple[str, ...]:
-    """Return the chosen channels, or all accelerations; other quantities weigh frequencies differently.
+    """Return the chosen channels, or all acceleration channels; other quantities weight frequencies differently.
 
     Raises
     ------
     InputError
-        If a chosen channel is not among them.
+        If a chosen channel is not an acceleration.
     RefusalError
-        If there is none, or one holds a single value only.
+        If there is no acceleration channel, or one holds a single value only.
     """
     accelerations = tuple(channel.name for channel in recording.channels if channel.quantity == "acceleration")
     unknown = [name for name in chosen if name not in accelerations]
@@ -295,14 +295,14 @@ LARGEST_TORQUE_CHANGE = 0.10
 """Relative, as in the calibration."""
 
 LARGEST_LEVEL_CHANGE_DB = 2.5
-"""Of the median mesh harmonic, each weighted by the decibels it stands over the lines around. Unweighted, on 100
-simulated machines it is 1.4 dB at most, with the deepest cracks; another torque within its limit adds 0.8 dB."""
+"""Largest change of the median mesh harmonic, each weighted by its decibels over the surrounding lines. Unweighted, on
+100 simulated machines it is at most 1.4 dB, with the deepest cracks; another torque within its limit adds 0.8 dB."""
 
 _REMEDY = "take a reference of the same gears, with the same sensors and gains, at the same speed and load"
 
 
 def check_same_rig(now: Rig, healthy: Rig) -> None:
-    """Refuse a reference whose own rig has other teeth or another torque.
+    """Refuse a reference whose rig has different teeth or a different torque.
 
     Raises
     ------
@@ -346,7 +346,7 @@ def check_same_level(now: Sequence[ShaftLines], healthy: Sequence[ShaftLines]) -
 
 
 def _mesh_levels(shaft: ShaftLines, n: int) -> tuple[FloatArray, FloatArray]:
-    """Return the mesh harmonics' levels and how far they stand over the lines around, in dB, (n, n_channels) each."""
+    """Return the mesh harmonics' levels and their heights over the surrounding lines, in dB, (n, n_channels) each."""
     z, tiny = shaft.teeth, np.finfo(float).tiny
     energies = np.maximum(mesh_energies(shaft, n), tiny)
     around = [np.abs(shaft.lines[:, k * z - z // 2 : k * z + z // 2 + 1]) ** 2 for k in range(1, n + 1)]
@@ -355,18 +355,18 @@ def _mesh_levels(shaft: ShaftLines, n: int) -> tuple[FloatArray, FloatArray]:
 
 
 def share_of_the_recording(now: ShaftLines, difference: ShaftLines, event: ToothEvent) -> tuple[float, float]:
-    """Return (E_now − E_reference)/E_difference at the event: about 1 if it is the recording's, −1 the reference's.
+    """Return (E_now − E_reference)/E_difference at the event: about 1 if it is the recording's, −1 if the reference's.
 
-    Energies are the mean over bands and channels, each over the difference's background there. Where the teeth differ
-    much, the products of their pattern with the event blur it.
+    Energies are relative to the difference's background, averaged over bands and channels. Where the teeth differ much,
+    cross terms of their pattern with the event blur the result.
 
     Parameters
     ----------
     now : ShaftLines
     difference : ShaftLines
-        What is left of it when the turned reference is taken off.
+        What remains of it after subtracting the turned reference.
     event : ToothEvent
-        Of the difference.
+        Found in the difference.
 
     Returns
     -------
@@ -379,7 +379,7 @@ def share_of_the_recording(now: ShaftLines, difference: ShaftLines, event: Tooth
         event_windows(replace(difference, lines=lines), event)
         for lines in (recorded, recorded - difference.lines, difference.lines)
     )
-    gain = np.sqrt(usual / usual_then)  # of the other teeth: a deep crack pulls at the gain that was fitted before
+    gain = np.sqrt(usual / usual_then)  # of the other teeth: a deep crack biases the gain fitted before
     shares = (recording / gain - reference * gain) / background / np.mean(residual / background)
     return float(shares.mean()), float(shares.std() / np.sqrt(shares.size))
 
@@ -387,8 +387,8 @@ def share_of_the_recording(now: ShaftLines, difference: ShaftLines, event: Tooth
 def root_thickness_mm(teeth: int, module_mm: float, pressure_angle_deg: float = 20.0) -> float:
     """Return the thickness of the tooth at the middle of its fillet, where cracks start.
 
-    The tip round of the rack makes the fillet. Its contact normal has the angle γ to the pitch line, half way between
-    α and π/2 here. With the round's centre h below the pitch line and b₁ beside the tooth's centre:
+    The fillet is generated by the rack's tip rounding. The contact normal is at angle γ to the pitch line, here half
+    way between α and π/2. With the rounding's centre h below the pitch line and b₁ beside the tooth's centre:
 
     φ = (h/tan γ + b₁)/r,  L = h/sin γ + ρ,  thickness = 2 (r sin φ − L cos(γ − φ))
 
@@ -424,7 +424,7 @@ def root_thickness_mm(teeth: int, module_mm: float, pressure_angle_deg: float = 
 
 
 def percent_per_mm(teeth: int, module_mm: float, pressure_angle_deg: float = 20.0) -> float:
-    """Return the percentage of the root's thickness that 1 mm of a crack takes, 100 sin 45°/s_F.
+    """Return the percentage of the root's thickness that 1 mm of crack takes, 100 sin 45°/s_F.
 
     The crack runs at 45° to the tooth's centre line.
 
@@ -445,18 +445,18 @@ def percent_per_mm(teeth: int, module_mm: float, pressure_angle_deg: float = 20.
 
 
 SMALLEST_AGREEMENT = 0.4
-"""Of the teeth's pattern with the reference's: strange gears reach 0.38 once in a hundred, the right ones fall below it
-only where a deep crack rules the pattern."""
+"""Agreement of the tooth pattern with the reference's: other gears reach 0.38 once in a hundred cases; the right ones
+fall below it only where a deep crack dominates the pattern."""
 
 CLEARLY_OF_THE_REFERENCE, STANDARD_ERRORS = -0.2, 3.0
-"""Share of the recording in what stands out, and by how many standard errors it is below zero. Of 67 simulated machines
-with a crack that is seen, two came so low; with recording and reference exchanged, 54 of 68 did (seed 9158)."""
+"""Share of the recording in the event, and by how many standard errors it is below zero. Of 67 simulated machines with
+a visible crack, two came so low; with recording and reference exchanged, 54 of 68 did (seed 9158)."""
 
 LARGEST_BOUND_PERCENT = 50.0
-"""Of the root: "no crack seen, below 70 %" would be no answer."""
+"""Percent of the root: "no crack seen, below 70 %" would be no answer."""
 
 CLEARLY_LARGER = log(1.3)
-"""Difference of the prominence on both gears from which the gear counts as certain."""
+"""Logarithm of the ratio of both gears' prominences from which the gear counts as certain."""
 
 
 def estimate_crack(
@@ -471,25 +471,24 @@ def estimate_crack(
 ) -> CrackEstimate | NoCrackSeen:
     """Estimate the depth of a crack in a tooth root of a spur gear pair.
 
-    The synchronous average of either shaft (with a reference: its difference from that of the healthy gears) is
-    searched for the tooth that stands out most. Ratios of its energy to that of the mesh harmonics in the same bands go
-    into a model of ln(depth) that never falls with them, fitted to simulated machines; its interval is a conformal
-    one.
+    Each shaft's synchronous average (with a reference: its difference from that of the healthy gears) is searched for
+    the tooth that stands out most. The ratios of its energy to that of the mesh harmonics in the same bands enter a
+    model of ln(depth) that never falls as they rise, fitted to simulated machines. The interval is conformal.
 
     Parameters
     ----------
     recording : Recording or PreparedRecording
-        Acceleration at steady speed; 13 revolutions of either shaft at least, better a hundred.
+        Acceleration at steady speed; at least 13 revolutions of each shaft, preferably a hundred.
     rig : Rig or None
-        Where the recording carries none. Teeth, module, face width and torque must be known.
+        Used where the recording carries none. Teeth, module, face width and torque must be known.
     reference : Recording, PreparedRecording or None
-        Of the same gears, sensors, speed and load before there was a crack. Without it, what teeth differ by from
-        birth hides all but deep cracks.
+        Of the same gears, sensors, speed and load before there was a crack. Without it, manufacturing differences
+        between teeth hide all but deep cracks.
     torque_nm : float or None
-        Instead of the rig's operating point.
+        In place of the operating point's torque.
     tip_relief_um : float or None
-        Metal taken off at the tips of either gear, from the drawing, 0 if there is none; None: not known. It decides
-        how strong the mesh is that the crack is compared with: knowing it to 20 % makes the depth surer.
+        Metal removed at the tips of each gear, from the drawing, 0 if there is none; None: unknown. It sets the
+        strength of the mesh that the crack is compared with: knowing it to 20 % makes the depth more certain.
     channels : sequence of str
         Default: all acceleration channels.
     calibration : Calibration or None
@@ -502,10 +501,10 @@ def estimate_crack(
     Raises
     ------
     RefusalError
-        If the calibration does not reach the machine, the record is too short, the reference does not fit, or what
-        stands out is unlike a crack.
+        If the machine is outside the calibration, the record is too short, the reference does not fit, or what stands
+        out is unlike a crack.
     InputError
-        If a channel is not there, the speed source is malformed, or the torque or tip relief cannot be.
+        If a channel is missing, the speed source is malformed, or the torque or tip relief is impossible.
 
     Notes
     -----
@@ -514,15 +513,15 @@ def estimate_crack(
     On 200 simulated gearboxes with other teeth and modules than the calibration's
     (`tests/benchmarks/severity_cases.py`, seed 9157; depths 0.5 to 4 mm): with a reference, the median error is 0.36 mm
     (90 %: 0.30 to 0.43 mm; 0.32 mm where the tip relief is known to 20 %), and the 90 % interval held the depth in 83
-    of 90 cases. Seen were 5 of 20 cracks below 1 mm and 85 of 121 above, most others refused; 1 of 59 healthy gearboxes
-    got a crack. Without a reference 33 of 141 were seen, with a median error of 0.52 mm. Where teeth differ much from
-    each other, a load 8 % off the reference's can look like a crack of 2 mm.
+    of 90 cases. Of the cracks below 1 mm, 5 of 20 were seen, of those above, 85 of 121; most others were refused. A
+    crack was reported for 1 of 59 healthy gearboxes. Without a reference 33 of 141 were seen, with a median error of
+    0.52 mm. Where teeth differ much from each other, a load 8 % off the reference's can look like a crack of 2 mm.
 
-    The kind is an opinion, as it hardly shows: with a reference, of 90 cracks seen 48 were called cracked and 42 left
-    open; of 122 chips and spalls 15 were called that, 10 cracked, 97 left open.
+    The kind of damage is uncertain, as it hardly shows: with a reference, of 90 visible cracks 48 were called cracked
+    and 42 left open; of 122 chips and spalls 15 were called that, 10 cracked, and 97 left open.
 
-    What did not make the depth surer on simulated machines: squeezed energy at high orders, reach in mesh cycles,
-    phases against the mesh, two loads or two speeds (what two recordings get wrong, they mostly get wrong alike).
+    On simulated machines these did not make the depth more certain: squeezed energy at high orders, reach in mesh
+    cycles, phases relative to the mesh, two loads or two speeds (two recordings mostly share their errors).
 
     References
     ----------
@@ -536,7 +535,7 @@ def estimate_crack(
     instance_of(calibration, Calibration | None, "calibration")
     facts = pair_facts(prepared.rig, torque_nm)
     used = calibration or load_calibration()
-    if tip_relief_um is not None:  # beyond any in the calibration it is a wrong unit's
+    if tip_relief_um is not None:  # larger than any in the calibration means a wrong unit
         max_relief_um = (
             MAX_RELIEF_SHARE * used.reach["load_mpa"][1] * used.reach["module_mm"][1] / STIFFNESS_N_PER_MM_UM
         )
@@ -585,7 +584,7 @@ def judge(
     agreements = {evidence.shaft.shaft: evidence.agreement for evidence in gears if evidence.agreement is not None}
     weakest = min(agreements, key=lambda shaft: agreements[shaft], default=None)
     strange = weakest is not None and agreements[weakest] < SMALLEST_AGREEMENT
-    if clear and strange:  # then the reference's pattern is in the difference: ask for as much as without it
+    if clear and strange:  # the difference holds the reference's pattern: require as much as without it
         alone = calibration.models[ALONE]
         clear = alone.score(best.features) >= alone.threshold
     if clear:
@@ -630,7 +629,7 @@ def judge(
 def _searched(
     gears: Sequence[GearEvidence], model: DepthModel, calibration: Calibration, facts: PairFacts
 ) -> tuple[ToothSearch, ...]:
-    """Return what was looked at on each gear."""
+    """Return the search of each gear."""
     return tuple(_search(evidence, model, calibration, facts) for evidence in gears)
 
 
