@@ -1,7 +1,7 @@
-"""How deep a crack in a tooth root is: millimetres and percent with an interval, or why that cannot be told.
+"""Depth of a crack in a tooth root: millimetres and percent with an interval, or why it cannot be estimated.
 
-`estimate_crack` answers with a `CrackEstimate`, `NoCrackSeen` or a refusal; its `Calibration` comes from simulated
-cracks, by `python -m app.studies.crack_severity`.
+`estimate_crack` returns a `CrackEstimate` or `NoCrackSeen`, or refuses. Its `Calibration` comes from simulated cracks,
+made by `python -m app.studies.crack_severity`.
 """
 
 from gearsig.severity._estimate import (

@@ -1,4 +1,4 @@
-"""The numbers that the depth of a crack is read from: ratios in which gains and smooth paths cancel."""
+"""The features from which the depth of a crack is estimated: ratios in which gains and smooth paths cancel."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from gearsig.prepared import PreparedRecording, best_shift, shift_scores, slidin
 from gearsig.rig import GearPair
 
 MIN_REVOLUTIONS = 13
-"""Of either shaft: fewer leave the other shaft's orders in its average, and the calibration has no fewer."""
+"""Of each shaft: fewer leave the other shaft's orders in the average, and the calibration has no fewer."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class ShaftLines:
     ----------
     shaft : str
     teeth, other_teeth : int
-        Of the gear on it, and of its mate.
+        Of the gear on the shaft, and of its mate.
     lines : complex array, (n_channels, n_orders)
         lines[c, n] is the complex amplitude (peak) of order n of this shaft; the mean at order 0.
     n_revolutions : int
@@ -37,7 +37,7 @@ class ShaftLines:
         Mean frequency of the shaft.
     channels : tuple of str
     has_mark : bool
-        Whether order phases count from a mark on this very shaft.
+        Whether order phases count from a mark on this shaft.
     """
 
     shaft: str
@@ -51,7 +51,7 @@ class ShaftLines:
     has_mark: bool = False
 
     def turned_about(self, names: Sequence[str]) -> ShaftLines:
-        """Return the lines with those of some channels times −1."""
+        """Return the lines with those of some channels multiplied by −1."""
         return replace(self, lines=np.where(np.isin(self.channels, names)[:, None], -self.lines, self.lines))
 
 
@@ -73,7 +73,7 @@ def shaft_lines(prepared: PreparedRecording, pair: GearPair, shaft: str, channel
             f"the record holds {angle.n_revolutions:.3g} revolutions of shaft {shaft!r}, {MIN_REVOLUTIONS} are needed",
             remedy="record longer",
         )
-    average = prepared.average_lines(shaft, channels, followed=True)  # two records' averages are compared
+    average = prepared.average_lines(shaft, channels, followed=True)  # averages of two records are compared
     return ShaftLines(
         shaft,
         teeth,
@@ -88,31 +88,31 @@ def shaft_lines(prepared: PreparedRecording, pair: GearPair, shaft: str, channel
 
 
 def orders_from_mesh(orders: NDArray[np.intp], teeth: int) -> NDArray[np.intp]:
-    """Return how many orders of a shaft lie between each order and the nearest mesh harmonic, min_k |n − k z|.
+    """Return the distance in shaft orders from each order to the nearest mesh harmonic, min_k |n − k z|.
 
     Parameters
     ----------
     orders : array of int
         n, per revolution of the shaft.
     teeth : int
-        z, of its gear.
+        z, of the shaft's gear.
     """
     distance: NDArray[np.intp] = np.abs((orders + teeth // 2) % teeth - teeth // 2)
     return distance
 
 
 MAX_BANDS = 10
-"""One band about each mesh harmonic. A band's ratio to its mesh line scatters by some 8 dB, for the line is one number
-that hangs on tip relief and resonances: many bands average it out."""
+"""One band about each mesh harmonic. A band's ratio to its mesh line scatters by some 8 dB, because the line is a
+single number that depends on tip relief and resonances: many bands average this out."""
 
 WINDOW_PITCHES = 1.5
-"""A tooth is in mesh for as long as the contact ratio says, and the answer rings on a little."""
+"""A tooth is in mesh for as long as the contact ratio says, and the response rings on a little."""
 
 _SIDEBANDS = 2
-"""Lines this near to a mesh harmonic are run-out, not a tooth."""
+"""Lines this close to a mesh harmonic are run-out, not a tooth."""
 
 _LOWEST_ORDER = 4
-"""Below: unbalance, misalignment, run-out."""
+"""Orders below are unbalance, misalignment and run-out."""
 
 _STEPS_PER_TOOTH = 32
 
@@ -126,7 +126,7 @@ class ToothEvent:
     centre_rev : float
         Middle of the window, 0 to 1.
     prominence : float
-        Its energy over the median window's, mean over bands and channels; 1: nothing stands out.
+        Its energy over the median window's, averaged over bands and channels; 1: nothing stands out.
     window, background : arrays, (n_bands, n_channels)
         Mean square envelope of each band in the window and in the median window. Band 0 lies below the first mesh
         harmonic, band k about the k-th.
@@ -139,15 +139,15 @@ class ToothEvent:
 
 
 def n_bands(shaft: ShaftLines) -> int:
-    """Return how many mesh harmonics have a whole band below the highest order, 10 at most."""
+    """Return the number of mesh harmonics with a whole band below the highest order, at most 10."""
     return min(MAX_BANDS, int((shaft.highest_order - shaft.teeth // 2) / shaft.teeth))
 
 
 def find_event(shaft: ShaftLines) -> ToothEvent:
     """Find the window of 1.5 tooth pitches with the most energy.
 
-    Each band's mean square envelope is divided by its median over the revolution before bands and channels are added:
-    what a resonance or a gain multiplies, it multiplies at all teeth.
+    Each band's mean square envelope is divided by its median over the revolution before bands and channels are added,
+    since a resonance or a gain multiplies all teeth alike.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ def find_event(shaft: ShaftLines) -> ToothEvent:
     Returns
     -------
     ToothEvent
-        Its centre in revolutions from the angle's zero, 0 to 1; its prominence, a ratio of energies.
+        Its centre in revolutions from angle zero, 0 to 1; its prominence, a ratio of energies.
     """
     energy, median, width = _window_energies(shaft)
     start, prominence = strongest_window(_over_bands(energy, median))
@@ -170,17 +170,17 @@ def find_event(shaft: ShaftLines) -> ToothEvent:
 
 
 def event_windows(shaft: ShaftLines, event: ToothEvent) -> tuple[FloatArray, FloatArray]:
-    """Return each band's mean square envelope in the event's window and the median one, (n_bands + 1, n_channels)."""
+    """Return each band's mean square envelope in the event's and in the median window, (n_bands + 1, n_channels)."""
     energy, median, width = _window_energies(shaft)
     n = energy.shape[-1]
     return energy[:, :, round(event.centre_rev * n - width / 2) % n], median
 
 
 def search_levels(shaft: ShaftLines) -> tuple[FloatArray, FloatArray]:
-    """Return what `find_event` searches: middles of the windows in revolutions, 0 to 1, ascending, and levels in dB.
+    """Return what `find_event` searches: centres of the windows in revolutions, 0 to 1, ascending, and levels in dB.
 
-    A level is that of the window's energy, relative to its band's median and mean over bands and channels, over the
-    median window's; the highest one is the event's prominence.
+    A level is the window's energy over the median window's, where energies are relative to their band's median and
+    averaged over bands and channels. The highest level is the event's prominence.
     """
     energy, median, width = _window_energies(shaft)
     level = _over_bands(energy, median)
@@ -190,7 +190,7 @@ def search_levels(shaft: ShaftLines) -> tuple[FloatArray, FloatArray]:
 
 
 def _window_energies(shaft: ShaftLines) -> tuple[FloatArray, FloatArray, int]:
-    """Return the mean square envelope in the window from each angle on, its median, and the window's width."""
+    """Return the mean square envelope in the window that starts at each angle, its median, and the window's width."""
     envelopes = band_envelopes(shaft)
     width = round(WINDOW_PITCHES * envelopes.shape[-1] / shaft.teeth)
     energy = sliding_mean(envelopes, width)
@@ -198,14 +198,14 @@ def _window_energies(shaft: ShaftLines) -> tuple[FloatArray, FloatArray, int]:
 
 
 def _over_bands(energy: FloatArray, median: FloatArray) -> FloatArray:
-    """Return the energy at each angle relative to its band's median, mean over bands and channels."""
+    """Return the energy at each angle relative to its band's median, averaged over bands and channels."""
     relative = np.divide(energy, median[..., None], out=np.ones_like(energy), where=median[..., None] > 0)
     mean: FloatArray = relative.mean(axis=(0, 1))
     return mean
 
 
 def band_envelopes(shaft: ShaftLines) -> FloatArray:
-    """Return squared envelopes over one revolution, of bands one mesh order wide.
+    """Return squared envelopes over one revolution, in bands one mesh order wide.
 
     e_k(θ) = |Σ_n x[kz + n] e^{2πi nθ}|², |n| <= z/2, without mesh lines, their nearest sidebands and the lowest orders.
 
@@ -232,7 +232,7 @@ def band_envelopes(shaft: ShaftLines) -> FloatArray:
 
 
 def without_regular_lines(shaft: ShaftLines) -> np.ndarray:
-    """Return the lines with those set to 0 that belong to all teeth alike: shaft orders, mesh, nearest sidebands."""
+    """Return the lines with those common to all teeth set to 0: shaft orders, mesh lines and nearest sidebands."""
     lines = shaft.lines.copy()
     orders = np.arange(lines.shape[1])
     z = shaft.teeth
@@ -271,35 +271,35 @@ IN_WORDS = {
     "event_spread": ("the event's scatter about that change", "dB", DB_OF_LOG_ENERGY),
     "mesh_spread": ("the mesh's scatter about that change", "dB", DB_OF_LOG_ENERGY),
 }
-"""Phrase, unit, units in one of the feature; the others are given by the rig and compared before."""
+"""Phrase, unit, and units per one of the feature; the others come from the rig and are checked before."""
 
 SHAPED = ("band_excess", "line_excess", "prominence")
-"""Features that the depth is read from, by curves that never fall."""
+"""Features that the depth is estimated from, by curves that never fall."""
 
 RISING = (*SHAPED, "pattern_excess")
-"""Features that a deeper crack raises, all else the same. The last one serves to detect only: how much teeth differ
-from birth must not decide on a depth."""
+"""Features that a deeper crack raises, all else the same. The last one serves detection only: how much teeth differ
+when new must not affect the depth."""
 
 RELIEF = ("relief_share", "relief_share_squared")
-"""Of the models that know the tip relief only; 0 where it is not known."""
+"""Used only by the models that know the tip relief; 0 where it is unknown."""
 
 MAX_RELIEF_SHARE = 2.0
-"""Beyond, the tips never touch: more relief changes nothing."""
+"""Beyond this the tips never touch: more relief changes nothing."""
 
 STIFFNESS_N_PER_MM_UM = 14.0
-"""Usual stiffness of a pair of steel gears per face width: by this, teeth yield load × module / 14."""
+"""Usual stiffness of a pair of steel gears per face width: teeth deflect by load × module / 14."""
 
 GATE_PITCHES = 4.0
 _SUB_BANDS = 4
 """Per mesh harmonic."""
 _MIN_SHARE = 0.1
-"""What is left of an energy at least when the background's is taken off: a logarithm follows."""
+"""Smallest share of an energy that remains after subtracting the background, because its logarithm is taken."""
 _N_FURTHER_GATES = 6
 
 
 @dataclass(frozen=True)
 class Conditions:
-    """What the rig file says of the gear with the event.
+    """What the rig file and the speed say of the gear with the event.
 
     Parameters
     ----------
@@ -308,7 +308,7 @@ class Conditions:
         Tangential force per face width and module.
     mesh_hz : float
     tip_relief_um : float or None
-        Metal taken off at the tips of either gear; None: not known.
+        Metal removed at the tips of each gear; None: unknown.
     """
 
     module_mm: float
@@ -318,7 +318,7 @@ class Conditions:
 
     @property
     def relief_share(self) -> float:
-        """Tip relief over what the teeth yield under the load, at most 2; 0 where the relief is not known."""
+        """Tip relief over the teeth's deflection under load, at most 2; 0 where the relief is unknown."""
         yield_um = self.load_mpa * self.module_mm / STIFFNESS_N_PER_MM_UM
         return min((self.tip_relief_um or 0.0) / yield_um, MAX_RELIEF_SHARE)
 
@@ -329,22 +329,22 @@ def feature_vector(
     """Return the features in the order of `FEATURES`.
 
     - band_excess: ln of the event's energy in the band about a mesh harmonic over that harmonic's energy; mean over
-      bands and channels, strong harmonics weighing more.
-    - line_excess: ln of the spectrum of the event by itself (gated, four pitches) over mesh energies interpolated
-      between harmonics; mean over quarter bands. A resonance counts in few of them.
+      bands and channels, weighted towards strong harmonics.
+    - line_excess: ln of the spectrum of the event alone (gated, four pitches) over mesh energies interpolated between
+      harmonics; mean over quarter bands. A resonance affects few of them.
     - prominence: ln of the event's energy over that at the other teeth.
     - pattern_excess: ln of the event's energy over that by which all teeth differ (on the healthy gear, where there is
-      a reference); mean over bands and channels. What resonances multiply cancels entirely.
+      a reference); mean over bands and channels. The effect of resonances cancels entirely.
     - event_slope, mesh_slope: change of the logarithms per mesh harmonic; event_spread, mesh_spread: their standard
       deviations over the bands.
-    - relief_share: tip relief over the teeth's deflection, see `Conditions`; it decides how strong the mesh is that the
+    - relief_share: tip relief over the teeth's deflection, see `Conditions`; it sets the strength of the mesh that the
       event is compared with.
-    - the rest are logarithms of what the rig file and the speed say.
+    - the rest are logarithms of data from the rig file and of the speed.
 
     Parameters
     ----------
     shaft : ShaftLines
-        Whose event it is: the average itself, or its difference from a healthy gear's.
+        With the event: the average itself, or its difference from a healthy gear's.
     healthy : ShaftLines
         The reference's average, or the average itself.
     mesh : array, (n_harmonics, n_channels)
@@ -353,7 +353,7 @@ def feature_vector(
     conditions : Conditions
     """
     energy = _less_background(event.window[1:], event.background[1:])  # (n_harmonics, n_channels)
-    excess, weights = np.log(energy / mesh), (mesh / mesh.max(axis=0)) ** 0.25  # no gain of a channel changes either
+    excess, weights = np.log(energy / mesh), (mesh / mesh.max(axis=0)) ** 0.25  # independent of a channel's gain
     positions, event_levels = _gated_levels(shaft, event, len(mesh))
     mesh_levels = np.log(mesh)
     harmonics = np.arange(1, len(mesh) + 1)
@@ -380,7 +380,7 @@ def feature_vector(
 
 
 def mesh_energies(shaft: ShaftLines, n_harmonics: int) -> FloatArray:
-    """Return the energies of the mesh harmonics, |x[kz]|² for k from 1 on.
+    """Return the energies of the mesh harmonics, |x[kz]|² for k from 1.
 
     Parameters
     ----------
@@ -399,7 +399,7 @@ def mesh_energies(shaft: ShaftLines, n_harmonics: int) -> FloatArray:
 
 
 def _pattern_energies(healthy: ShaftLines, n_harmonics: int) -> FloatArray:
-    """Return the mean square envelope over all teeth of each band, (n_harmonics, n_channels)."""
+    """Return the mean square envelope of each band over all teeth, (n_harmonics, n_channels)."""
     z, lines = healthy.teeth, without_regular_lines(healthy)
     bands = [lines[:, k * z - z // 2 : k * z + z // 2 + 1] for k in range(1, n_harmonics + 1)]
     return np.array([np.sum(np.abs(band) ** 2, axis=1) for band in bands])
@@ -439,20 +439,20 @@ def _less_background(energy: FloatArray, background: FloatArray) -> FloatArray:
 
 
 LARGEST_SPEED_DIFFERENCE = 0.02
-"""Relative, as in the calibration; beyond, resonances amplify both recordings differently."""
+"""Relative, as in the calibration; beyond this, resonances amplify the two recordings differently."""
 
 LARGEST_GAIN_CHANGE = 0.15
 
 LARGEST_MARK_SHIFT = 0.25
-"""Of a tooth: a mark's sensor that was mounted anew, its trigger and the shafts' twist move the mesh that little. Not
-counted, a degree, 0.1 tooth of 36, leaves more about the fourth mesh harmonic in the difference than was there."""
+"""Fraction of a tooth by which a remounted mark sensor, its trigger and the shafts' twist may shift the mesh. Ignored,
+a shift of one degree, 0.1 tooth of 36, leaves more about the fourth mesh harmonic in the difference than was there."""
 
 SLOW_ORDERS = 4
-"""Up to which a shaft's orders say nothing of its teeth."""
+"""Shaft orders up to this one carry no information about the teeth."""
 
 
 def difference_lines(now: ShaftLines, healthy: ShaftLines, *, whole_teeth: bool) -> tuple[ShaftLines, float]:
-    """Return the lines of `now` less those of the healthy gear, turned so that the same teeth meet.
+    """Return the lines of `now` minus those of the healthy gear, turned so that the same teeth coincide.
 
     d[n] = x[n] − r[n] e^{−2πi n s}, with the shift s that gives the largest Σ w[n] Re(x[n] r*[n] e^{2πi n s}).
 
@@ -461,14 +461,15 @@ def difference_lines(now: ShaftLines, healthy: ShaftLines, *, whole_teeth: bool)
     now, healthy : ShaftLines
         Of the same shaft and channels.
     whole_teeth : bool
-        Whether the shift is a whole number of teeth, but for `LARGEST_MARK_SHIFT`: the mate's mark fixes the phase of
-        the mesh. Where both have a mark on this shaft, it is 0 but for that. Without a mark any shift is possible.
+        Whether the shift is a whole number of teeth, to within `LARGEST_MARK_SHIFT`, because the mate's mark fixes the
+        phase of the mesh. If both have a mark on this shaft, it is 0 to within that. Without a mark any shift is
+        allowed.
 
     Returns
     -------
     ShaftLines
     agreement : float
-        Σ w Re(…)/Σ w |…| at the shift, over the orders that tell teeth apart: 1 where the teeth's pattern is the same.
+        Σ w Re(…)/Σ w |…| at the shift, over the orders that distinguish teeth: 1 where the tooth patterns are the same.
         A deep crack lowers it, too.
 
     Raises
@@ -488,17 +489,17 @@ def difference_lines(now: ShaftLines, healthy: ShaftLines, *, whole_teeth: bool)
 
 
 REVERSED, NOT_REVERSED = 0.6, 0.9
-"""Agreement from which a channel that is turned about fits, and share of it up to which it does not as it is: a part of
-a tooth turns some mesh harmonics about as well."""
+"""Smallest agreement of a channel taken with reversed sign, and the largest share of it that the channel may reach with
+its own sign: a fraction of a tooth reverses some mesh harmonics as well."""
 
 
 def reversed_channels(now: ShaftLines, healthy: ShaftLines, *, whole_teeth: bool) -> tuple[str, ...]:
-    r"""Return the channels that read the other way round: a sensor mounted on the other side, or crossed wires.
+    r"""Return the channels with reversed sign: a sensor mounted on the other side, or crossed wires.
 
     .. math:: a_\pm = \max_s \sum_n \pm w_n \mathrm{Re}(x_n r_n^* e^{2 \pi i n s}) / \sum_n w_n |x_n r_n|
 
-    of each channel, each sign at the shift s that suits it best. Turned about is a channel with a₋ of `REVERSED` and
-    more, and a₊ of no more than `NOT_REVERSED` times that.
+    for each channel and sign, each at its best shift s. A channel is reversed if a₋ is at least `REVERSED` and a₊ at
+    most `NOT_REVERSED` times that.
 
     Parameters
     ----------
@@ -510,7 +511,7 @@ def reversed_channels(now: ShaftLines, healthy: ShaftLines, *, whole_teeth: bool
     Returns
     -------
     tuple of str
-        Their names. A channel ruled by one harmonic, which a part of a tooth turns about as well, is not among them.
+        Their names. A channel dominated by one harmonic, which a fraction of a tooth reverses as well, is not included.
     """
     cross, marks = _cross_lines(now, healthy), _allowed_shifts(now, healthy, whole_teeth=whole_teeth)
     names = []
@@ -528,7 +529,7 @@ def reversed_channels(now: ShaftLines, healthy: ShaftLines, *, whole_teeth: bool
 
 
 def reversed_text(channels: Sequence[str]) -> str:
-    """Say which channels read the other way round than in the reference, and what was made of it."""
+    """Report which channels have the opposite sign to the reference, and what was done about it."""
     verb, them = ("reads", "it was") if len(channels) == 1 else ("read", "they were")
     return (
         f"{enumerated(channels)} {verb} the other way round than in the reference, as a sensor does that is mounted on "
@@ -537,7 +538,7 @@ def reversed_text(channels: Sequence[str]) -> str:
 
 
 def _cross_lines(now: ShaftLines, healthy: ShaftLines) -> NDArray[np.complexfloating]:
-    """Return x r* of each channel, strong lines by their root, at the orders that tell parts of a tooth."""
+    """Return x r* of each channel, strong lines by their root, at the orders that resolve parts of a tooth."""
     highest = min(now.highest_order, healthy.highest_order)
     x, r = now.lines[:, : highest + 1], healthy.lines[:, : highest + 1]
     orders = np.arange(highest + 1)
@@ -577,10 +578,10 @@ def check_same_speed(now: ShaftLines, healthy: ShaftLines) -> None:
 
 
 def _matched(reference: np.ndarray, x: np.ndarray, teeth: int) -> np.ndarray:
-    """Return the reference, each mesh harmonic's band of each channel times the complex gain that fits `x` best.
+    """Return the reference, each mesh harmonic's band of each channel scaled by the complex gain that best fits `x`.
 
-    A slightly other speed or load changes amplitude and phase of the teeth's pattern a little, alike within a band.
-    g = Σ x r*/Σ|r|², held within `LARGEST_GAIN_CHANGE` of 1: more would take the crack for a gain.
+    A slightly different speed or load changes amplitude and phase of the tooth pattern a little, alike within a band.
+    g = Σ x r*/Σ|r|², held within `LARGEST_GAIN_CHANGE` of 1: beyond this the crack would be taken for a gain.
     """
     orders = np.arange(x.shape[1])
     used = tooth_distinguishing_orders(orders, teeth)
@@ -597,7 +598,7 @@ def _matched(reference: np.ndarray, x: np.ndarray, teeth: int) -> np.ndarray:
 
 
 def tooth_distinguishing_orders(orders: np.ndarray, teeth: int) -> np.ndarray:
-    """Return which orders tell one tooth from another; shaft orders, mesh lines and their sidebands hardly do."""
+    """Return which orders distinguish teeth; shaft orders, mesh lines and their sidebands hardly do."""
     used: np.ndarray = (orders > SLOW_ORDERS) & (orders_from_mesh(orders, teeth) > 1)
     return used
 
@@ -606,7 +607,7 @@ SHAPE = ("lead", "tail", "duration", "kurtosis", "peak", "window_slope")
 """Order of the entries of `event_shape`."""
 
 REACH_LEVEL = 4.0
-"""Energy over that at the median tooth down to which an event lasts: healthy teeth reach it now and then."""
+"""An event lasts while its energy over the median tooth's exceeds this; healthy teeth reach it now and then."""
 
 _SHAPE_STEPS_PER_TOOTH = 64
 _NEAR_PITCHES = 2.5
@@ -618,12 +619,12 @@ def event_shape(searched: ShaftLines, event: ToothEvent) -> FloatArray:
     """Return the numbers in the order of `SHAPE`.
 
     - lead, tail: ln of the energy one to three pitches before and after the event over its largest.
-    - duration: ln of the energy's standard deviation about its middle, in pitches; kurtosis: ln of it; peak: ln of the
-      largest energy density. A spall is short, a crack lasts as long as its tooth is in mesh.
+    - duration: ln of the energy's standard deviation about its centre, in pitches; kurtosis: its ln; peak: ln of the
+      largest energy density. A spall is short; a crack lasts as long as its tooth is in mesh.
     - window_slope: change of the window's ln energy per mesh harmonic.
 
-    The event's phase against the mesh is left out: it tells chips apart on machines like those of the calibration, and
-    misleads where the mesh harmonics pass a resonance.
+    The event's phase relative to the mesh is left out: it identifies chips on machines like those of the calibration,
+    but misleads where the mesh harmonics pass a resonance.
 
     Parameters
     ----------
@@ -642,7 +643,7 @@ def event_shape(searched: ShaftLines, event: ToothEvent) -> FloatArray:
 
 
 def reach_cycles(searched: ShaftLines, event: ToothEvent) -> float:
-    """Return for how many mesh cycles after its middle the event has four times the energy of a median other tooth.
+    """Return for how many mesh cycles after its centre the event has four times the energy of a median other tooth.
 
     Parameters
     ----------
@@ -658,7 +659,7 @@ def reach_cycles(searched: ShaftLines, event: ToothEvent) -> float:
 
 
 def _relative_energy(searched: ShaftLines, event: ToothEvent) -> FloatArray:
-    """Return the energy in windows of one pitch over the median one, the event in the middle."""
+    """Return the energy in windows of one pitch over the median one, with the event in the middle."""
     envelopes = band_envelopes(searched)
     relative = _over_bands(envelopes, np.median(envelopes, axis=-1))
     width = round(len(relative) / searched.teeth)
@@ -685,7 +686,7 @@ def _log_durations(searched: ShaftLines, event: ToothEvent) -> tuple[float, floa
 
 
 def band_signal(searched: ShaftLines, lowest: float, highest: float, centre_rev: float) -> FloatArray:
-    """Return one revolution of what tells teeth apart, between two mesh harmonics, `centre_rev` in its middle.
+    """Return one revolution of the signal that distinguishes teeth, between two mesh harmonics, about `centre_rev`.
 
     Returns
     -------
@@ -702,25 +703,25 @@ def band_signal(searched: ShaftLines, lowest: float, highest: float, centre_rev:
 
 
 LOWEST_HARMONIC = 3.5
-"""High orders: from between the third and fourth mesh harmonic on."""
+"""High orders start between the third and fourth mesh harmonics."""
 
 SQUEEZED_WINDOW_PITCHES = 2.0
 _STEP = 4
 
 
 def squeezed_rise_db(searched: ShaftLines, healthy: ShaftLines, event: ToothEvent) -> float:
-    """Return 10 log₁₀ of the squeezed energy near the tooth over that of a median healthy tooth, mean over channels.
+    """Return 10 log₁₀ of the squeezed energy near the tooth over a median healthy tooth's, averaged over channels.
 
-    E = Σ |T(o, θ)|² over orders o above 3.5 mesh harmonics and the two pitches about the event. It grows with a crack's
-    depth on one machine. Between machines it says no more of the depth than the energies that `features` holds: the
-    squeezing moves energy between orders, not between angles.
+    E = Σ |T(o, θ)|² over orders o above 3.5 mesh harmonics and the two pitches about the event. On one machine it grows
+    with a crack's depth. Between machines it adds nothing to the energies in `features`: squeezing moves energy between
+    orders, not between angles.
 
     Parameters
     ----------
     searched : ShaftLines
         The average, or its difference from the healthy gear's.
     healthy : ShaftLines
-        The healthy gear's average, or the average itself: whose median tooth is compared with.
+        The healthy gear's average, or the average itself: supplies the median tooth.
     event : ToothEvent
     """
     highest = min(n_bands(searched), n_bands(healthy)) + 0.5
@@ -730,7 +731,7 @@ def squeezed_rise_db(searched: ShaftLines, healthy: ShaftLines, event: ToothEven
 
 
 def _windows(shaft: ShaftLines, highest: float, event: ToothEvent) -> list[FloatArray]:
-    """Return the mean energy in the window about each angle, the event in the middle, one array per channel."""
+    """Return the mean energy in the window about each angle, with the event in the middle, one array per channel."""
     from gearsig.timefreq import UniformSignal, squeezed_cwt
 
     energies = []

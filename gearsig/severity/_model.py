@@ -1,4 +1,4 @@
-"""The fitted relation between features and depth, with its intervals and its limits; numbers only, no fitting."""
+"""The fitted relation between features and depth, with its intervals and limits; numbers only, no fitting."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from gearsig.results import Result
 from gearsig.severity._features import FEATURES, IN_WORDS, RELIEF, RISING, SHAPE, SHAPED
 
 MIN_SPREAD = 0.1
-"""Of ln percent: no machine is known better than to ten percent."""
+"""Of ln percent: no machine is known to better than ten percent."""
 
 
 def _freeze(model: object, shapes: Mapping[str, tuple[int, ...]]) -> None:
-    """Make the arrays of a frozen model read-only, if they have the shapes they must have."""
+    """Make the arrays of a frozen model read-only, after checking their shapes."""
     for name, shape in shapes.items():
         array = frozen_array(getattr(model, name), f"{name} of the model", ndim=len(shape))
         if array.shape != shape:
@@ -31,7 +31,7 @@ def _freeze(model: object, shapes: Mapping[str, tuple[int, ...]]) -> None:
 
 
 def segments(values: FloatArray, knots: FloatArray) -> FloatArray:
-    """Return how far values lie below the first knot, between both, and above the second; (…, 3).
+    """Return how far values lie below the first knot, between the knots, and above the second; (…, 3).
 
     Examples
     --------
@@ -45,7 +45,7 @@ def segments(values: FloatArray, knots: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class DepthModel:
-    """ln percent = c + Σ b_i z_i + Σ_j g_j(z_j), z = (f − m)/s, with rising curves g_j; and what belongs to it.
+    """ln percent = c + Σ b_i z_i + Σ_j g_j(z_j), z = (f − m)/s, with rising curves g_j; its interval and its limits.
 
     Parameters
     ----------
@@ -55,25 +55,25 @@ class DepthModel:
     coefficients : array, (n_features,)
         b; 0 for the features that rise with the depth.
     knots, slopes : arrays, (n_shaped, 2) and (n_shaped, 3)
-        Of the curves g of the features `SHAPED`: straight below, between and above the knots. Slopes are not negative.
+        Of the curves g of the features `SHAPED`: linear below, between and above the knots. Slopes are not negative.
     spread : array, (n_features + 1,)
         Of ln percent: σ = max(spread[0] + Σ spread[i] (f_i − m_i)/s_i, 0.1).
     quantiles : tuple of two floats
-        5 % and 95 % quantiles of (ln true percent − predicted)/σ, each by a model that was not fitted to that rig.
+        5 % and 95 % quantiles of (ln true percent − predicted)/σ, predicted by models not fitted to the same rig.
     detection : array, (n_features,)
         Weights of the detection score.
     threshold : float
         Score from which a crack counts as seen.
     healthy_scores : array, (n_healthy,)
-        Scores of healthy gear pairs, rising: the higher one of either gear.
+        Scores of healthy gear pairs, ascending: the higher one of the two gears.
     precision : array, (n_features, n_features)
-        Inverse covariance of the features (f_i − m_i)/s_i; 0 for those that the depth is not read from.
+        Inverse covariance of the features (f_i − m_i)/s_i; 0 for those that the depth is not estimated from.
     largest_distance : float
         Mahalanobis distance beyond which a feature vector is unlike the calibration's.
     lowest, highest : arrays, (n_features,)
         Range of each feature among the calibration's cracks.
     percent_range : tuple of two floats
-        Depths of the calibration.
+        Range of depths in the calibration.
     """
 
     mean: FloatArray
@@ -106,7 +106,7 @@ class DepthModel:
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> DepthModel:
-        """Build it from what a JSON file holds."""
+        """Build it from the contents of a JSON file."""
         fitted: dict[str, Any] = {}
         for f in fields(cls):
             value = values[f.name]
@@ -129,7 +129,7 @@ class DepthModel:
 
     def log_interval(self, features: FloatArray) -> tuple[float, float]:
         """Return the 90 % interval of ln percent."""
-        # No machine is known better than to ten percent.
+        # No machine is known to better than ten percent.
         spread = max(float(self.spread[0] + self.standardised(features) @ self.spread[1:]), MIN_SPREAD)
         centre = self.log_percent(features)
         return centre + self.quantiles[0] * spread, centre + self.quantiles[1] * spread
@@ -139,15 +139,15 @@ class DepthModel:
         return float(self.standardised(features) @ self.detection)
 
     def p_value(self, score: float) -> float:
-        """Return (1 + number of healthy pairs with as high a score)/(1 + number of healthy pairs)."""
+        """Return (1 + number of healthy pairs with at least this score)/(1 + number of healthy pairs)."""
         higher = len(self.healthy_scores) - int(np.searchsorted(self.healthy_scores, score, side="left"))
         return (1.0 + higher) / (1.0 + len(self.healthy_scores))
 
     def unlike(self, features: FloatArray) -> str:
-        """Say in which way a feature vector is unlike the calibration's cracks; empty if it is not."""
+        """Return how a feature vector is unlike the calibration's cracks; empty if it is not."""
         margin = 0.05 * (self.highest - self.lowest)
         beyond = np.maximum(self.lowest - margin - features, features - self.highest - margin)
-        beyond[np.diag(self.precision) == 0] = 0.0  # a clearer event than any in the calibration is no harm
+        beyond[np.diag(self.precision) == 0] = 0.0  # an event may be clearer than any in the calibration
         i = int(np.argmax(beyond))
         if beyond[i] > 0:
             phrase, unit, scale = IN_WORDS.get(FEATURES[i], (FEATURES[i].replace("_", " "), "", 1.0))
@@ -161,24 +161,24 @@ class DepthModel:
         return ""
 
     def at_threshold(self, features: FloatArray) -> FloatArray:
-        """Return the features that the least visible crack at this place would have.
+        """Return the features of the smallest visible crack at this place.
 
-        All energies of the event rise by the same factor until the score reaches the threshold. If it is there already,
-        nothing changes.
+        All energies of the event are raised by the same factor until the score reaches the threshold. If it is already
+        there, nothing changes.
         """
         result = np.array(features, dtype=np.float64)
         result[[FEATURES.index(name) for name in RISING]] += max(0.0, self._missing_rise(features))
         return result
 
     def threshold_prominence(self, features: FloatArray) -> float:
-        """Return ln of the prominence at which an event with these features would just be a crack, as `at_threshold`.
+        """Return ln of the prominence at which an event with these features would just count as a crack.
 
-        Of one that is a crack it lies below the event's own.
+        For an event that is a crack it lies below the event's own; see `at_threshold`.
         """
         return float(features[FEATURES.index("prominence")]) + self._missing_rise(features)
 
     def _missing_rise(self, features: FloatArray) -> float:
-        """Return by how much ln of all energies would have to rise to the threshold; below 0 beyond it."""
+        """Return by how much ln of all energies would have to rise to reach the threshold; negative beyond it."""
         rising = [FEATURES.index(name) for name in RISING]
         gain = float(np.sum(self.detection[rising] / self.scale[rising]))
         return (self.threshold - self.score(features)) / gain
@@ -187,26 +187,26 @@ class DepthModel:
 CRACKED, CHIPPED, SPALLED = KINDS = ("cracked", "chipped", "spalled")
 OTHER_DAMAGE = "chipped or spalled"
 
-# Not how large the event is and how far it stands out: a deep crack is no chip for being large.
+# Without the event's size and prominence: a deep crack is not a chip because it is large.
 _USED = [i for i, name in enumerate(FEATURES) if name not in (*RELIEF, *RISING)]
 KIND_FEATURES = (*(FEATURES[i] for i in _USED), *SHAPE)
 
 
 def kind_vector(features: FloatArray, shape: FloatArray) -> FloatArray:
-    """Return what the kind is read from, in the order of `KIND_FEATURES`."""
+    """Return the features that the kind is read from, in the order of `KIND_FEATURES`."""
     return np.concatenate([np.asarray(features)[_USED], shape])
 
 
 @dataclass(frozen=True)
 class KindModel:
-    """p_k = exp(b_k + Σ w_ki z_i)/Σ_j exp(b_j + …), z = (f − m)/s held within ±4: what is further says no more.
+    """p_k = exp(b_k + Σ w_ki z_i)/Σ_j exp(b_j + …), z = (f − m)/s limited to ±4: values beyond say no more.
 
     Parameters
     ----------
     mean, scale : arrays, (n_features,)
         m and s.
     weights : array, (3, n_features + 1)
-        b_k before w_ki, in the order of `KINDS`. As many cracks as chips and spalls together, whatever the depths.
+        b_k before w_ki, in the order of `KINDS`. Prior: as many cracks as chips and spalls together, at any depth.
     """
 
     mean: FloatArray
@@ -219,7 +219,7 @@ class KindModel:
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> KindModel:
-        """Build it from what a JSON file holds."""
+        """Build it from the contents of a JSON file."""
         return cls(*(np.asarray(values[name], dtype=np.float64) for name in ("mean", "scale", "weights")))
 
     def probabilities(self, vector: FloatArray) -> dict[str, float]:
@@ -233,23 +233,23 @@ class KindModel:
 FILE = Path(__file__).with_name("calibration.json")
 WITH_REFERENCE, ALONE = "with_reference", "alone"
 RELIEF_KNOWN = "_relief_known"
-"""Ending of the names of the models that know the tip relief."""
+"""Suffix of the names of the models that know the tip relief."""
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """What `python -m app.studies.crack_severity` made.
+    """The calibration made by `python -m app.studies.crack_severity`.
 
     Parameters
     ----------
     models : mapping
-        "with_reference" and "alone", also with the ending "_relief_known" → DepthModel.
+        "with_reference" and "alone", also with the suffix "_relief_known" → DepthModel.
     kinds : mapping
         "with_reference" and "alone" → KindModel.
     reach : mapping
         Quantity → (lowest, highest) value among the calibration's machines.
     lag_pitches : float
-        By how many pitches the event's middle follows the middle of the tooth's engagement.
+        Delay of the event's centre after the middle of the tooth's engagement, in pitches.
     provenance : mapping
         Simulator, version, seeds, numbers of cases.
     """
@@ -262,12 +262,12 @@ class Calibration:
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> Calibration:
-        """Build it from what a JSON file holds.
+        """Build it from the contents of a JSON file.
 
         Raises
         ------
         InputError
-            If it belongs to other features than this version computes.
+            If it was made for other features than this version computes.
         """
         if (tuple(values["features"]), tuple(values.get("shape", ()))) != (FEATURES, SHAPE):
             raise InputError(
@@ -284,12 +284,12 @@ class Calibration:
         )
 
     def check_reach(self, features: Mapping[str, float]) -> None:
-        """Refuse a machine that is unlike the calibration's.
+        """Refuse a machine outside the calibration's range.
 
         Raises
         ------
         RefusalError
-            With every quantity that is outside.
+            Naming every quantity that is outside.
         """
         outside = [
             f"{name} is {value:.4g}, the calibration has {self.reach[name][0]:.4g} to {self.reach[name][1]:.4g}"
@@ -311,7 +311,7 @@ def load_calibration() -> Calibration:
 
 @dataclass(frozen=True)
 class CrackEstimate(Result):
-    """A damaged tooth was seen; whether it is cracked, and how deep the crack is, if it is one.
+    """A damaged tooth was seen: whether it is cracked and, if so, how deep the crack is.
 
     Parameters
     ----------
@@ -320,33 +320,33 @@ class CrackEstimate(Result):
     gear : str
         "pair/shaft".
     tooth : int or None
-        From 1 at the shaft's mark, as they engage; None where there is no mark on this shaft.
+        From 1 at the shaft's mark, in order of engagement; None where there is no mark on this shaft.
     angle_deg : float
         Of the shaft at the middle of the tooth's engagement; counted from the mark, or from an arbitrary start.
     gear_is_certain : bool
-        False where both gears show it alike: gears of equal teeth meet the same mate every revolution.
+        False where both gears show it alike: gears with equal tooth numbers meet the same mate every revolution.
     depth_mm, depth_percent : float
-        Length of a straight crack at 45° through the face width, and the part of the root's thickness it takes away.
+        Length of a straight crack at 45° through the face width, and the share of the root's thickness it takes away.
     interval_mm, interval_percent : tuples of two floats
-        Holds the depth in 90 % of the cases, among machines like the calibration's.
+        Contains the depth in 90 % of cases, for machines like the calibration's.
     p_value : float
-        Chance of as clear an event on a healthy gear pair, among the calibration's healthy ones.
+        Probability of an event this clear on a healthy gear pair, from the calibration's healthy pairs.
     with_reference : bool
-        Whether a recording of the healthy gears was compared with.
+        Whether it was compared with a recording of the healthy gears.
     features : mapping
-        Name → value of what the estimate rests on; see `gearsig.severity`.
+        Name → value of the features behind the estimate; see `gearsig.severity`.
     reasons : tuple of str
         What the reader should know, one sentence each.
     kind_probabilities : mapping
-        "cracked", "chipped", "spalled" → probability, if cracks are as frequent as chips and spalls together.
+        "cracked", "chipped", "spalled" → probability, with cracks as frequent as chips and spalls together.
     reach_cycles : float
-        For how many mesh cycles after its middle the event has four times a median other tooth's energy. It hangs on
-        damping and resonances as much as on the depth; the estimate does not rest on it.
+        For how many mesh cycles after its centre the event has four times a median other tooth's energy. It depends on
+        damping and resonances as much as on the depth; the estimate does not use it.
     squeezed_rise_db : float
         Synchrosqueezed energy at high orders near the tooth over that of a median healthy tooth; see
-        `gearsig.severity`. The estimate does not rest on it.
+        `gearsig.severity`. The estimate does not use it.
     agreement : float or None
-        How far the teeth's pattern is that of the reference, see `difference_lines`; None without one.
+        How closely the tooth pattern agrees with the reference's, see `difference_lines`; None without a reference.
     """
 
     shaft: str
@@ -376,14 +376,14 @@ class CrackEstimate(Result):
     def kind(self) -> str:
         """What the event looks like: "cracked", "chipped or spalled", or "undecided".
 
-        Very even gears, as in the demonstrations, let deep cracks look like chips: that takes more evidence.
+        On very uniform gears, as in the demonstrations, deep cracks look like chips: that verdict needs more evidence.
         """
         cracked = self.kind_probabilities.get(CRACKED, 1.0)
         return CRACKED if cracked >= 0.7 else OTHER_DAMAGE if cracked <= 0.1 else "undecided"
 
     @property
     def likelier_other(self) -> bool:
-        """Whether it is likelier chipped or spalled than cracked."""
+        """Whether it is more likely chipped or spalled than cracked."""
         return self.kind_probabilities.get(CRACKED, 1.0) < 0.5
 
     @property
@@ -412,20 +412,20 @@ class CrackEstimate(Result):
 
 @dataclass(frozen=True)
 class ToothSearch:
-    """What was looked at on one gear: how far each place stands out, and how far a crack would have to.
+    """The search of one gear: how far each place stands out, and how far a crack would have to.
 
     Parameters
     ----------
     gear, shaft : str
     teeth : int
     angle_deg : array, (n,)
-        Of the shaft, 0 to 360: the middle of the engagement that a tooth at this angle has.
+        Of the shaft, 0 to 360: the middle of the engagement of a tooth at this angle.
     level_db : array, (n,)
-        Energy of a window of 1.5 pitches over that of the median window, mean over bands about the mesh harmonics.
+        Energy of a window of 1.5 pitches over the median window's, averaged over bands about the mesh harmonics.
     threshold_db : float
-        Level from which the clearest event of this gear would count as a crack, all its energies rising alike.
+        Level at which the clearest event of this gear would count as a crack, if all its energies rose alike.
     with_reference : bool
-        Whether it is the difference from the healthy gear that was searched.
+        Whether the difference from the healthy gear was searched.
     """
 
     gear: str
@@ -442,14 +442,14 @@ class ToothSearch:
 
 @dataclass(frozen=True)
 class NoCrackSeen(Result):
-    """No crack was seen, and how deep one may be that would not have shown.
+    """No crack was seen, and how deep a crack may be without being seen.
 
     Parameters
     ----------
     below_mm, below_percent : float
-        A crack that is deeper would have been seen in 95 of 100 cases, on either gear.
+        A deeper crack would have been seen in 95 of 100 cases, on either gear.
     p_value : float
-        Of the clearest event there is.
+        Of the clearest event.
     with_reference : bool
     features : mapping
         Of the clearest event.
