@@ -1,8 +1,8 @@
 """From signals and indicators to findings in words and numbers.
 
-`analyze` diagnoses a recording, `analyze_file` a file that may be longer than the memory. Both answer with an
-`Analysis`: a `verdict`, `findings` with place (`Where`), `Strength` and confidence, indicators, and what has changed
-since a reference (`LevelChange`).
+`analyze` diagnoses a recording, `analyze_file` a file that may be larger than memory. Both return an `Analysis`: a
+`verdict`, `findings` with location (`Where`), `Strength` and confidence, indicators, and the changes since a reference
+(`LevelChange`).
 """
 
 from gearsig.diagnosis._analyze import analyze, only_channel_assumed, with_known_angle, with_matching_channel_names

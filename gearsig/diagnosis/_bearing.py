@@ -1,4 +1,4 @@
-"""Bearings: families of lines in the envelope, at known bearing orders or at none that the rig explains."""
+"""Bearings: families of lines in the envelope, at orders of known bearings or at orders the rig does not explain."""
 
 from __future__ import annotations
 
@@ -51,51 +51,51 @@ from gearsig.prepared import LOG_RATIO_LIMIT, score_needed
 from gearsig.rig import Rig
 
 CLEAR_MODULATION, USUAL_MODULATION, USUAL_OF_RACES = 0.05, 0.1, 0.2
-"""Depth of the strongest line of the envelope from which a part is called damaged, not only worth watching: beside a
-reference, which shows what the bearing's waviness and play do; and alone, of elements and cages, and of races. Of
+"""Depth of the strongest envelope line above which a part is called damaged, not just worth watching: with a reference,
+which shows the effect of the bearing's waviness and play; and without one, for elements and cages, and for races. Of
 measured bearings, healthy ones have lines of 3 to 20 % at the orders of races, damaged races of 58 to 80 %, a damaged
 ball of 12 %."""
 
 MAX_PARTS = 2
-"""Parts that may be damaged at once; families at more orders than that have another cause more likely."""
+"""Number of parts that may be damaged at once; families at more orders are more likely to have another cause."""
 
 SHARED_BY_OTHERS = 0.5
 """Factor where impacts of another machine, a belt or an unknown shaft explain the lines as well as the part does."""
 
 WITH_STATED_SPEED, AT_ANOTHER_SPEED = 0.85, 0.5
-"""Factors where the speed is a stated one, and nothing but the family itself speaks for it; and where another speed is
-as likely: the family lies beyond a bearing's slip then, and is the part's only if the stated speed is wrong, or beyond
-the usual slip and is an element's or a cage's, which are rarer than wrong speeds, or the shafts' lines are those of a
-whole multiple of it as well, and it is the part's only if the stated speed is right."""
+"""Factors where the speed is stated and only the family itself confirms it, and where another speed is as likely. The
+latter holds if the family lies beyond a bearing's slip, so that it is the part's only if the stated speed is wrong; if
+it lies beyond the usual slip and is an element's or a cage's, which are rarer than wrong speeds; or if the shafts'
+lines also fit a whole multiple of the speed, so that it is the part's only if the stated speed is right."""
 
 WORTH_A_SUSPICION = 0.3
-"""Below this confidence a family at a part's order is worth a notice: other causes are more likely together."""
+"""Below this confidence a family at a part's order is only a notice: other causes together are more likely."""
 
 IMPULSIVE_MOMENT, LATER_LINES = 0.15, 0.06
-"""Third moment of a race's profile (`impact_profile_measures`), and power of its third to sixth line against the first
-two, below which no impacts make it. Exponentials, however slowly they ring, have 0.5 to 0.9 and, with intervals that
-scatter by 3 %, 0.13 to 0.9; damaged races of recordings and simulators 0.21 to 1.1 and 0.11 to 1.4, healthy ones that
-play, waviness and passing elements modulate −0.4 to 0.16, or 0 to 0.04."""
+"""Third moment of a race's profile (`impact_profile_measures`), and power of its third to sixth lines relative to the
+first two, below which no impacts cause it. Exponentials, however slowly they decay, have 0.5 to 0.9 and, with intervals
+that scatter by 3 %, 0.13 to 0.9; damaged races in recordings and simulations 0.21 to 1.1 and 0.11 to 1.4, healthy ones
+modulated by play, waviness and passing elements −0.4 to 0.16, or 0 to 0.04."""
 
 ONE_TO_THREE = np.arange(1.0, 4.0)
-"""Multiples of a race's order that must not be a shaft's for its profile to be known."""
+"""Multiples of a race's order that must not coincide with a shaft's for its profile to be known."""
 
 BLOCK_INTERVALS = 8
-"""From impact to impact, over which slip hardly parts the first six multiples."""
+"""Impact intervals in a block: slip hardly spreads the first six multiples over so many."""
 
 IF_SMOOTH, IF_SMOOTH_BESIDE = 0.25, 0.5
-"""Factors where no impacts make a family: alone, where of 22 such one race was damaged; and beside a reference, which
-shows what play and waviness make."""
+"""Factors on a family that no impacts cause: without a reference, where one of 22 such races was damaged; and with one,
+which shows the effect of play and waviness."""
 
 OTHER_MAKE = 0.04
-"""How far the orders of two makes of a bearing of one designation may be apart."""
+"""Largest relative difference of order between two makes of a bearing of the same designation."""
 
 SLIPS = (-0.45, -0.3, -0.18, -0.09, 0.0, 0.09, 0.18, 0.3, 0.45)
-"""Nine likely slips, over the range that is searched: tenths of their distribution, the range being 2.8 deviations."""
+"""Nine typical slips relative to the range searched: deciles of their distribution, for a range of 2.8 deviations."""
 
 WOULD_SHOW = 0.8
-"""Share of the slips at which a damaged race would have shown where none is said to show: as sure as that is said to
-be. Of elements and cages, which seldom break first, half of them."""
+"""Share of the slips at which damage to a race must show for "no damage shows" to be said, which is also the confidence
+stated. For elements and cages, which seldom fail first, half of the slips are enough."""
 
 
 def detect_bearings(
@@ -104,10 +104,10 @@ def detect_bearings(
     kurtogram_bands: Sequence[KurtogramBand] = (),
     is_as_before: Callable[[Where], bool] = lambda _: False,
 ) -> list[Finding]:
-    """Name the race where the rig gives the bearing; else report families that nothing known explains.
+    """Identify the damaged part if the rig gives the bearing; else report families that nothing known explains.
 
-    The bands that the kurtograms choose are searched like the others, and say what they show of a race found. Lines
-    that are as strong in the healthy machine's recording leave no doubt whether a bearing has been damaged since.
+    The bands selected by the kurtograms are searched like the others, and add evidence on a race found. Lines as strong
+    in the healthy machine's recording are no reason to suspect that a bearing has been damaged since.
     """
     cleaned = [
         replace(envelope, excess=without_shafts(signals, envelope.excess))
@@ -135,16 +135,16 @@ def detect_bearings(
     trains = [
         _unnamed_finding(signals, c) if c.bearing is None else _named_finding(signals, c, 1) for c in families.trains
     ]
-    # A train of another machine's explains a part as well: then it is said that the bearings are not known to be good.
+    # A train of another machine explains a part as well: then the bearings are not reported as healthy.
     claimed = any(f.is_claim for f in (*findings, *(f for f in trains if not f.where.bearing)))
     findings += trains
     if not claimed and signals.rig.bearings and cleaned:
-        fixed = cleaned[: len(envelopes)]  # where a damage rings is not known beforehand; an own band follows it
+        fixed = cleaned[: len(envelopes)]  # the band in which damage rings is unknown; a kurtogram's band depends on it
         findings += _none_shows(signals, fixed, families, is_as_before)
     return findings
 
 
-# Families that were found.
+# Families found.
 
 
 def _named_finding(signals: AnalysisSignals, candidate: Candidate, n_parts: int) -> Finding:
@@ -211,7 +211,7 @@ def _named_finding(signals: AnalysisSignals, candidate: Candidate, n_parts: int)
 def _named_evidence(
     signals: AnalysisSignals, candidate: Candidate, times: int, *, is_weak: bool, is_smooth: bool
 ) -> Iterator[str]:
-    """Yield what speaks for a part, and what else would show as it does."""
+    """Yield the evidence for a part, and what else would show in the same way."""
     slip = signed(100 * (candidate.comb.fundamental / candidate.expected - 1), 2)
     yield f"{_family_text(candidate)}, {slip} % from the kinematic order {candidate.expected:.4f}."
     yield _modulation_text(candidate) + (" Waviness of healthy races gives as much." if is_weak else "")
@@ -232,7 +232,7 @@ def _named_evidence(
 
 
 def _other_speed_text(times: int) -> str:
-    """Say which lines of the shafts stand out, and what else makes them; not a sentence yet."""
+    """Return a clause on which lines of the shafts stand out, and what else would cause them."""
     return (
         f"all lines of shafts and meshes that stand out are at multiples of {times} times their order: those of shafts "
         f"that turn {times} times as fast as stated, or of a sampling rate stated as many times too high, where every "
@@ -241,15 +241,15 @@ def _other_speed_text(times: int) -> str:
 
 
 def _with_impact_profile(candidate: Candidate) -> Candidate:
-    """Return a family with whether what modulates at a race's order is not impacts, by three standard errors."""
+    """Mark a family as smooth if the modulation at a race's order is not by impacts, beyond three standard errors."""
     envelope, over_angle = candidate.envelope, candidate.envelope.over_angle
     order, excess = candidate.comb.fundamental, envelope.excess
     if candidate.name not in RACES or over_angle is None or len(excess.free_lines_at(order * ONE_TO_THREE)) < 3:
         return candidate
-    # Shafts' lines, beside the race's or stronger, would be taken for its profile.
+    # Shafts' lines that are as strong as the race's, or stronger, would distort its profile.
     values, per_revolution = over_angle.values(envelope.channel), over_angle.samples_per_revolution
     n = prev_fast_len(len(values), real=True)
-    # Nothing above what is asked for: the lines of N_MULTIPLES and half an interval beyond, and the window's foot.
+    # Keep only the lines of N_MULTIPLES, half an interval beyond, and the window's foot.
     n_kept = min(n, next_fast_len(int(2 * (N_MULTIPLES + 2) * n * order / per_revolution), real=True))
     lines = rfft(values[:n])[: n_kept // 2 + 1]
     numbers = excess.line_numbers(np.arange(len(lines)) * per_revolution / n)
@@ -268,25 +268,26 @@ def impact_profile_measures(
     r"""Return two measures of whether an envelope's profile over the interval of a race is that of impacts.
 
     Impacts rise at once and ring down: the bispectrum of their envelope has phases from 0 (short) to −90° (saw tooth),
-    that of dips between them 180°. With :math:`C_k` the Fourier coefficients of blocks of eight intervals, which slip
-    leaves together, the third moment is
+    that of dips between impacts 180°. With :math:`C_k` the Fourier coefficients of blocks of eight intervals, short
+    enough for slip not to matter, the third moment is
 
     .. math:: \operatorname{Re} e^{i\pi/4} \sum_{k + l \le 6} \langle C_k C_l C_{k+l}^* \rangle
         \Big/ \Big(\sum_k \langle |C_k|^2 \rangle - n_k\Big)^{3/2}
 
-    where the noise n is that half way to the next multiples. It does not depend on where in an interval a block begins.
+    where the noise n is taken half way to the next multiples. It does not depend on where in an interval a block
+    begins.
 
     Parameters
     ----------
     values : ndarray, shape (n,)
-        Of an envelope.
+        An envelope.
     samples_per_interval : float
-        From one impact to the next.
+        Samples from one impact to the next.
 
     Returns
     -------
     ((float, float), (float, float)) or None
-        The third moment, and the power of the third to sixth multiple over that of the first two; either with its
+        The third moment, and the power of the third to sixth multiples over that of the first two, each with its
         standard error. None with fewer than eight blocks or six multiples, or where the noise has more power.
     """
     n, at_most = round(BLOCK_INTERVALS * samples_per_interval), 2000
@@ -317,7 +318,7 @@ def impact_profile_measures(
 
 
 def _bearings_named(candidate: Candidate) -> str:
-    """Name the bearing, and those that cannot be told from it."""
+    """Return the bearing's name, with those that cannot be distinguished from it."""
     bearings = [b for b in (candidate.bearing, *candidate.of_same_order) if b is not None]
     names = " or ".join(f"{b.name} on {named('shaft', b.shaft)}" for b in bearings)
     if len({b.shaft for b in bearings}) == 1:
@@ -336,12 +337,12 @@ def _unnamed_finding(signals: AnalysisSignals, candidate: Candidate) -> Finding:
     ]
     near += _race_beyond_slip(signals, candidate)
     mains = mains_beside(signals, candidate)
-    n_lines = round(max(candidate.comb.positions, default=order) / order)  # that many tell the fundamental better
+    n_lines = round(max(candidate.comb.positions, default=order) / order)  # the fundamental is known better by this
     width = 2.0 * candidate.envelope.excess.spectrum.resolution / n_lines
     multiple_of = None if mains else hunting_multiple(signals, order, width)
     hunting = multiple_of[1] if multiple_of is not None else ""
     multiple, shaft = _shaft_as_stated(signals, candidate)
-    # A shaft may well turn there; that it is struck every other turn is no better than an unknown part.
+    # A shaft may well turn at this rate; an impact every other turn is no more likely than an unknown part.
     is_shafts = (multiple > 0 and multiple.is_integer()) or bool(near and not speed_is_confirmed(signals))
     strong = candidate.modulation >= CLEAR_MODULATION and not (is_shafts or mains or hunting)
     causes = ["A rolling bearing that is not in the rig file is the usual cause; other machines and belts do it too."]
@@ -384,7 +385,7 @@ def _unnamed_finding(signals: AnalysisSignals, candidate: Candidate) -> Finding:
 
 
 def _race_beyond_slip(signals: AnalysisSignals, candidate: Candidate) -> Iterator[str]:
-    """Say which race's order is the nearest, where that is a little further away than slip makes it."""
+    """Yield the nearest race, if its order differs by a little more than slip explains."""
     order = candidate.comb.fundamental
     races = [(part, name, bearing.name) for bearing, name, part in expected_parts(signals) if name in RACES]
     part, name, bearing = min(races, key=lambda race: abs(order / race[0] - 1), default=(inf, "", ""))
@@ -397,11 +398,10 @@ def _race_beyond_slip(signals: AnalysisSignals, candidate: Candidate) -> Iterato
 
 
 def _shaft_as_stated(signals: AnalysisSignals, candidate: Candidate) -> tuple[float, str]:
-    """Return the multiple or half of a shaft's order that a family lies beside, in numbers and in words.
+    """Return the multiple or half of a shaft's order beside a family, as a number and in words; (0, "") if none.
 
-    Of a speed that is stated and held constant only: one that wanders spreads the shaft's lines, and those of a race
-    that is struck nearly a whole number of times a turn: with its sidebands they are a train at a rate beside the
-    shaft's. (0, "") if there is none.
+    Only for a stated speed taken as constant. If the true speed varies, the shaft's lines spread; so do those of a race
+    whose order is nearly a whole number: with its sidebands they form a train at a rate beside the shaft's.
     """
     if signals.angle is None or signals.angle.method != "constant":
         return 0.0, ""
@@ -415,7 +415,7 @@ def _shaft_as_stated(signals: AnalysisSignals, candidate: Candidate) -> tuple[fl
 
 
 def _unexplained_by(rig: Rig) -> str:
-    """Say what explains no impacts: nothing that a rig file describes, or only the shaft whose speed is known."""
+    """Return the words for what does not explain impacts: nothing in the rig, or only the shaft of known speed."""
     if not any(shaft.name for shaft in rig.shafts):
         return "the shaft does not explain"
     kinds = ["shaft", *(["gear"] if rig.pairs else []), *(["bearing"] if rig.bearings else [])]
@@ -423,7 +423,7 @@ def _unexplained_by(rig: Rig) -> str:
 
 
 def _over_frequency(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Iterator[Finding]:
-    """Without speed: report the clearest family of the envelope over frequency, without a cause."""
+    """Without a speed, yield the clearest family of the envelope over frequency, without a cause."""
     end_hz = min((float(e.excess.spectrum.positions[-1]) for e in envelopes), default=0.0)
     best = clearest_family(envelopes, 4.0, min(1000.0, end_hz / 4))
     if best is None or best.p_value > signals.settings.false_alarm_probability:
@@ -465,7 +465,7 @@ def _family_basis(candidate: Candidate, confidence: float) -> str:
 
 def _family_text(candidate: Candidate) -> str:
     comb, n = candidate.comb, 6
-    if candidate.in_train:  # then all multiples up to its last line were looked at
+    if candidate.in_train:  # then all multiples up to its last line were examined
         n = round(comb.positions[-1] / comb.fundamental) if comb.positions else 0
     ratios = ", ".join(f"{r:.0f}" for r in comb.ratios_db[:6]) + (", …" if len(comb.ratios_db) > 6 else "")
     return (
@@ -478,7 +478,7 @@ def _modulation_text(candidate: Candidate) -> str:
     return f"The strongest line is {100 * candidate.modulation:.1f} % of the mean envelope."
 
 
-# Bearings in which nothing shows: good as far as damage would have shown, else undecided.
+# Bearings in which nothing shows: healthy as far as damage would have shown, else undecided.
 
 
 def _none_shows(
@@ -487,12 +487,12 @@ def _none_shows(
     families: Families,
     is_as_before: Callable[[Where], bool],
 ) -> list[Finding]:
-    """State that nothing shows as far as it would have shown, and which parts could not have shown."""
+    """Report that nothing shows, as far as damage would have shown, and which parts could not have shown it."""
     where = Where(channels=tuple(dict.fromkeys(e.channel for e in envelopes)))
     reason = next(_reasons_to_leave_open(signals, envelopes, families, is_as_before), None)
     if reason is not None:
         return [_undecided(*reason, where)]
-    # For each part of each bearing, the depth of modulation from which it would have shown.
+    # For each part of each bearing, the depth of modulation above which it would have shown.
     expected = expected_parts(signals)
     probability = signals.settings.false_alarm_probability / max(1, len(expected) * len(envelopes))
     depths = {
@@ -534,7 +534,7 @@ def _reasons_to_leave_open(
     families: Families,
     is_as_before: Callable[[Where], bool],
 ) -> Iterator[tuple[str, str]]:
-    """Yield why no damage is not called none, and what would tell."""
+    """Yield reasons why the absence of damage cannot be stated, each with what would help."""
 
     def new(candidates: Iterable[Candidate]) -> list[Candidate]:
         return [c for c in candidates if not is_as_before(_where(signals, c))]
@@ -581,7 +581,7 @@ def _reasons_to_leave_open(
 
 
 def _examined(signals: AnalysisSignals, depths: Mapping[tuple[str, str], float]) -> list[str]:
-    """Return the bearings whose races, where nearly all damage begins, would have shown it; or what else is known."""
+    """Return the bearings whose races, or other known parts without these, would have shown damage."""
     examined = []
     for bearing in signals.rig.bearings:
         parts = {name: depth for (owner, name), depth in depths.items() if owner == bearing.name}
@@ -603,7 +603,7 @@ def _not_examined(signals: AnalysisSignals, depths: Mapping[tuple[str, str], flo
             where,
             surer="A longer recording: orders that are close need many revolutions to be told apart.",
         )
-        # A cage seldom breaks before what it holds apart is damaged: that alone does not leave the bearing undecided.
+        # A cage seldom breaks before the other parts are damaged: it alone does not leave the bearing undecided.
         only_cages = all(name == "FTF" for _, name in hidden)
         yield replace(finding, kind=Kind.INFORMATION) if only_cages else finding
     unknown = [b.name for b in signals.rig.bearings if b.name not in {owner for owner, _ in depths}]
@@ -624,9 +624,9 @@ def smallest_depth(
 
     Each line needs the log ratio score/n over its floor, where `score` is what chance reaches with `probability` and n
     the number of harmonics that no shaft hides. The depth is the amplitude of such a line over the mean envelope. The
-    band in which a damage rings is not known beforehand: the best one of all says little, so that it is the median
-    over the bands, each with its best channel. Slip takes a part's lines to and from those of the shafts: the depth is
-    the one that is enough at a share of the slips.
+    band in which damage rings is not known beforehand, so the best of all bands says little: the median over bands is
+    taken, each with its best channel. Slip moves a part's lines towards and away from those of the shafts: the depth
+    returned is sufficient at a share of the slips.
 
     Parameters
     ----------
@@ -634,11 +634,11 @@ def smallest_depth(
         Multiples of the shafts masked.
     order : float
     slip : float
-        Relative range searched to either side.
+        Relative range searched on either side.
     probability : float
         Of a false alarm in one envelope.
     share : float
-        Of the slips that are likely, 0 to 1.
+        Of the typical slips, 0 to 1.
 
     Returns
     -------
@@ -662,7 +662,7 @@ def _depths_in(envelope: BandEnvelope, orders: FloatArray, score: float) -> Floa
     n_free = np.maximum(free.sum(axis=1), 1)
     needed = score / n_free
     log_floor = np.where(free, np.log(np.maximum(excess.floor[lines], 1e-300)), 0.0).sum(axis=1) / n_free
-    # Harmonics beside those of the shafts that a family must have to be seen are three.
+    # A family needs three harmonics that no shaft hides in order to be seen.
     shows = (n_free >= 3) & (needed <= LOG_RATIO_LIMIT) & (envelope.mean > 0)
     depths: FloatArray = np.where(shows, np.exp(log_floor + needed / 2) / max(envelope.mean, 1e-300), inf)
     return depths

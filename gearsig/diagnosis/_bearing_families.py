@@ -26,26 +26,27 @@ from gearsig.rig import Bearing
 from gearsig.spectra import Spectrum
 
 SEEN_DB = 6.0
-"""Height over the floor from which a line between those of a family counts as seen."""
+"""Height over the floor at which a line between those of a family counts as seen."""
 
 AS_STRONG_DB = 9.0
-"""Scatter of a train's lines about a smooth profile: a line of two resonances' beats is weakened by so much."""
+"""Scatter of a train's lines about a smooth profile: beats between two resonances weaken a line by this much."""
 
 AS_STRONG_BESIDE_SHAFT_DB = 3.0
-"""The same where one of a train's first six lines is a multiple of a shaft's order: sums and differences of family and
-shaft lie on such a train, too, and are weaker than the family, whereas all lines of a train are alike."""
+"""The same if one of a train's first six lines is a multiple of a shaft's order: sums and differences of family and
+shaft then lie on the train, too, and are weaker than the family, whereas the lines of a real train are equally
+strong."""
 
 
 def underlying_impulse_train(excess: LinesOverFloor, comb: Comb, shafts: tuple[float, ...] = ()) -> Comb | None:
     """Return the train of impacts whose lines a family is a part of, or None if the family stands alone.
 
-    Tried are p/q of the family's fundamental (q to 30, p to 3), over the range of the family's own lines. The best is
-    that of the largest sum of log ratios less a cost per line: a train that is too slow pays for lines of noise, one
-    that is too fast leaves lines to others. It counts if at least half of its lines beside the family's are seen, and
-    beside the sidebands of the family: a race that turns through the load has them a shaft's order apart. And they
-    must be as strong as the family's, within `AS_STRONG_DB`, up to where weaker ones could still be seen: nothing makes
-    every q-th line of a train stronger than the others, whereas lines of a strong family's second-order sidebands, or
-    of its foot, lie everywhere.
+    Candidates are p/q of the family's fundamental (q to 30, p to 3), over the range of the family's lines. The best has
+    the largest sum of log ratios minus a cost per line: a train that is too slow pays for lines of noise, one that is
+    too fast misses lines. It counts if at least half of its lines that belong neither to the family nor to the family's
+    sidebands are seen; a race that turns through the load has sidebands a shaft's order apart. These lines must also be
+    as strong as the family's, within `AS_STRONG_DB`, up to where weaker ones could still be seen: nothing makes every
+    q-th line of a train stronger than the others, whereas second-order sidebands of a strong family, or lines of its
+    foot, lie everywhere.
 
     Parameters
     ----------
@@ -58,21 +59,21 @@ def underlying_impulse_train(excess: LinesOverFloor, comb: Comb, shafts: tuple[f
     Returns
     -------
     Comb or None
-        With as many multiples as lie within the range; the p-value is that of the family.
+        With all multiples within the range; the p-value is that of the family.
     """
     if not comb.positions:
         return None
     reach = max(comb.positions) + excess.spectrum.resolution
     family = _unmasked(excess, comb.fundamental, reach)
     noise = float(np.median(excess.log_ratio[~excess.masked]))
-    # Between noise (0) and the family's own mean (1): a train that adds noise lines loses.
+    # Between noise (0) and the family's mean (1), so that a train that adds noise lines loses.
     cost = noise + 0.4 * (float(family.mean()) - noise) if len(family) else 0.0
     best, best_score = None, float(np.sum(family - cost))
-    # On every third line of a train a family still has two of three multiples.
+    # A family still has two of three multiples on every third line of a train.
     fractions = {p / q for q in range(2, 31) for p in range(1, min(q, 4)) if gcd(p, q) == 1}
     for fundamental in (comb.fundamental * fraction for fraction in sorted(fractions)):
         if fundamental < 6 * excess.spectrum.resolution:
-            continue  # trains with lines closer than that are not told from noise
+            continue  # trains with lines closer than that cannot be distinguished from noise
         score = float(np.sum(_unmasked(excess, fundamental, reach) - cost))
         if score > best_score and _is_seen_between(excess, fundamental, comb.fundamental, reach, shafts):
             best, best_score = fundamental, score
@@ -82,22 +83,22 @@ def underlying_impulse_train(excess: LinesOverFloor, comb: Comb, shafts: tuple[f
 
 
 def stands_out_from_neighbours(excess: LinesOverFloor, comb: Comb, slip: float, others: tuple[float, ...]) -> bool:
-    """Whether no family at orders a few percent to either side scores as high as this one.
+    """Whether no family at orders a few percent on either side scores as high as this one.
 
-    Neighbours in which one of the `others`, the orders of further parts, lies are left out: they may be families too.
+    Neighbours that contain one of the `others`, the orders of further parts, are left out: they may be families too.
     """
     for distance in (-0.09, -0.05, 0.05, 0.09):
         low, high = (comb.fundamental * (1 + distance + side * slip) for side in (-1, 1))
         if any(low <= other * (1 + side * slip) <= high for other in others for side in (-1, 0, 1)):
             continue
         placebo = best_comb(excess, low, high)
-        if placebo is not None and placebo.score >= 0.9 * comb.score:  # a part's own scores clearly higher
+        if placebo is not None and placebo.score >= 0.9 * comb.score:  # a true part's family scores clearly higher
             return False
     return True
 
 
 def _unmasked(excess: LinesOverFloor, fundamental: float, reach: float) -> FloatArray:
-    """Return the log ratios of the multiples up to `reach` that are not explained already."""
+    """Return the log ratios of the multiples up to `reach` that are not explained yet."""
     ratios: FloatArray = excess.log_ratio[
         excess.free_lines_at(np.arange(1, int(reach / fundamental) + 1) * fundamental)
     ]
@@ -107,9 +108,10 @@ def _unmasked(excess: LinesOverFloor, fundamental: float, reach: float) -> Float
 def _is_seen_between(
     excess: LinesOverFloor, fundamental: float, family: float, reach: float, shafts: tuple[float, ...]
 ) -> bool:
-    """Whether at least half of the train's lines stand out that are none of the family's and none of its sidebands.
+    """Whether at least half of those lines of the train stand out that are not the family's or its sidebands.
 
-    Seen is a line 6 dB over the floor; a widened line of noise is so once in 18. Sidebands of a race's family make few.
+    A line counts as seen 6 dB over the floor, which a widened line of noise reaches once in 18. Sidebands of a race's
+    family give few such lines.
     """
     places = np.arange(1, int(reach / fundamental) + 1) * fundamental
     sidebands = [0.0, *(side * k * shaft for shaft in shafts for k in (1, 2, 3) for side in (-1, 1))]
@@ -121,7 +123,7 @@ def _is_seen_between(
         return False
     multiples = excess.free_lines_at(np.arange(1, int(reach / family) + 1) * family)
     own_db, between_db = (excess.over_floor_db(lines) for lines in (multiples, further[seen]))
-    # What is seen is over 6 dB, so that lines weaker than 6 dB and the scatter have none between that are too weak.
+    # Lines count as seen above 6 dB only, so weak ones cannot be judged by family lines below 6 dB plus the scatter.
     is_seen = own_db >= SEEN_DB + AS_STRONG_DB
     if is_seen.any():
         between_db = between_db[further[seen] <= multiples[is_seen].max()]
@@ -135,7 +137,7 @@ def _is_seen_between(
 def _is_of_family(
     places: FloatArray, peaks: FloatArray, resolution: float, family: float, sideband: float
 ) -> NDArray[np.bool_]:
-    """Whether a multiple of the family, shifted by `sideband`, is near and meets the peak at least as well."""
+    """Whether a multiple of the family, shifted by `sideband`, is near and fits the peak at least as well."""
     others = sideband + np.maximum(np.rint((places - sideband) / family), 0) * family
     near: NDArray[np.bool_] = np.abs(others - places) < 2 * resolution
     if sideband:
@@ -144,7 +146,7 @@ def _is_of_family(
 
 
 def _peaks_at(spectrum: Spectrum, lines: NDArray[np.int64]) -> FloatArray:
-    """Return the position of the highest peak within two lines of each, between the lines by a parabola."""
+    """Return the position of the highest peak within two lines of each, interpolated by a parabola."""
     values, last = spectrum.values, len(spectrum.values) - 2
     near = np.clip(lines[:, None] + np.arange(-2, 3), 1, last)
     top = np.take_along_axis(near, values[near].argmax(axis=1)[:, None], axis=1)[:, 0]
@@ -157,39 +159,39 @@ BEARING_PARTS = {
     "BSF": ("rolling element", 2.0),
     "FTF": ("cage", 1.0),
 }
-"""Part that strikes at each order, and strikes per cycle: a damaged rolling element strikes both races each spin."""
+"""Part and impacts per cycle for each order: a damaged rolling element strikes both races in each spin."""
 
 RACES = ("BPFO", "BPFI")
-"""Where nearly all damage begins."""
+"""Where almost all damage begins."""
 
 
 def part_text(name: str, bearing: str) -> str:
-    """Name a part by its order's name, e.g. "outer race of bearing 1"."""
+    """Return a part's text from its order's name, e.g. "outer race of bearing 1"."""
     return f"{BEARING_PARTS[name][0]} of {bearing}"
 
 
 USUAL_SLIP = 0.007
-"""Scatter of a part's order about its kinematic one."""
+"""Scatter of a part's order about the kinematic order."""
 
 SAME_BEARING_ORDER = 1e-3
-"""Relative distance below which two bearings' orders are the same for any record: slip alone scatters more."""
+"""Relative distance below which two bearings' orders are indistinguishable in any record: slip alone scatters more."""
 
 N_MULTIPLES = 6
-"""Of a family's fundamental that are looked at."""
+"""Multiples of a family's fundamental that are examined."""
 
 
 ALTERNATING_DB = 6.0
-"""By which the odd lines of half a rate lie below the even ones, where strikes at that rate are strong in turn."""
+"""Level of the odd lines of half a rate below the even ones if impacts at that rate alternate in strength."""
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """One family found, and what it may be.
+    """A family of lines, and what it may be.
 
-    `of_same_order` are other bearings whose same part has the very same order: no envelope tells them apart. `share` is
-    the part's, these included, among all that would show at that order. `loudest` is the channel with the largest line.
-    `of_tones` says that it is gone with the steady tones, `of_elements` that elements which differ may be it as well,
-    `is_smooth` that no impacts make it.
+    `of_same_order` are other bearings whose same part has the same order, which no envelope can distinguish. `share` is
+    the posterior share of the part, these included, among all causes that would show at that order. `loudest` is the
+    channel with the largest line. `of_tones` says that the family vanishes with the steady tones, `of_elements` that
+    unequal elements may cause it as well, `is_smooth` that no impacts cause it.
     """
 
     comb: Comb
@@ -209,14 +211,14 @@ class Candidate:
 
     @property
     def strength_db(self) -> float:
-        """Mean height of the first six multiples over the floor; those that do not stand out count 0."""
+        """Mean height of the first six multiples over the floor in dB; those that do not stand out count 0."""
         highest = (N_MULTIPLES + 0.5) * self.comb.fundamental
         lines = zip(self.comb.positions, self.comb.ratios_db, strict=True)
         return float(sum(ratio for position, ratio in lines if position < highest)) / N_MULTIPLES
 
     @property
     def has_odd_lines(self) -> bool:
-        """Whether odd multiples are about as high as even ones: strikes twice as fast do not make them."""
+        """Whether odd multiples are about as high as even ones, which impacts at twice the rate would not cause."""
         highest_db = [0.0, 0.0]
         for position, ratio_db in zip(self.comb.positions, self.comb.ratios_db, strict=True):
             number = round(position / self.comb.fundamental)
@@ -232,16 +234,16 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Families:
-    """What the envelopes show.
+    """The families of lines in the envelopes.
 
     Parameters
     ----------
     named : tuple of Candidate
-        Parts of known bearings, surest first.
+        Parts of known bearings, most certain first.
     trains : tuple of Candidate
-        Other periodic impacts; without a bearing, or with the one whose part strikes at their rate.
+        Other periodic impacts; without a bearing, or with the one whose part has their rate.
     unclear : tuple of Candidate
-        Families at a part's order that are no clearer than those beside them.
+        Families at a part's order that are no clearer than their neighbours.
     """
 
     named: tuple[Candidate, ...] = ()
@@ -250,18 +252,18 @@ class Families:
 
 
 def _without(envelopes: Sequence[BandEnvelope], families: Sequence[Candidate]) -> list[BandEnvelope]:
-    """Return the envelopes with all multiples of these families left out."""
+    """Return the envelopes without the multiples of these families."""
     for family in families:
         envelopes = [replace(e, excess=e.excess.without_multiples(family.comb.fundamental)) for e in envelopes]
     return list(envelopes)
 
 
 def find_families(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Families:
-    """Return the families of the envelopes, each put down to a part of a bearing only if nothing else explains it.
+    """Return the families of the envelopes, each attributed to a bearing part only if nothing else explains it.
 
-    A family at a part's order that belongs to a slower train of impacts is the train's; the train is then hidden and
-    the search begins anew, so that a damaged part beside it is found, as it does behind the clicks of a supply and
-    behind beats of steady tones. A train whose lines are those of a stronger family explains nothing: sums and
+    A family at a part's order that belongs to a slower train of impacts is attributed to the train. The train is then
+    masked and the search repeated, to find a damaged part beside it; the same is done for the clicks of a supply and
+    beats of steady tones. A train whose lines are those of a stronger family explains nothing, because sums and
     differences of that family and the shaft lie on it.
     """
     trains: list[Candidate] = []
@@ -270,7 +272,7 @@ def find_families(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Fa
         candidates = _significant(signals, envelopes)
         of_pull = [c for c in candidates if c.of_tones or mains_beside(signals, c)]
         candidates = [c for c in candidates if all(c is not pull for pull in of_pull)]
-        # Of a family whose multiples are a stronger one's, as a cage's are an outer race's, nothing is taken away.
+        # A family with the multiples of a stronger one, as a cage's include an outer race's, is not masked.
         if of_pull := [c for c in of_pull if not any(_hides(c, other) for other in candidates)]:
             pulls += of_pull
             envelopes = _without(envelopes, of_pull)
@@ -299,11 +301,11 @@ def find_families(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Fa
         named = [c for c in named if c.strength_db >= stranger - SECOND_DB]
     clear = [c for c in named if _stands_out(signals, c)]
     unclear = [c for c in named if c not in clear]
-    if not clear and not trains:  # combinations with shaft orders make further families, which are no second fault
+    if not clear and not trains:  # combinations with shaft orders are further families, but no second fault
         free = best_unnamed(signals, envelopes)
         if free is not None and free.bearing is not None:
             return Families((free,), (), tuple(unclear))
-        if free is not None and mains_beside(signals, free):  # clicks of a supply hide what is slower and weaker
+        if free is not None and mains_beside(signals, free):  # clicks of a supply hide slower and weaker trains
             further = find_families(signals, _without(envelopes, [free]))
             return replace(further, trains=(free, *further.trains))
         trains = [] if free is None else [free]
@@ -311,28 +313,28 @@ def find_families(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Fa
 
 
 def _beside_elements(candidate: Candidate, named: Sequence[Candidate]) -> Candidate:
-    """Return an open outer race as its elements', too, where they or the cage show."""
+    """Return an ambiguous outer race as its elements', too, if they or the cage show."""
     elements = {c.bearing for c in named if c.name in ("BSF", "FTF")}
     is_open = candidate.name == "BPFO" and candidate.share <= 0.5
     return replace(candidate, of_elements=True) if is_open and candidate.bearing in elements else candidate
 
 
 SAME_FAMILY = 5e-3
-"""Relative distance of two fundamentals that are one: a bearing's slip differs from day to day."""
+"""Relative distance up to which two fundamentals are the same: a bearing's slip varies from day to day."""
 
 FOUR_IN_FIVE = 0.8
-"""Of a family's lines: another may stand where one of them would be."""
+"""Share of a family's lines: another line may stand in the place of one of them."""
 
 PEAK_ERROR = 0.02
-"""By which a parabola misses a peak between lines, of their distance."""
+"""Error of a peak's position by a parabola, as a fraction of the line spacing."""
 
 SECOND_DB = 12.0
-"""A family so much weaker than another, in its own envelope or in the clearest one, is a by-product of it: sums and
-differences with the shaft and the cage, and the other bearing's sensor."""
+"""A family this much weaker than another, in its own envelope or in the clearest one, is a by-product of it: sums and
+differences with the shaft and the cage, or pick-up by the other bearing's sensor."""
 
 
 def _distinct(signals: AnalysisSignals, candidates: list[Candidate]) -> list[Candidate]:
-    """Return the candidates, strongest first, without those that are by-products of another one."""
+    """Return the candidates, strongest first, without by-products of another one."""
     kept: list[Candidate] = []
     for candidate in sorted(candidates, key=lambda c: -c.strength_db):
         beside = (max(s.strength_db, _strength_in(candidate.envelope, s.comb.fundamental)) for s in kept)
@@ -342,12 +344,12 @@ def _distinct(signals: AnalysisSignals, candidates: list[Candidate]) -> list[Can
 
 
 def _is_sideband(signals: AnalysisSignals, candidate: Candidate, carrier: Candidate) -> bool:
-    """Whether a family is the sidebands of a race's: k (f - n s) is the sideband number k n of multiple k.
+    """Whether a family is the sidebands of a race's: k (f - n s) is sideband k n of multiple k.
 
-    An inner race turns through the load, so that it has them a shaft's order apart; an outer race where the load turns,
-    weaker than its own lines. Elements and cages have them a cage's order apart. Elements pass both races together as
-    often a turn as they are many: an inner and an outer race that are struck nearly a whole number of times are each
-    other's sidebands. The true one is that on whose sidebands the other's lines lie better, weighed by their slips.
+    An inner race turns through the load, so its sidebands are a shaft's order apart; so are an outer race's where the
+    load rotates, weaker than its own lines. Sidebands of elements and cages are a cage's order apart. BPFO and BPFI add
+    up to the number of elements: if they are nearly whole numbers, an inner and an outer race are each other's
+    sidebands. The true carrier is the one whose sidebands fit the other's lines better, weighted by their slips.
     """
     shaft = signals.rig.ratio(carrier.bearing.shaft) if carrier.bearing is not None else None
     if not shaft:
@@ -359,7 +361,7 @@ def _is_sideband(signals: AnalysisSignals, candidate: Candidate, carrier: Candid
     n = round(distance / shaft)
     is_apart = 1 <= n <= 3 and abs(distance - n * shaft) <= 2 * resolution
     if {candidate.name, carrier.name} == set(RACES) and (is_apart or lies_there or lies_back):
-        # Of n lines that scatter normally about where they belong, the likelihood goes with 1/scatter^n.
+        # With n lines scattering normally about their places, the likelihood is proportional to 1/scatter^n.
         n_lines = min(len(there), len(back))
         odds = [
             _own_weight(signals, one) / float(np.mean(off / resolution) + PEAK_ERROR) ** n_lines
@@ -372,10 +374,9 @@ def _is_sideband(signals: AnalysisSignals, candidate: Candidate, carrier: Candid
 
 
 def _off_sidebands(candidate: Candidate, carrier: Candidate, shaft: float) -> FloatArray:
-    """Return how far the peaks of a family are from another's multiples and from up to three sidebands of those.
+    """Return the distances of a family's peaks from another's multiples and up to three sidebands of these.
 
-    Of a race that is struck nearly a whole number of times a turn they lie about the multiples of many an order, but
-    not on them.
+    If a race's order is nearly a whole number, they lie near the multiples of many orders, but not on them.
     """
     peaks, fundamental = np.array(candidate.comb.positions), carrier.comb.fundamental
     sidebands = shaft * np.arange(-3, 4)
@@ -385,14 +386,14 @@ def _off_sidebands(candidate: Candidate, carrier: Candidate, shaft: float) -> Fl
 
 
 def _strength_in(envelope: BandEnvelope, fundamental: float) -> float:
-    """Return the strength of a family in another envelope."""
+    """Return the strength of a family in another envelope, in dB as `Candidate.strength_db`."""
     places = fundamental * np.arange(1, N_MULTIPLES + 1)
     lines = envelope.excess.free_lines_at(places)
     return float(np.maximum(envelope.excess.over_floor_db(lines), 0.0).sum()) / N_MULTIPLES
 
 
 def _hides(family: Candidate, stronger: Candidate) -> bool:
-    """Whether a stronger family would go with a family's lines, if these were left out."""
+    """Whether masking a family's lines would also remove a stronger family."""
     return stronger.strength_db > family.strength_db and _is_multiple(stronger.comb.fundamental, family)
 
 
@@ -403,21 +404,21 @@ def _is_multiple(fundamental: float, train: Candidate) -> bool:
 
 
 def speed_is_only_stated(signals: AnalysisSignals) -> bool:
-    """Whether the speed is a stated one that no line of the signal has confirmed."""
+    """Whether the speed is stated and no line of the signal has confirmed it."""
     return signals.angle is not None and signals.angle.method == "constant" and signals.angle.quality <= 0.5
 
 
 def slip_of(signals: AnalysisSignals) -> float:
-    """Return the relative range in which a part's order is sought.
+    """Return the relative range in which a part's order is searched.
 
-    Where the speed is stated and nothing confirms it, the slip of a motor comes to the bearing's.
+    Where the speed is stated and not confirmed, a motor's slip adds to the bearing's.
     """
     slip = signals.settings.bearing_slip
     return max(slip, 0.05) if speed_is_only_stated(signals) else slip
 
 
 def expected_parts(signals: AnalysisSignals) -> list[tuple[Bearing, str, float]]:
-    """Return every known bearing part with the order at which its damage would strike."""
+    """Return every known bearing part with the order of the impacts that damage to it would cause."""
     return [
         (bearing, name, order * ratio * BEARING_PARTS[name][1])
         for bearing in signals.rig.bearings
@@ -427,16 +428,16 @@ def expected_parts(signals: AnalysisSignals) -> list[tuple[Bearing, str, float]]
 
 
 def _rates_of_bearings(signals: AnalysisSignals) -> tuple[float, float]:
-    """Return between which orders impacts of bearings come: about 1.5 to 14 times per revolution."""
+    """Return the range of orders of bearing impacts: about 1.5 to 14 times per revolution."""
     turns = signals.known_shaft_orders.values()
     return 1.5 * min(turns, default=1.0), 14.0 * max(turns, default=1.0)
 
 
 def best_unnamed(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Candidate | None:
-    """Return the clearest family that is no shaft's.
+    """Return the clearest family that is not a shaft's.
 
-    Slower trains show by their multiples among a bearing's rates. It carries a bearing's name if its fundamental is a
-    low harmonic of a known part: paths may hide the first.
+    Slower trains show by their multiples among the bearing rates. The family gets a bearing's name if its fundamental
+    is a low harmonic of a known part, since paths may hide the first.
     """
     best = clearest_family(envelopes, *_rates_of_bearings(signals))
     if best is None or best.p_value > signals.settings.false_alarm_probability:
@@ -447,14 +448,14 @@ def best_unnamed(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Can
     known = _known_multiple(signals, best)
     if known is None:
         return _where_it_is_strongest(envelopes, best)
-    # Smeared lines do not stand out from families beside them; of all orders theirs is the clearest all the same.
+    # Smeared lines do not stand out from neighbouring families, although theirs is the clearest of all orders.
     return known if _stands_out(signals, known) else replace(known, share=0.5 * known.share)
 
 
 def _strongest_family(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> float:
-    """Return the strength of the strongest family that is no chance, without steady tones that beat, in dB.
+    """Return the strength in dB of the strongest family that is not due to chance or to beats of steady tones.
 
-    One of no known part has another cause: a damaged race where the speed is wrong, or a bearing that nobody described.
+    If it is of no known part it has another cause: a damaged race at a wrong speed, or a bearing missing from the rig.
     Its by-products are near one part or another.
     """
     allowed, strongest = signals.settings.false_alarm_probability, 0.0
@@ -470,25 +471,25 @@ def _strongest_family(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -
 
 
 def clearest_family(envelopes: list[BandEnvelope], low: float, high: float) -> Candidate | None:
-    """Return the surest family with a fundamental between `low` and `high`, its p-value over all envelopes.
+    """Return the most certain family with a fundamental between `low` and `high`, its p-value over all envelopes.
 
-    Of families that are no chance at all, the strongest.
+    Of families with negligible p-values, the strongest.
     """
     families = _families(envelopes, low, high)
     best = min(families, key=lambda family: (max(family.p_value, 1e-9), -family.strength_db), default=None)
     if best is None:
         return None
-    # At no known order much else may make impacts as well, and each envelope counts as a trial.
+    # At no known order there are few other causes of impacts, and each envelope counts as a trial.
     return replace(best, p_value=min(1.0, best.p_value * len(envelopes)), loudest=_loudest(envelopes, best))
 
 
 def _chance_over(envelopes: Sequence[BandEnvelope], best: Candidate, p_values: Sequence[float]) -> float:
-    """Return the chance of the best family over all envelopes, from its chances in those that have one.
+    """Return the p-value of the best family over all envelopes, from its p-values in those that have one.
 
-    Bands overlap and channels hear the same source: where a line is higher than noise makes any of a spectrum, those
-    that show it are no independent trials, and the harmonic mean of the chances holds for dependent ones as well
-    (Wilson 2019, doi:10.1073/pnas.1814092116). One accident of noise may be in all bands, too, so that without such a
-    line each envelope counts as a trial.
+    Bands overlap and channels pick up the same source: if a line is higher than noise makes any line of a spectrum, the
+    envelopes that show it are not independent trials, and the harmonic mean of the p-values, which is valid for
+    dependent trials, is used (Wilson 2019, doi:10.1073/pnas.1814092116). Without such a line each envelope counts as a
+    trial, because one accident of noise may be in all bands.
     """
     n, of_noise_db = len(envelopes), 10 * log10(log(len(best.envelope.excess.log_ratio)))
     if max(best.comb.ratios_db) <= of_noise_db:
@@ -499,8 +500,8 @@ def _chance_over(envelopes: Sequence[BandEnvelope], best: Candidate, p_values: S
 def _where_it_is_strongest(envelopes: list[BandEnvelope], family: Candidate) -> Candidate:
     """Return a family in the envelope in which it stands out most.
 
-    That is not where chance explains it least: a family that fills its own channel with lines makes lines more likely
-    there.
+    This need not be the one with the smallest p-value: a family that fills its own channel with lines makes chance
+    lines more likely there.
     """
     low, high = (family.comb.fundamental * (1 + off) for off in (-SAME_FAMILY, SAME_FAMILY))
     seen = [
@@ -512,7 +513,7 @@ def _where_it_is_strongest(envelopes: list[BandEnvelope], family: Candidate) -> 
 
 
 def _families(envelopes: list[BandEnvelope], low: float, high: float) -> list[Candidate]:
-    """Return each envelope's best family with a fundamental between `low` and `high`, where it has one."""
+    """Return each envelope's best family with a fundamental between `low` and `high`, if it has one."""
     combs = [(best_comb(envelope.excess, low, high), envelope) for envelope in envelopes]
     return [Candidate(c, e, c.p_value) for c, e in combs if c is not None and len(c.positions) >= MINIMUM_LINES]
 
@@ -520,7 +521,7 @@ def _families(envelopes: list[BandEnvelope], low: float, high: float) -> list[Ca
 def _loudest(envelopes: list[BandEnvelope], family: Candidate) -> str:
     """Return the channel whose envelopes have the largest line at a family's fundamental: the nearest to its source.
 
-    The clearest need not be it: impacts raise the floor of their own channel by what they scatter.
+    It need not be the clearest: the scatter of impacts raises the floor of their own channel.
     """
     spectrum = family.envelope.excess.spectrum
     comparable = [e for e in envelopes if e.excess.spectrum.unit == spectrum.unit]
@@ -529,7 +530,7 @@ def _loudest(envelopes: list[BandEnvelope], family: Candidate) -> str:
 
 
 def _significant(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> list[Candidate]:
-    """Return the significant bearing parts, surest first; one that shares its lines with a surer one is left out."""
+    """Return the significant bearing parts, most certain first; of those that share lines, only the more certain one."""
     allowed = signals.settings.false_alarm_probability
     candidates = [c for c in _at_parts(signals, envelopes) if c.p_value <= allowed and _has_own_lines(c.comb)]
     candidates.sort(key=lambda c: -_own_weight(signals, c))
@@ -542,10 +543,10 @@ def _significant(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> lis
 
 
 def _at_parts(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Iterator[Candidate]:
-    """Yield the clearest family at each part's order, with its chance over all envelopes and parts."""
+    """Yield the clearest family at each part's order, with its p-value over all envelopes and parts."""
     slip = slip_of(signals)
     expected = expected_parts(signals)
-    orders = sorted(order for _, _, order in expected)  # the same part of like bearings is one trial
+    orders = sorted(order for _, _, order in expected)  # the same part of identical bearings is one trial
     n_orders = sum(high / low - 1 >= SAME_BEARING_ORDER for low, high in pairwise(orders)) + 1
     for bearing, name, order in expected:
         low, high = order * (1 - slip), order * (1 + slip)
@@ -553,34 +554,34 @@ def _at_parts(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> Iterat
         if best is None:
             continue
         p_value = min(1.0, _chance_among_others(signals, envelopes, best, bearing, name, low, high) * n_orders)
-        # Once it is fitted to the lines, the fundamental must still be near the order.
+        # After the fit to the lines, the fundamental must still be near the order.
         near = slip * order + best.envelope.excess.spectrum.resolution / 6
         if abs(best.comb.fundamental - order) <= near:
             yield replace(best, p_value=p_value, bearing=bearing, name=name, expected=order)
 
 
 DOUBTFUL = 0.05
-"""Chance of a race's family up to which "no damage shows" is not said: the level that statistics is used to."""
+"""p-value of a race's family that rules out saying that no damage shows: the customary significance level."""
 
 
 def doubtful_races(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> list[Candidate]:
-    """Return families at races' orders that chance hardly explains, and which were no finding all the same."""
+    """Return families at races' orders that chance hardly explains, although they were not reported as findings."""
     candidates = _at_parts(signals, envelopes)
     return [c for c in candidates if c.name in RACES and c.p_value <= DOUBTFUL]
 
 
 IN_VIBRATION, SEEN_IN_VIBRATION, WITHOUT_GAPS = 24, 6, 0.75
-"""Multiples of a race's order that are looked for in the vibration itself, how many of them must be seen, and which
-part of those from the first to the last that are seen: impacts leave no gaps, whereas strong lines of gears, together
-no chance either, lie here and there."""
+"""Multiples of a race's order that are sought in the vibration itself, the number of them that must be seen, and the
+share of those between the first and the last seen: impacts leave no gaps, whereas strong gear lines, though not due to
+chance either, are scattered."""
 
 
 def races_in_vibration(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> list[tuple[str, str, Comb]]:
-    """Return channel, race and lines of trains that stand in the order spectra where no envelope can show them.
+    """Return channel, race and lines of trains in the order spectra, where no envelope can show them.
 
-    Envelopes are searched for the first six lines of a family. A slip may take those to multiples of a slow shaft, of
-    which only the further lines of the train part. Where an envelope could show it and does not, lines are smooth tones
-    of elements that pass the load, which healthy bearings have too, up to high multiples.
+    Envelopes are searched for the first six lines of a family. Slip may shift these to multiples of a slow shaft, from
+    which only the further lines of the train separate. If an envelope could show the family and does not, the lines are
+    smooth tones of elements passing the load, which healthy bearings also have, up to high multiples.
     """
     races = [(part_text(name, b.name), order) for b, name, order in expected_parts(signals) if name in RACES]
     multiples, slip = np.arange(1, IN_VIBRATION + 1), slip_of(signals)
@@ -610,11 +611,11 @@ def _chance_among_others(
     low: float,
     high: float,
 ) -> float:
-    """Return a family's chance over all envelopes, without its sidebands and further multiples among chance's lines.
+    """Return a family's p-value over all envelopes, not counting its sidebands and further multiples as chance lines.
 
-    A race that turns through the load fills the spectrum with lines a shaft's order apart, a rolling element with such
-    a cage's turn apart, and impacts go on beyond the sixth multiple: they would make the family they belong to look
-    like chance, above all in a short record, in which each line is wide.
+    A race that turns through the load fills the spectrum with lines a shaft's order apart, a rolling element with lines
+    a cage's order apart, and impacts go on beyond the sixth multiple. These lines would make their own family look like
+    chance, above all in a short record, where each line is wide.
     """
     fundamental = family.comb.fundamental
     step = (signals.rig.ratio(bearing.shaft) or 0.0) * (bearing.orders().get("FTF", 0.0) if name == "BSF" else 1.0)
@@ -638,20 +639,20 @@ def _chance_among_others(
 
 
 def _widened(excess: LinesOverFloor, places: FloatArray, reach: int) -> NDArray[np.int64]:
-    """Return the numbers of the lines at some places and of those beside them."""
+    """Return the numbers of the lines at some places and of their neighbours."""
     lines = excess.lines_at(places)[:, None] + np.arange(-reach, reach + 1)
     return np.unique(np.clip(lines, 0, len(excess.masked) - 1))
 
 
 def _has_own_lines(comb: Comb) -> bool:
-    """Whether the strong lines have no common divisor: those of twice the order are another family's."""
+    """Whether the harmonic numbers of the strong lines have no common divisor; otherwise they are another family's."""
     lines = zip(comb.positions, comb.ratios_db, strict=True)
     strong = [round(position / comb.fundamental) for position, db in lines if db >= max(comb.ratios_db) - SECOND_DB]
     return gcd(*strong) == 1 or len(strong) == 1
 
 
 def _train_of(signals: AnalysisSignals, candidate: Candidate) -> Candidate | None:
-    """Return the train of impacts that a candidate's lines are a part of, if it is one."""
+    """Return the train of impacts to which a candidate's lines belong, if any."""
     train = underlying_impulse_train(
         candidate.envelope.excess, candidate.comb, tuple(signals.known_shaft_orders.values())
     )
@@ -664,10 +665,10 @@ def _train_of(signals: AnalysisSignals, candidate: Candidate) -> Candidate | Non
 
 
 def _as_part(signals: AnalysisSignals, train: Candidate) -> Candidate:
-    """Return the train with the name of the likeliest part that strikes at its rate, if there is one.
+    """Return the train with the name of the most likely part at its rate, if there is one.
 
-    A cage turns slower than all else. Of a slower shaft's race or element the first multiples run into those of its
-    shaft in a short record, and the higher ones fall on the orders of a like bearing on the faster shaft.
+    A cage is slower than everything else. In a short record the first multiples of a slower shaft's race or element run
+    into those of its shaft, and the higher ones fall on the orders of a similar bearing on the faster shaft.
     """
     fitting = [
         replace(train, bearing=bearing, name=name, expected=order)
@@ -685,32 +686,32 @@ def _stands_out(signals: AnalysisSignals, candidate: Candidate) -> bool:
 
 
 def _weight(signals: AnalysisSignals, name: str, slip: float) -> float:
-    """Return how likely a part is, by how far from its kinematic order the lines are.
+    """Return the weight of a part, given the distance of the lines from its kinematic order.
 
-    Slip scatters by 0.7 %, with the speed's own error by 2 %. Rolling elements and cages are damaged far more rarely
-    than races.
+    Slip scatters by 0.7 %, or 2 % including an error of the speed. Rolling elements and cages are damaged far less
+    often than races.
     """
     return exp(-0.5 * (slip / _typical_slip(signals)) ** 2) * (0.3 if name in ("BSF", "FTF") else 1.0)
 
 
 def _typical_slip(signals: AnalysisSignals) -> float:
-    """Return the scatter of a part's order about its kinematic one, with the error of a speed that is only stated."""
+    """Return the scatter of a part's order about its kinematic order, including the error of an unconfirmed speed."""
     return 0.02 if speed_is_only_stated(signals) else USUAL_SLIP
 
 
 def _own_weight(signals: AnalysisSignals, candidate: Candidate) -> float:
-    """Return how likely the candidate's part is, by its slip and by whether its bearing is the nearest."""
+    """Return the weight of the candidate's part, given its slip and whether its bearing is the nearest."""
     near = nearest_bearing(signals, candidate.loudest or candidate.envelope.channel)
     slip = candidate.comb.fundamental / candidate.expected - 1
     return _weight(signals, candidate.name, slip) * (1.0 if near in (None, candidate.bearing) else 0.5)
 
 
 def _with_rivals(signals: AnalysisSignals, candidate: Candidate) -> Candidate:
-    """Note what else would show at the same lines.
+    """Add what else would show at the same lines.
 
-    Other parts whose order is so near, or half or twice, that slip alone could make it this one; a multiple of the
-    shaft, of half of it or of twice the mains beside it; and of an outer race, elements that differ, where lines a
-    cage's turn apart are as strong.
+    These are other parts whose order, or half or twice of it, is within slip of this one; a nearby multiple of the
+    shaft, of half of it or of twice the mains; and, for an outer race, unequal elements if lines a cage's order apart
+    are as strong.
     """
     weight = _own_weight(signals, candidate)
     parts = expected_parts(signals)
@@ -758,19 +759,19 @@ def _with_rivals(signals: AnalysisSignals, candidate: Candidate) -> Candidate:
 
 
 AS_BEATS = 10.0
-"""How much likelier beats of tones are than impacts, where a family is gone with the tones."""
+"""Odds of beats of tones against impacts, where a family vanishes with the tones."""
 
 AS_NEAR = 1e-3
-"""Relative distance of a rate's multiples in the vibration from the same in an envelope, up to which they are one."""
+"""Relative distance up to which a rate's multiples in the vibration and in an envelope are the same."""
 
 NO_ACCIDENT = 1e-6
-"""Chance of lines at the multiples of a rate up to which tones do not stand there by accident."""
+"""p-value of lines at the multiples of a rate below which tones are not there by accident."""
 
 
 def _rings_in_multiples(signals: AnalysisSignals, candidate: Candidate) -> bool:
-    """Whether a band's own lines stand at the multiples of the family's rate: tones that beat stand anywhere.
+    """Whether a band's own lines are at the multiples of the family's rate; beating tones may be anywhere.
 
-    In a short record impacts, too, ring in steady lines. Multiples that are further apart than the rate is known only.
+    In a short record impacts, too, ring in steady lines. Only multiples known well against their spacing are used.
     """
     lines, order = signals.order_excess.get(candidate.envelope.channel), candidate.comb.fundamental
     if lines is None:
@@ -785,27 +786,27 @@ def _rings_in_multiples(signals: AnalysisSignals, candidate: Candidate) -> bool:
 
 
 def _weight_of_pull(signals: AnalysisSignals, candidate: Candidate) -> float:
-    """Return how likely a supply is on whose magnetic pull a family lies, beside a part at its kinematic order.
+    """Return the weight of a supply's magnetic pull at a family's rate, relative to a part at its kinematic order.
 
-    A supply puts it there within its wander, or as far as the record tells; a part anywhere within its slip.
+    A supply puts it there within its drift, or within the record's resolution; a part anywhere within its slip.
     """
     resolution = candidate.envelope.excess.spectrum.resolution / candidate.comb.fundamental
     return max(1.0, sqrt(2 * pi) * _typical_slip(signals) / (2 * max(MAINS_TOLERANCE, resolution / 2)))
 
 
 SHALLOW = 0.15
-"""Depth of modulation up to which an outer race's order says as little of damage as of what passes by: elements that
-differ, and a stiffness that varies as they pass the load, modulate at the same order."""
+"""Depth of modulation up to which an outer race's order is no more likely damage than elements passing by: unequal
+elements, and the varying stiffness as they pass the load, modulate at the same order."""
 
 BESIDE_SHAFT = 0.015
-"""Relative distance from a multiple of a shaft within which its line, spread by a wandering speed, is a rival."""
+"""Relative distance from a multiple of a shaft within which its line, spread by a varying speed, is a rival."""
 
 
 def _shaft_beside(signals: AnalysisSignals, candidate: Candidate) -> str:
-    """Name the multiple of a shaft that lies beside the family and is half as strong, or stronger.
+    """Return the multiple of a shaft beside the family that is at least half as strong; empty if there is none.
 
-    It explains the family where that holds for half of the lines that the family shows, and not for the first alone: a
-    line that a wandering speed spreads is spread about each of its multiples.
+    It must be as strong beside half of the lines that the family shows, not the first alone: a line spread by a varying
+    speed is spread about each of its multiples.
     """
     spectrum, fundamental = candidate.envelope.excess.spectrum, candidate.comb.fundamental
     seen = [round(position / fundamental) for position in candidate.comb.positions]
@@ -824,9 +825,9 @@ def _shaft_beside(signals: AnalysisSignals, candidate: Candidate) -> str:
 
 
 def _amplitude_beside(spectrum: Spectrum, place: float, strong: float) -> float:
-    """Return the largest amplitude within two lines of a place, without the lobe of another line where it reaches in.
+    """Return the largest amplitude within two lines of a place, excluding the lobe of another line that reaches in.
 
-    Two places nearer to each other than two lines are one.
+    Two places closer than two lines are the same.
     """
     reach = 2 * spectrum.resolution
     if abs(place - strong) <= reach:
@@ -836,17 +837,17 @@ def _amplitude_beside(spectrum: Spectrum, place: float, strong: float) -> float:
 
 
 BESIDE_DB, ONE_SIDED_DB = 12.0, 6.0
-"""Heights, over the floor and over the place as far on the other side, from which lines beside multiples of a shaft are
-not what smears those."""
+"""Heights over the floor, and over the mirrored place on the other side, at which lines beside multiples of a shaft are
+not smeared shaft lines."""
 
 
 def races_beside_shaft(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> dict[str, tuple[int, str]]:
-    """Return inner races of which one line and its sidebands may stand: a multiple of the shaft beside it, the shaft.
+    """Return inner races that may show by one line and its sidebands: race → multiple of the shaft beside it, shaft.
 
-    Where a race rings on from impact to impact, there are no further multiples; slip may also take the first so
-    near to a whole number of turns that it is taken for the shaft's. It and the two sidebands then lie as far from the
-    shaft's multiples, to one side: a speed that wanders spreads these to both, the more the higher. What is a multiple
-    of another shaft is that one's.
+    If a race rings from one impact to the next, there are no further multiples; slip may also bring the first so near
+    to a whole number of turns that it is taken for the shaft's. This line and its two sidebands then lie at equal
+    distances from the shaft's multiples, on one side, whereas a varying speed spreads the multiples to both sides,
+    higher ones more. A multiple of another shaft is attributed to that shaft.
     """
     races = {}
     for bearing, name, order in expected_parts(signals):
@@ -876,11 +877,12 @@ def races_beside_shaft(signals: AnalysisSignals, envelopes: Sequence[BandEnvelop
 
 
 def parts_on_shaft(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> dict[tuple[int, str], list[str]]:
-    """Name the races that impacts so many times a turn of a shaft may be of: within its slip, the order is whole.
+    """Return the races that may cause impacts a whole number of times per turn of a shaft, as their slip allows it.
 
-    The k-fold order of the shaft and its next two multiples stand out of the envelope, and twice as high as all other
-    multiples of the shaft between them, but for the first and for sidebands at one order beside: none exceeds its own.
-    A k-fold order that is a smaller multiple of another shaft is that one's: each modulates its own mesh.
+    The k-fold order of the shaft and its next two multiples stand out from the envelope. They are twice as high as all
+    other multiples of the shaft between them, except the first and the neighbours one order away, none of which exceeds
+    its own carrier. A k-fold order that is a smaller multiple of another shaft is attributed to that shaft: each
+    modulates its own mesh.
     """
     parts: dict[tuple[int, str], list[str]] = {}
     turns = tuple(signals.known_shaft_orders.values())
@@ -911,10 +913,10 @@ def parts_on_shaft(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) 
 
 
 def _half_beside(signals: AnalysisSignals, candidate: Candidate) -> str:
-    """Name the multiple and a half of a shaft that the family's fundamental is on or beside.
+    """Return the half-integer multiple of a shaft that the family's fundamental is on or beside; empty if none.
 
-    Loose parts strike every other turn: half the shaft's order is then there, too, half as strong or stronger. A race's
-    sidebands are on all halves as well if it is on one, so that no slower train is told from it.
+    Loose parts cause impacts every other turn: half the shaft's order is then there, too, at least half as strong. If a
+    race is on a half-integer multiple, so are its sidebands, and a slower train cannot be distinguished from it.
     """
     spectrum, fundamental = candidate.envelope.excess.spectrum, candidate.comb.fundamental
     reach = 2 * spectrum.resolution
@@ -928,14 +930,14 @@ def _half_beside(signals: AnalysisSignals, candidate: Candidate) -> str:
 
 
 def mains_beside(signals: AnalysisSignals, candidate: Candidate) -> str:
-    """Name the multiple of twice the mains' frequency that the family's fundamental is on: magnetic forces modulate."""
+    """Return the multiple of twice the mains frequency at the family's fundamental: magnetic forces modulate."""
     return magnetic_pull_at(candidate.comb.fundamental * signals.frequency_per_order_hz)
 
 
 def _elements_differ(signals: AnalysisSignals, candidate: Candidate) -> bool:
     """Whether lines at the cage's order beside multiples of the shaft are as strong as an outer race's own.
 
-    Elements that differ pass the load in turn, once a turn of the cage: an outer race struck by like elements does not
+    Unequal elements pass the load in turn, once per turn of the cage; an outer race struck by equal elements does not
     show it.
     """
     bearing, excess = candidate.bearing, candidate.envelope.excess
@@ -951,10 +953,10 @@ def _elements_differ(signals: AnalysisSignals, candidate: Candidate) -> bool:
 
 
 def nearest_bearing(signals: AnalysisSignals, channel: str) -> Bearing | None:
-    """Return the bearing that a channel's position or name tells it to be at, None where none or several fit.
+    """Return the bearing at a channel's location, by the channel's position or name; None if none or several fit.
 
-    A name fits where it is part of the position or of the channel's name, or where its words' initials are a word of
-    it: "drive end" in "X130_DE_time".
+    A bearing's name fits if it is part of the position or of the channel's name, or if the initials of its words are a
+    word there: "drive end" in "X130_DE_time".
     """
     import re
 
@@ -970,9 +972,9 @@ def nearest_bearing(signals: AnalysisSignals, channel: str) -> Bearing | None:
 
 
 def _known_multiple(signals: AnalysisSignals, candidate: Candidate) -> Candidate | None:
-    """Return the candidate named, if its fundamental is a low harmonic of a known part: paths may hide the first.
+    """Return the candidate named, if its fundamental is a low harmonic of a known part, whose first paths may hide.
 
-    As well it is something that strikes twice or three times as often.
+    It may equally be something that causes impacts two or three times as often.
     """
     for bearing, name, order in expected_parts(signals):
         for m in (1, 2, 3):
@@ -984,6 +986,6 @@ def _known_multiple(signals: AnalysisSignals, candidate: Candidate) -> Candidate
 
 
 def _shares_lines(comb: Comb, surer: Comb) -> bool:
-    """Whether most lines of a family are those of a surer one."""
+    """Whether most lines of a family are those of a more certain one."""
     shared = [p for p in comb.positions if any(abs(p / q - 1) < 0.005 for q in surer.positions)]
     return len(shared) >= len(comb.positions) / 2

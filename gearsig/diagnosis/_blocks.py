@@ -1,8 +1,8 @@
-"""Maps, averages and envelope spectra of records longer than memory, in overlapping blocks.
+"""Maps, averages and envelope spectra of records larger than memory, in overlapping blocks.
 
-Each equals what the whole record at once would give: spectra lie where those of the whole record do, a revolution
-counts in the block where it begins, and a band's filter is the same function of frequency whatever the block's length,
-with so much of the neighbours on either side that its response has died away.
+Each equals the result for the whole record at once: spectra are at the same places, a revolution counts in the block
+where it begins, and a band's filter is the same function of frequency for any block length, with enough of the
+neighbouring blocks for its response to die away.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ BLOCK_SAMPLES = 1 << 20
 """Of a block, per channel: some 100 MB of work at a time."""
 EDGE_FRACTION = 0.1
 KERNEL_SAMPLES = 64
-"""More than the resampling reaches to either side."""
+"""More than the resampling reaches on either side."""
 
 
 @dataclass(frozen=True)
@@ -45,13 +45,13 @@ class RecordBlocks:
     Parameters
     ----------
     head : Recording
-        Its beginning: channels, rate, rig and source of speed; all of it where it is only read whole.
+        Its beginning: channels, rate, rig and source of speed; the whole record if it can only be read whole.
     n_samples : int
         Per channel.
     read : callable
         A slice of samples → Recording; None → all of it.
     is_parted : bool
-        Whether the format is read in parts.
+        Whether the format can be read in parts.
     """
 
     head: Recording
@@ -60,15 +60,15 @@ class RecordBlocks:
     is_parted: bool = True
 
     def whole(self) -> Recording:
-        """Return all of it."""
+        """Return the whole record."""
         return self.read(None) if self.is_parted else self.head
 
     def power_density(self, channel: str, *, n_per_block: int = 8192) -> Spectrum:
-        """Return the power density of all of the record: the mean of all half overlapping spectra (Hann)."""
+        """Return the power density of the whole record: the mean of all half overlapping spectra (Hann)."""
         levels = self.frequency_map(channel, n_per_block=n_per_block)
         hop = n_per_block // 2
         n_spectra = (self.n_samples - n_per_block) // hop + 1
-        # All columns are means of as many spectra but the last.
+        # All columns but the last are means of equally many spectra.
         n_each = np.full(len(levels.time_s), ceil(n_spectra / len(levels.time_s)))
         n_each[-1] = n_spectra - n_each[:-1].sum()
         head = np.zeros(n_per_block)
@@ -84,19 +84,19 @@ class RecordBlocks:
         scaling: Scaling = "power density",
         shaft_angle: ShaftAngle | None = None,
     ) -> OrderMap:
-        """Return spectra over time, in each column the mean power of all half overlapping ones that begin in it.
+        """Return spectra over time, each column the mean power of all half overlapping spectra that begin in it.
 
         Parameters
         ----------
         channel : str
         n_per_block : int
-            Samples of a spectrum (Hann).
+            Samples per spectrum (Hann).
         n_columns_max : int
-            Bounds the memory: spectra are averaged where there are more.
+            Bounds the memory: spectra are averaged if there are more.
         scaling : str
             As in `amplitude_spectrum`, or "power density".
         shaft_angle : ShaftAngle or None
-            For the speed of each column; None: said to be 0.
+            For the speed of each column; None: given as 0.
 
         Returns
         -------
@@ -146,9 +146,9 @@ class RecordBlocks:
         n_columns_max: int = 1000,
         samples_per_revolution: int | None = None,
     ) -> OrderMap:
-        """Return amplitudes over order along the record, in each column the rms of all spectra that begin in it.
+        """Return amplitudes over order along the record, each column the rms of all spectra that begin in it.
 
-        Spectra (Hann) are of so many revolutions and begin half as many apart, rounded down.
+        Spectra (Hann) span `revolutions_per_block` revolutions and overlap by half, rounded down.
 
         Parameters
         ----------
@@ -198,15 +198,15 @@ class RecordBlocks:
     def envelope_density(self, channel: str, band_hz: tuple[float, float], *, n_per_block: int = 8192) -> Spectrum:
         """Return the power density of a band's squared envelope |z|², averaged over the record.
 
-        The band's edges are raised cosines of a tenth of its width; |z|² is sampled at a whole fraction of the rate,
-        at least four times the bandwidth where the record allows it. Beyond the record's ends there is nothing.
+        The band's edges are raised cosines of a tenth of its width; |z|² is sampled at a whole fraction of the rate, at
+        least four times the bandwidth where the record allows it. The signal is zero beyond the record's ends.
 
         Parameters
         ----------
         channel : str
         band_hz : (float, float)
         n_per_block : int
-            Samples of a spectrum of the envelope (Hann, half overlapping).
+            Samples per spectrum of the envelope (Hann, half overlapping).
         """
         rate, hop = self.head.sampling_rate_hz, n_per_block // 2
         total, n_spectra, held = np.zeros(n_per_block // 2 + 1), 0, np.zeros(0)
@@ -258,7 +258,7 @@ class RecordBlocks:
         """
         speed, rate = self.head.speed, self.head.sampling_rate_hz
         if isinstance(speed, ConstantSpeed):
-            # Knots at both ends of the whole record, of which only the length is asked.
+            # Knots at both ends of the whole record, of which only the length matters.
             still = np.broadcast_to(np.zeros((1, 1), np.float32), (len(self.head.channels), self.n_samples))
             return find_shaft_angle(replace(self.head, samples=still))
         if not isinstance(speed, PulseTimes | TachometerChannel):
@@ -275,7 +275,7 @@ class RecordBlocks:
             if isinstance(speed, TachometerChannel):
                 edges = tachometer_edges(part, speed)
                 times_s = edges.times_s
-                # By the levels of the first block, where they are not given.
+                # By the levels of the first block, if they are not given.
                 speed = replace(speed, threshold=edges.threshold, hysteresis=edges.hysteresis)
             else:
                 assert isinstance(part.speed, PulseTimes)  # noqa: S101 - said to the type checker: of the same file
@@ -301,7 +301,7 @@ class RecordBlocks:
         shaft_angle : ShaftAngle or None
             None: `shaft_angle()`.
         samples_per_revolution : int or None
-            None: what the first block calls for, see `resample_to_angle`.
+            None: as the first block requires, see `resample_to_angle`.
         n_jackknife_blocks : int
             For the standard error, as in `synchronous_average`.
         """
@@ -333,7 +333,7 @@ class RecordBlocks:
         return _Turns(self, channel, angle, n, first, last)
 
     def _grid(self, channel: str, angle: ShaftAngle) -> int:
-        """Return the samples per revolution that the first block calls for."""
+        """Return the samples per revolution that the first block requires."""
         n = min(BLOCK_SAMPLES, self.n_samples)
         covered = angle.between(0.0, n / self.head.sampling_rate_hz)
         return resample_to_angle(self.read(slice(0, n)), covered, channels=(channel,)).samples_per_revolution
@@ -355,9 +355,9 @@ class _Turns:
     highest_order: float = np.inf
 
     def between(self, first: int, last: int) -> Iterator[tuple[int, FloatArray]]:
-        """Yield the number of a revolution, and it and those that follow as rows, (n, n_per_revolution)."""
+        """Yield the number of a revolution, and that revolution and those that follow as rows, (n, n_per_revolution)."""
         angle, rate, n = self.angle, self.blocks.head.sampling_rate_hz, self.n_per_revolution
-        # Nearly: they only say what is read, with a twentieth of a revolution to spare.
+        # Approximate: they only determine what is read, with a twentieth of a revolution to spare.
         starts_s = np.interp(np.arange(first, last + 1), angle.revolutions, angle.time_s)
         spare = KERNEL_SAMPLES + ceil(0.05 * rate * float(np.diff(starts_s).max()))
         n_at_once = max(1, floor(BLOCK_SAMPLES / rate / float(np.median(np.diff(starts_s)))))
@@ -384,7 +384,7 @@ def record_blocks(
     speed: SpeedSource | None = None,
     part: slice | None = None,
 ) -> RecordBlocks:
-    """Open a recording that is read block by block: HDF5, TDMS, Parquet or WAV. One of another format is read.
+    """Open a recording for reading block by block: HDF5, TDMS, Parquet or WAV; other formats are read whole.
 
     Parameters
     ----------
@@ -392,12 +392,12 @@ def record_blocks(
     rig, sampling_rate_hz, speed
         As in `read_recording`.
     part : slice or None
-        These samples alone, as if there were no others.
+        Only these samples, as if there were no others.
 
     Raises
     ------
     InputError
-        As `read_recording`, and for a part of what is only read whole.
+        As `read_recording`, and for a part of a format that can only be read whole.
     """
     n_samples = n_samples_of(path)
     first, last, _ = (part or slice(None)).indices(n_samples or 0)
@@ -413,6 +413,6 @@ def record_blocks(
 
 
 def _moved(angle: ShaftAngle, start_s: float, end_s: float, revolution: int) -> ShaftAngle:
-    """Return the angle of a part of the record, on the part's own time, from a revolution that becomes 0."""
+    """Return the angle of a part of the record, on the part's own time, counted from `revolution`."""
     between = angle.between(start_s, end_s)
     return replace(between, time_s=between.time_s - start_s, revolutions=between.revolutions - revolution)

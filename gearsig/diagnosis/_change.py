@@ -1,4 +1,4 @@
-"""What changed since the reference, in dB against what either record's own segments differ by, and what it may mean."""
+"""Changes since the reference in dB, tested against the scatter of each record's segments, and what they may mean."""
 
 from __future__ import annotations
 
@@ -52,17 +52,17 @@ from gearsig.recording import MAINS_HZ, MAINS_WANDER
 from gearsig.rig import order_lines
 
 N_SEGMENTS = 8
-"""Of the shorter record: enough to know a level's scatter to a quarter, and long enough to tell sidebands apart."""
+"""Of the shorter record: enough to know a level's scatter to a quarter, and long enough to resolve sidebands."""
 
 MIN_SEGMENT_REV = 8
 STATED_SPEED = 0.01
-"""Relative error of a speed that is stated and that nothing confirms."""
+"""Relative error of a speed that is stated and not confirmed."""
 
 STANDS_OUT = 4.0
-"""Power of a line, averaged over the segments, over the lines' lower quartile around: noise does not reach it."""
+"""Mean power of a line over segments, relative to the lower quartile of the lines around: noise does not reach it."""
 
 STAYS = 0.75
-"""Share of the segments in which a line is higher than what is beside it: a tone that wanders past is no shaft's."""
+"""Share of the segments in which a line exceeds its neighbours: a tone that drifts past is no shaft's."""
 
 NOISE_QUANTILE = 0.25
 """Of lines: three in four of them may be tones, as between the harmonics of a loose shaft."""
@@ -71,13 +71,13 @@ N_HARMONICS, N_MESH_HARMONICS, N_SIDEBANDS = 10, 8, 3
 OVERALL = "overall level"
 SUBHARMONICS = (1 / 2, 3 / 2, 5 / 2, 7 / 2, 1 / 3, 2 / 3)
 OTHER_SPEED = 0.03
-"""Relative difference of speed from which levels differ for that alone: forces grow with its square, and resonances
-meet other orders."""
+"""Relative difference of speed that alone changes levels: forces grow with its square, and resonances meet other
+orders."""
 
 
 @dataclass(frozen=True)
 class _Levels:
-    """Mean squares of one quantity in each segment of one record, and whether it stands out of what is beside it."""
+    """Mean squares of one quantity in each segment of one record, and whether it stands out from its neighbours."""
 
     power: FloatArray
     stands_out: bool = True
@@ -95,7 +95,7 @@ class _Quantity:
 
     @property
     def mean_power(self) -> float:
-        """Of the record where it is larger."""
+        """Mean power in the record where it is larger."""
         return max(float(self.now.power.mean()), float(self.then.power.mean()))
 
 
@@ -107,22 +107,22 @@ def level_changes(
 ) -> tuple[LevelChange, ...]:
     """Compare the levels of lines, sidebands, bearing parts and noise with those of the reference.
 
-    Either record is cut into segments of equally many revolutions. A level is the mean over them, in dB; its standard
-    error comes from their scatter, and from that of means of 2, 4, … neighbours where it is larger, as what wanders
-    slowly does not average out. The change is tested by Welch's t.
+    Each record is cut into segments of equally many revolutions. A level is the mean over them, in dB. Its standard
+    error comes from their scatter, or from that of means of 2, 4, … neighbours where this is larger, since slow drifts
+    do not average out. The change is tested by Welch's t.
 
     Parameters
     ----------
     signals, envelopes
         Of the recording.
     reference, reference_envelopes
-        Of the healthy machine, same channels.
+        Of the healthy machine, with the same channels.
 
     Returns
     -------
     tuple of LevelChange
-        Overall levels alone where a speed is not known or a record is shorter than 16 revolutions; empty where a
-        run-up goes through other speeds, too.
+        Overall levels only, if a speed is unknown or a record is shorter than 16 revolutions; empty if a run-up covers
+        other speeds.
 
     References
     ----------
@@ -151,10 +151,10 @@ def family_change(
     reference: AnalysisSignals,
     reference_envelopes: Sequence[BandEnvelope],
 ) -> LevelChange | None:
-    """Return the level of a family of lines beside that in the reference, same channel, band and order.
+    """Compare the level of a family of lines with that in the reference, in the same channel, band and order.
 
-    Of the bands whose envelopes both have, the one that has most in common with the family's; None where there is
-    none, or nothing of an envelope is there.
+    Of the bands for which both have envelopes, the one that overlaps most with the family's is used. None if there is
+    none, or an envelope is empty.
     """
     order, band = where.order, where.band_hz
     if order is None or band is None:
@@ -177,9 +177,9 @@ def family_change(
 
 
 def _is_new(now: BandEnvelope, then: BandEnvelope, order: float) -> bool:
-    """Whether the lines of a family give less than half the reason in the reference: of chance, in its logarithm.
+    """Whether the log p-value of a family's lines in the reference is less than half of that in the recording.
 
-    Segments have a coarser resolution than the whole record, by which weak lines drown in their noise.
+    Segments have a coarser resolution than the whole record, so that weak lines drown in their noise.
     """
     combs = [best_comb(e.excess, order * (1 - SAME_FAMILY), order * (1 + SAME_FAMILY)) for e in (now, then)]
     chance, chance_then = (1.0 if comb is None else comb.p_value for comb in combs)
@@ -189,7 +189,7 @@ def _is_new(now: BandEnvelope, then: BandEnvelope, order: float) -> bool:
 def with_clearest_band(
     findings: Sequence[Finding], signals: AnalysisSignals, reference: AnalysisSignals
 ) -> list[Finding]:
-    """Return the findings, each family of a bearing with the band that shows it best, beside the reference's best."""
+    """Return the findings, adding to each bearing family the band that shows it best, and the reference's best."""
     return [
         replace(f, evidence=(*f.evidence, text)) if (text := _clearest_text(f, signals, reference)) else f
         for f in findings
@@ -224,14 +224,14 @@ def _speed_off(signals: AnalysisSignals, reference: AnalysisSignals) -> float:
 
 
 SPREAD_LINES = 8
-"""Of a spectrum over frequency, over which a speed that varies spreads a line."""
+"""Of a spectrum over frequency, in which a varying speed spreads a line."""
 
 SPEED_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-"""Two records that run through the same speeds have them alike; a pulse that jitters is in neither end."""
+"""Alike in two records that run through the same speeds; a jittering pulse affects neither quantile."""
 
 
 def _speeds_apart(signals: AnalysisSignals, reference: AnalysisSignals) -> float:
-    """Return the largest relative difference between the speeds that both records run through; 0 without speeds."""
+    """Return the largest relative difference between the speed ranges of both records; 0 without speeds."""
     if signals.angle is None or reference.angle is None:
         return 0.0
     now, then = (np.quantile(one.angle.speed_rev_per_s, SPEED_QUANTILES) for one in (signals, reference))  # type: ignore[union-attr]
@@ -239,31 +239,31 @@ def _speeds_apart(signals: AnalysisSignals, reference: AnalysisSignals) -> float
 
 
 LIGHTEST_DAMPING = 0.01
-"""Damping ratio of the sharpest mode of a machine on its feet: bearings, joints and the ground take more."""
+"""Damping ratio of the sharpest mode of an installed machine: bearings, joints and the ground dissipate more."""
 
 
 def _by_speed_alone_db(apart: float) -> float:
-    r"""Return by how much another speed alone may raise a line, in dB: forces by its square, a mode by its flank.
+    r"""Return by how much a different speed alone may raise a line, in dB: forces by its square, a mode by its flank.
 
-    A mode's response near its resonance goes with 1/√(x² + ζ²), x the relative distance from it. Between two speeds
-    that are δ apart it differs by (u + √(u² + 4))/2 at most, u = δ/ζ.
+    A mode's response near its resonance is proportional to 1/√(x² + ζ²), x the relative distance from it. Between two
+    speeds that are δ apart it differs by a factor of at most (u + √(u² + 4))/2, u = δ/ζ.
     """
     u = abs(apart) / LIGHTEST_DAMPING
     return float(40 * np.log10(1 + abs(apart)) + 20 * np.log10((u + sqrt(u**2 + 4)) / 2))
 
 
 def _in_common(a: tuple[float, float], b: tuple[float, float]) -> float:
-    """Return the part that two bands share of what they cover together."""
+    """Return the overlap of two bands as a fraction of the range they cover together."""
     return float(max(min(a[1], b[1]) - max(a[0], b[0]), 0.0) / (max(a[1], b[1]) - min(a[0], b[0])))
 
 
 def _segment_rev(signals: AnalysisSignals, reference: AnalysisSignals) -> int:
-    """Return the revolutions of a segment, alike in both records.
+    """Return the number of revolutions of a segment, the same in both records.
 
     Raises
     ------
     RefusalError
-        If a record has no speed, or not two segments.
+        If a record has no speed, or fewer than two segments.
     """
     lengths = [s.over_angle.n_revolutions if s.over_angle is not None else 0.0 for s in (signals, reference)]
     revolutions = int(min(lengths)) - 1  # the first may be incomplete
@@ -286,23 +286,23 @@ class _Segments:
 
     @classmethod
     def of(cls, signal: AngleSignal, channel: str, block_rev: int) -> _Segments:
-        """Return those of a channel, without overlap: then the segments' noise is independent."""
+        """Return those of a channel, without overlap, so that the segments' noise is independent."""
         spectra = order_map(signal, channel, revolutions_per_block=block_rev, overlap=0.0, scaling="power")
         return cls(spectra.values, spectra.resolution)
 
     @cached_property
     def mean(self) -> FloatArray:
-        """Over the segments, (n_lines,)."""
+        """Mean over the segments, (n_lines,)."""
         mean: FloatArray = self.power.mean(axis=0)
         return mean
 
     @property
     def highest_order(self) -> float:
-        """Of the lines."""
+        """Highest order of the lines."""
         return float((self.power.shape[1] - 4) * self.resolution)
 
     def without_multiples(self, orders: Sequence[float]) -> _Segments:
-        """Return the same with the lines at multiples of some orders, two to either side, set to 0."""
+        """Return the same with the lines at multiples of some orders, and two on either side, set to 0."""
         positions = np.arange(self.power.shape[1]) * self.resolution
         hidden = np.zeros(len(positions), dtype=bool)
         for order in orders:
@@ -310,12 +310,12 @@ class _Segments:
         return _Segments(np.where(hidden, 0.0, self.power), self.resolution)
 
     def line(self, order: float, slip: float = 0.0) -> _Levels:
-        """Return the largest line at an order, within `slip` (relative) or a line to either side."""
+        """Return the largest line at an order, within `slip` (relative) or one line on either side."""
         reach = max(1, round(slip * order / self.resolution))
         low, high = max(round(order / self.resolution) - reach, 1), round(order / self.resolution) + reach + 1
         mean, top = self.mean, low + int(np.argmax(self.mean[low:high]))
         floor = np.quantile(mean[max(low - 32, 1) : high + 32], NOISE_QUANTILE)
-        is_peak = mean[top] >= mean[max(top - 2, 1) : top + 3].max()  # and no foot of a line beyond
+        is_peak = mean[top] >= mean[max(top - 2, 1) : top + 3].max()  # not the foot of a line beyond
         largest = self.power[:, low:high].max(axis=1)
         stays = np.mean(largest >= self.power[:, max(low - 2, 1) : high + 2].max(axis=1)) >= STAYS
         return _Levels(largest, bool(is_peak and stays and mean[top] >= STANDS_OUT * floor))
@@ -327,7 +327,7 @@ class _Segments:
 
 
 def _overall(signals: AnalysisSignals, reference: AnalysisSignals) -> Iterator[_Quantity]:
-    """Yield each channel's mean square about its mean, by segments of time."""
+    """Yield each channel's mean square about its mean, in segments of time."""
     for channel in signals.recording.channels:
         if channel.name in signals.spectra and channel.name in reference.spectra:
             values = (s.recording.values(channel.name) for s in (signals, reference))
@@ -336,7 +336,7 @@ def _overall(signals: AnalysisSignals, reference: AnalysisSignals) -> Iterator[_
 
 
 def _sum(levels: Sequence[_Levels]) -> _Levels:
-    """Add mean squares; they stand out if the lines that do hold half of all."""
+    """Add mean squares; the sum stands out if the lines that stand out hold half of it."""
     power = np.sum([one.power for one in levels], axis=0)
     power_of_standing = sum(float(one.power.sum()) for one in levels if one.stands_out)
     return _Levels(power, 2 * power_of_standing >= float(power.sum()))
@@ -375,7 +375,7 @@ def _lines_and_noise(signals: AnalysisSignals, reference: AnalysisSignals, block
                 ]
                 label = f"{WHIRL_ORDERS[0]:g} to {WHIRL_ORDERS[1]:g}× {shaft}"
                 yield _Quantity(label, "subharmonic", place, middle, unit, *levels)
-        n_fine = 6  # the narrowest of the bands that envelopes are taken of
+        n_fine = 6  # the narrowest of the envelope bands
         for low, high in envelope_bands(signals.recording.sampling_rate_hz)[-n_fine:]:
             hertz = signals.frequency_per_order_hz, reference.frequency_per_order_hz
             if high / min(hertz) > highest:
@@ -389,9 +389,9 @@ def _lines_and_noise(signals: AnalysisSignals, reference: AnalysisSignals, block
 def _of_shaft_alone(
     quantity: _Quantity, sides: Sequence[tuple[AnalysisSignals, _Segments]], order: float, slip: float, highest: float
 ) -> _Quantity:
-    """Return a shaft's line, not standing out where it lies elsewhere; or the line of the mains that hides it.
+    """Return a shaft's line, not standing out where it lies elsewhere; or the mains line that hides it.
 
-    That counts in the louder record: where it hides a weaker line, a shaft's has risen by as much and more.
+    The louder record decides: a mains line that hides a weaker line of the shaft there shows that it rose no less.
     """
     channel, levels = quantity.where.channels[0], (quantity.now, quantity.then)
     louder = int(levels[1].power.mean() > levels[0].power.mean())
@@ -409,9 +409,9 @@ def _of_shaft_alone(
 
 
 def _is_at(signals: AnalysisSignals, segments: _Segments, channel: str, order: float, wide: float = 0.0) -> bool:
-    """Whether the line that the wide ones of the segments show is at an order, or within a range about it.
+    """Whether the line that segments show broadly is really at an order, or within a range about it.
 
-    The whole record tells what stands beside it: whirling oil beside half, a race's lines beside a multiple.
+    The whole record resolves neighbours: oil whirl beside one half, a race's lines beside a multiple.
     """
     spectrum = signals.order_excess[channel].spectrum
     place = spectrum.largest_near(order, max(segments.resolution, wide / 2 + spectrum.resolution))[0]
@@ -422,15 +422,15 @@ def _is_at(signals: AnalysisSignals, segments: _Segments, channel: str, order: f
 def _mains_in_line(
     signals: AnalysisSignals, segments: _Segments, level: _Levels, channel: str, order: float, slip: float
 ) -> float:
-    """Return the multiple of the mains that makes most of a shaft's line, in Hz; 0 where none does.
+    """Return the multiple of the mains, in Hz, that makes up most of a shaft's line; 0 if none does.
 
-    A segment is short, and its lines wide. The spectrum of the whole record tells both apart where they are two of its
-    lines from each other, or the speed varies so much that it spreads a shaft's line, and none of the mains.
+    A segment is short, and its lines wide. The spectrum of the whole record separates the two if they are two of its
+    lines apart, or if the speed varies so much that it spreads the shaft's line but not the mains'.
     """
     spectrum, hertz = signals.spectra[channel], order * signals.frequency_per_order_hz
     reach_hz = (slip * order + 2 * segments.resolution) * signals.frequency_per_order_hz
     spread_hz = _spread_hz(signals, order)
-    # Spread over so many lines, a shaft's leaves none of them half of the power; over fewer, it may be any of them.
+    # A shaft's line spread this widely leaves no line with half of the power; spread less, it may be any of them.
     own_hz = 0.0 if spread_hz > SPREAD_LINES * spectrum.resolution else spread_hz / 2 + 2 * spectrum.resolution
     for mains_hz in MAINS_HZ:
         place_hz = mains_hz * round(hertz / mains_hz)
@@ -443,7 +443,7 @@ def _mains_in_line(
 
 
 def _spread_hz(signals: AnalysisSignals, order: float) -> float:
-    """Return over how many hertz a wandering speed spreads a line of an order."""
+    """Return the width in Hz over which a varying speed spreads the line of an order."""
     low_rpm, high_rpm = signals.angle.speed_range_rpm if signals.angle is not None else (0.0, 0.0)
     return order * (high_rpm - low_rpm) / 60
 
@@ -452,7 +452,7 @@ Family = tuple[str, str, float, Where, list[float]]
 
 
 def _families(signals: AnalysisSignals, channel: str, resolution: float) -> Iterator[Family]:
-    """Yield label, kind, harmonic, place and orders of the lines that teeth and shafts give; the most certain first."""
+    """Yield label, kind, harmonic, place and orders of the lines of teeth and shafts; the most certain first."""
     rig, closest = signals.rig, 4 * resolution  # nearer lines run into each other: the Hann window's main lobe
     reference = rig.reference_shaft
     lines = order_lines(rig, reference, n_mesh_harmonics=N_MESH_HARMONICS, n_shaft_harmonics=0, n_sidebands=N_SIDEBANDS)
@@ -487,7 +487,7 @@ def _bearing_parts(
     reference_envelopes: Sequence[BandEnvelope],
     block_rev: int,
 ) -> Iterator[_Quantity]:
-    """Yield each known part's family of lines in the band of each channel's envelopes where either record has most."""
+    """Yield each known part's family of lines, in the band of each channel where either record shows most of it."""
     bands = {(e.channel, e.band_hz): e for e in reference_envelopes}
     shafts, slip, parts = tuple(signals.known_shaft_orders.values()), slip_of(signals), expected_parts(signals)
     loudest: dict[tuple[int, str], tuple[_Quantity, BandEnvelope, BandEnvelope]] = {}
@@ -517,15 +517,15 @@ def _bearing_parts(
 def _without_beats(
     quantity: _Quantity, sides: Sequence[tuple[AnalysisSignals, BandEnvelope]], order: float
 ) -> _Quantity:
-    """Return a part's family, not standing out where the louder record's is gone with the steady tones.
+    """Return a part's family, not standing out where the louder record's vanishes with the steady tones.
 
-    Carriers and slots of a supply that runs at another frequency beat elsewhere, and change no bearing.
+    Carriers and slots of a supply at another frequency beat elsewhere, and change no bearing.
     """
     levels = (quantity.now, quantity.then)
     power = [float(level.power.mean()) for level in levels]
     louder = int(power[1] > power[0])
     if not levels[louder].stands_out or max(power) < 10 ** (MIN_CHANGE_DB / 10) * min(power):
-        return quantity  # no change is told of it
+        return quantity  # no change is reported
     signals, envelope = sides[louder]
     slip = slip_of(signals)
     comb = best_comb(without_shafts(signals, envelope.excess), order * (1 - slip), order * (1 + slip))
@@ -536,9 +536,9 @@ def _without_beats(
 
 
 def _depths(envelope: BandEnvelope, block_rev: int, shafts: Sequence[float] = ()) -> _Segments | None:
-    """Return an envelope's segments over its mean, as depths of modulation, without multiples of the shafts.
+    """Return an envelope's segments relative to its mean, as depths of modulation, without multiples of the shafts.
 
-    A louder carrier changes none of it. None where the speed is not known, or nothing was recorded.
+    A louder carrier does not change it. None if the speed is unknown, or nothing was recorded.
     """
     if envelope.over_angle is None or envelope.mean <= 0:
         return None
@@ -549,7 +549,7 @@ def _depths(envelope: BandEnvelope, block_rev: int, shafts: Sequence[float] = ()
 def _family(depths: _Segments, order: float, slip: float) -> _Levels | None:
     """Return the sum of the first three multiples of an order.
 
-    It stands out where each does, and the depth is one that a damage has.
+    It stands out if each of them does and the depth is typical of damage.
     """
     lines = [depths.line(k * order, slip) for k in (1, 2, 3) if k * order * (1 + slip) <= depths.highest_order]
     if not lines or not all(line.power.any() for line in lines):
@@ -593,7 +593,7 @@ def _compared(quantity: _Quantity, n_compared: int, probability: float) -> Level
 
 
 def _standard_error(levels: FloatArray) -> float:
-    """Return the standard error of the mean of a series whose neighbours may go together: largest of batch means'."""
+    """Return the standard error of the mean of a series with correlated neighbours: the largest of batch means'."""
     errors, batch = [], 1
     while len(levels) // batch >= 2:
         n = len(levels) // batch
@@ -609,21 +609,21 @@ def _between_halves(levels: FloatArray) -> float:
 
 
 # --------------------
-# What is said of it.
+# What the changes mean.
 # --------------------
 
 
 def change_findings(
     changes: Sequence[LevelChange], signals: AnalysisSignals, reference: AnalysisSignals, named: Sequence[Finding]
 ) -> list[Finding]:
-    """Return what changed since the reference as the first finding, and what it may mean.
+    """Return the changes since the reference as the first finding, and what they may mean.
 
     Parameters
     ----------
     changes : sequence of LevelChange
     signals, reference : AnalysisSignals
     named : sequence of Finding
-        What the recording shows by itself: a bearing's part that is named there is not named again.
+        Findings of the recording alone: a bearing part identified there is not reported again.
     """
     unknown = []
     if all(c.kind == "overall" for c in changes):
@@ -639,11 +639,11 @@ def change_findings(
             return unknown
     findings, rest = _gains(changes)
     findings = [*unknown, *findings]
-    changed = [c for c in rest if c.is_change and (c.change_db > 0 or c.kind != "bearing")]  # none heals
+    changed = [c for c in rest if c.is_change and (c.change_db > 0 or c.kind != "bearing")]  # bearings do not heal
     if not changed:
         return [*findings, _unchanged(rest)] if rest else findings
     off = _speed_off(signals, reference)
-    # Hum of a cable and a motor's field are no fault by themselves, but what has changed is said.
+    # Hum of a cable and a motor's field are no faults by themselves, but their change is reported.
     risen = _largest([c for c in changed if c.change_db > 0 and c.kind != "mains" and _matters(c, rest)])
     headline = _changed(_largest(changed), off)
     if (apart := _speeds_apart(signals, reference)) > OTHER_SPEED:
@@ -664,7 +664,7 @@ def change_findings(
             more = "Damage of the bearing that is named explains it: its shocks raise the noise as well."
         headline = replace(headline, evidence=(*headline.evidence, more))
     is_speed_known = signals.angle is not None and reference.angle is not None
-    is_reason = risen and is_speed_known  # another speed changes every level
+    is_reason = risen and is_speed_known  # a different speed changes every level
     return [*findings, headline if is_reason else replace(headline, kind=Kind.NOTICE), *meanings]
 
 
@@ -677,11 +677,11 @@ def _left_open(apart: float) -> Finding:
 
 
 TOGETHER_DB, N_TOGETHER = 10.0, 4
-"""Rise of a shaft's higher multiples, and of how many, for which another speed is no reason: it brings one or two of
-them nearer to resonances, not all."""
+"""Rise of a shaft's higher multiples, and their number, that a different speed does not explain: it brings one or two
+of them nearer to resonances, not all."""
 
 DEEPEST_DB = 40.0
-"""Below a channel's strongest line in the reference, a line that has risen is no reason to worry yet."""
+"""A line this far below a channel's strongest line in the reference is no concern yet when it rises."""
 
 
 def _matters(change: LevelChange, changes: Sequence[LevelChange]) -> bool:
@@ -692,7 +692,7 @@ def _matters(change: LevelChange, changes: Sequence[LevelChange]) -> bool:
 
 
 def _largest(changes: Sequence[LevelChange]) -> list[LevelChange]:
-    """Return each label once, from the channel and band where it has changed most, in the order compared."""
+    """Return each label once, from the channel and band where it changed most, in the order compared."""
     best: dict[str, LevelChange] = {}
     for change in changes:
         if change.label not in best or abs(change.change_db) > abs(best[change.label].change_db):
@@ -701,11 +701,11 @@ def _largest(changes: Sequence[LevelChange]) -> list[LevelChange]:
 
 
 SAME_GAIN_DB = 2.0
-"""Levels of a channel that change alike within so much, noise and all, are read with another gain."""
+"""If all levels of a channel, noise included, change alike to within this, the gain has changed."""
 
 
 def _gains(changes: Sequence[LevelChange]) -> tuple[list[Finding], list[LevelChange]]:
-    """Tell channels whose levels have all changed alike, noise included, and return the changes of the others."""
+    """Report channels whose levels have all changed alike, noise included, and return the changes of the others."""
     findings, rest = [], []
     for channel in dict.fromkeys(c.where.channels[0] for c in changes):
         of_channel = [c for c in changes if c.where.channels[0] == channel]
@@ -746,7 +746,7 @@ def _unchanged(changes: Sequence[LevelChange]) -> Finding:
 
 
 def _changed(changes: Sequence[LevelChange], off: float) -> Finding:
-    changes = sorted(changes, key=lambda c: c.kind == "noise")  # lines say more
+    changes = sorted(changes, key=lambda c: c.kind == "noise")  # lines are more informative
     risen, fallen = ([c for c in changes if sign * c.change_db > 0] for sign in (1, -1))
     texts = [", ".join(f"{c.label} {signed(c.change_db)} dB" for c in (risen or fallen)[:4])]
     rest = len(risen or fallen) - 4
@@ -779,29 +779,29 @@ def _changed(changes: Sequence[LevelChange], off: float) -> Finding:
     )
 
 
-# What textbooks say of it: ISO 13373-3:2015, "Condition monitoring and diagnostics of machines – Vibration condition
+# The textbooks' signs: ISO 13373-3:2015, "Condition monitoring and diagnostics of machines – Vibration condition
 # monitoring – Part 3: Guidelines for vibration diagnosis"; R. B. Randall, 2021, ch. 2.
 
 _FIT = "how well the textbook's signs fit, one sensor's levels alone; not calibrated"
 BENT_SHAFT, NOT_OF_UNBALANCE = 0.3, 0.3
-"""How likely a bent shaft is beside an unbalance, where nothing tells; and how likely each sign is of an unbalance that
-a linear machine would not make of it."""
+"""Weight of a bent shaft relative to an unbalance where nothing distinguishes them; and factor on an unbalance for each
+sign that an unbalance of a linear machine would not produce."""
 
 DOUBLE_OF_SINGLE = 0.1
-"""Share of 2× in what is added, in amplitude, from which it is a sign of its own: every rotor has some."""
+"""Amplitude ratio of 2× in the added vibration above which it counts as a sign: every rotor has some."""
 
 AXIAL_OF_RADIAL = 0.5
-"""Of what is added at 1× in radial direction, in amplitude, from which a shaft shakes in axial direction: an unbalance
-does so as well, by the tilt of its supports, but less."""
+"""Amplitude ratio to the vibration added radially at 1×, above which a shaft counts as vibrating axially: an unbalance
+causes this as well, by the tilt of its supports, but less."""
 
 OTHER_CAUSES = 0.3
-"""Weight of all that no textbook's pattern covers, beside those it does."""
+"""Weight of all causes that no textbook pattern covers, relative to those covered."""
 
 
 def _meanings(
     risen: Sequence[LevelChange], changes: Sequence[LevelChange], signals: AnalysisSignals, claimed: AbstractSet[str]
 ) -> list[Finding]:
-    """Return what the changes may mean, likeliest first; nothing of bearings that are named already."""
+    """Return what the changes may mean, most likely first; without bearings that are named already."""
     findings: list[Finding] = []
     for shaft in signals.known_shaft_orders:
         findings += _of_shaft(shaft, risen, changes, signals)
@@ -852,13 +852,13 @@ SHAFT_CAUSES: Mapping[str, tuple[str, str]] = {
 def _of_shaft(
     shaft: str, risen: Sequence[LevelChange], changes: Sequence[LevelChange], signals: AnalysisSignals
 ) -> Iterator[Finding]:
-    """Yield what a shaft's own orders mean by their share of what has been added.
+    """Yield what a shaft's orders mean, by their share of the added vibration.
 
-    Unbalance adds 1× alone; misalignment 2×, of half of 1× or more; a bent shaft both; looseness many harmonics and
-    halves; a rub halves, thirds and noise. A force that turns with the shaft makes no 2× but through a stiffness that
-    bends, and shakes little in axial direction, where a bent shaft shakes most. Without a sensor there unbalance and a
-    bent shaft are one finding, as nothing tells them apart, and so are looseness and a rub where halves or thirds come
-    without noise. Oil that whirls adds a line a little below half.
+    Unbalance adds 1× alone; misalignment 2×, at half of 1× or more; a bent shaft both; looseness many harmonics and
+    halves; a rub halves, thirds and noise. A force rotating with the shaft produces 2× only through a nonlinear
+    stiffness, and causes little axial vibration, where a bent shaft causes most. Without an axial sensor unbalance and
+    a bent shaft are one finding, as nothing distinguishes them; so are looseness and a rub if halves or thirds come
+    without noise. Oil whirl adds a line a little below one half.
     """
     of_shaft = [c for c in risen if c.where.shaft == shaft and c.kind in ("shaft", "subharmonic")]
     added = {c.harmonic: _velocity(c, signals, since=True) for c in of_shaft}
@@ -911,7 +911,7 @@ def _of_shaft(
 
 
 def _mains_at(change: LevelChange, signals: AnalysisSignals) -> Iterator[str]:
-    """Say that a multiple of the mains is where a shaft's line is, as far as the record and a wandering speed tell."""
+    """Report a multiple of the mains at a shaft's line, as far as the record and a varying speed can resolve them."""
     hertz = change.where.frequency_hz
     if hertz is None:
         return
@@ -924,7 +924,7 @@ def _mains_at(change: LevelChange, signals: AnalysisSignals) -> Iterator[str]:
 
 
 def _told_apart(weights: Mapping[str, float], alike: Sequence[AbstractSet[str]]) -> list[list[str]]:
-    """Return the causes, likeliest first; those that nothing tells apart in one."""
+    """Return the causes, most likely first; those that nothing distinguishes form one group."""
     groups: dict[str, list[str]] = {}
     for cause in sorted(weights, key=lambda cause: -weights[cause]):
         first = next((first for first in groups if any({first, cause} <= causes for causes in alike)), cause)
@@ -933,15 +933,15 @@ def _told_apart(weights: Mapping[str, float], alike: Sequence[AbstractSet[str]])
 
 
 def _is_axial(change: LevelChange, signals: AnalysisSignals) -> bool:
-    """Whether the name or the position of a level's channel says that it looks along the shaft."""
+    """Whether the name or position of a level's channel says that it measures along the shaft."""
     channel = signals.recording.channels[signals.recording.index(change.where.channels[0])]
     return "axial" in f"{channel.position} {channel.name}".lower()
 
 
 def _velocity(change: LevelChange, signals: AnalysisSignals, *, since: bool = False) -> float:
-    """Return a line's mean square as of velocity, up to a factor; `since`: what was added to the reference's.
+    """Return a line's mean square as velocity, up to a factor; `since`: what was added since the reference.
 
-    Acceleration weighs by 1/order², displacement by order².
+    Acceleration is weighted by 1/order², displacement by order².
     """
     power = 10 ** (change.level_db / 10) - since * 10 ** (change.reference_db / 10)
     return float(power * change.harmonic ** (-2 * derivatives_of_velocity(signals, change.where.channels[0])))

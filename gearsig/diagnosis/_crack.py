@@ -1,4 +1,4 @@
-"""Depth of a root crack: asked where it can be answered, and made one statement with a damaged tooth found before."""
+"""Depth of a root crack: estimated where possible, and merged with a damaged tooth found before into one statement."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ from gearsig.rig import GearPair, Rig
 from gearsig.severity import CRACKED, OTHER_DAMAGE, CrackEstimate, NoCrackSeen
 
 CLEAR = 0.7
-"""Confidence from which a crack seen by itself is called a fault. With the calibration's fifty or so healthy machines
-no p-value is below 2 %: what is clearer than all of them must be enough."""
+"""Confidence at which a crack found on its own is called a fault. With the calibration's fifty or so healthy machines
+no p-value is below 2 %: being clearer than all of them must be enough."""
 
 _INTERVAL = "90 % of simulated cracks lie within such intervals"
 
@@ -41,19 +41,19 @@ def crack_depth(
     torque_nm: float | None,
     dead: Collection[str] = (),
 ) -> Answer | None:
-    """Return the depth of a crack, that none is seen, or why it cannot be told; None where nobody asked and none is.
+    """Return a crack's depth, that none is seen, or why it cannot be told; None if nobody asked and none is seen.
 
-    Nobody asks for a crack of a machine that is described without gears.
+    For a machine described without gears, nobody is taken to ask for a crack.
 
     Parameters
     ----------
     recording : Recording or PreparedRecording
     rig : Rig
     reference : Recording, PreparedRecording or None
-        Of the same gears when they were healthy. Without it only a crack is an answer: that none is seen says little,
-        and that it cannot be told says nothing.
+        Of the same gears when healthy. Without it only a crack is returned: that none is seen says little, and that it
+        cannot be told says nothing.
     torque_nm : float or None
-        Of the operating point's shaft, instead of its own.
+        On the shaft of the operating point, in place of its torque.
     dead : collection of str
         Channels to leave out.
 
@@ -78,22 +78,22 @@ def crack_depth(
 
 
 def with_crack(findings: Sequence[Finding], answer: Answer | None, rig: Rig) -> list[Finding]:
-    """Return the findings with what is known of a crack: a tooth found both ways is one finding, with its depth."""
+    """Return the findings with the result on a crack; a tooth found both ways is one finding, with its depth."""
     if answer is None:
         return list(findings)
     if isinstance(answer, CannotTell):
         surer = answer.remedy[:1].upper() + answer.remedy[1:] + "." if answer.remedy else ""
         title = f"The depth of a root crack cannot be told: {answer.reason}."
         finding = cannot_tell(DEPTH_UNKNOWN, title, surer=surer)
-        # Of several pairs, or of teeth whose size is not known, no depth is ever told: that hinders nothing that the
-        # reference was given for. What has changed at the teeth is told without it, or that nothing has.
+        # For several pairs, or teeth of unknown size, a depth can never be given; this does not make the reference
+        # useless, because changes at the teeth, or their absence, are reported without it.
         is_never_told = len(rig.pairs) > 1 or any(None in (p.module_mm, p.face_width_mm) for p in rig.pairs)
         told = {f.code for f in findings}
         are_examined = "no-tooth-local-damage" in told and not told & {"tooth-damage-undecided", "tooth-not-examined"}
         kind = Kind.INFORMATION if is_never_told else Kind.NOTICE if are_examined else finding.kind
         return [*findings, replace(finding, kind=kind)]
     if isinstance(answer, NoCrackSeen):
-        # Both gears of the pair are looked at: if a crack through half of the root would have shown, the teeth count as
+        # Both gears of the pair are searched: if a crack through half of the root would have shown, the teeth count as
         # examined.
         settled = answer.with_reference and answer.below_percent <= 50.0 and not rig.assumed
         codes = ("tooth-damage-undecided", "tooth-not-examined") if settled else ()
@@ -113,7 +113,7 @@ def with_crack(findings: Sequence[Finding], answer: Answer | None, rig: Rig) -> 
             surer=same.surer if not answer.with_reference else crack_finding.surer,
         )
         return [merged if f is same else f for f in left]
-    # What a damaged bearing's impacts leave in an average changes single teeth, too; so does what changes all of them.
+    # Impacts of a damaged bearing left in an average also change single teeth; so does a change of all teeth.
     impacts = any(f.kind is Kind.FAULT and f.where.bearing for f in findings)
     if impacts or (answer.agreement is not None and answer.agreement < AGREES):
         confidence = 0.5 * crack_finding.confidence
@@ -127,9 +127,9 @@ def with_crack(findings: Sequence[Finding], answer: Answer | None, rig: Rig) -> 
 
 
 def _seen(crack: CrackEstimate, rig: Rig) -> Finding:
-    # Who has a reference at hand has a reason to ask.
+    # A user who provides a reference has a reason to ask.
     prior, limit = (0.5, 0.98) if crack.with_reference else (0.1, WITHOUT_REFERENCE)
-    # One such change in ten is no damage to the tooth, but a key, a rub or an assembly that was changed.
+    # One such change in ten comes from a key, a rub or a changed assembly, not from damage to the tooth.
     confidence = from_p_value(crack.p_value, prior=prior, limit=limit) * 0.9
     confidence *= WITH_ASSUMED_DATA if rig.assumed else 1.0
     low, high = crack.interval_percent
@@ -165,7 +165,7 @@ def _none_seen(answer: NoCrackSeen, rig: Rig) -> Finding:
 
 
 def _is_superseded(finding: Finding, crack: CrackEstimate, rig: Rig) -> bool:
-    """Whether a finding says that nothing shows at teeth one of which has a crack."""
+    """Whether a finding says that nothing shows at teeth of which one has a crack."""
     if finding.code == "tooth-damage-undecided":
         return crack.with_reference
     pair = _pair(crack, rig)
@@ -174,10 +174,10 @@ def _is_superseded(finding: Finding, crack: CrackEstimate, rig: Rig) -> bool:
 
 
 def _is_same_tooth(finding: Finding, crack: CrackEstimate, rig: Rig) -> bool:
-    """Whether a damaged tooth is the crack's: the largest event and the estimate are each good to about one tooth."""
+    """Whether a damaged tooth is the crack's: event and estimate are each located to about one tooth."""
     if finding.code != "tooth-local-damage" or finding.where.angle_deg is None:
         return False
-    if finding.where.shaft != crack.shaft:  # gears that show it alike: the event is on one, the crack on the other
+    if finding.where.shaft != crack.shaft:  # both gears show it: the event is on one, the crack on the other
         return not crack.gear_is_certain
     teeth = rig.teeth_of(crack.gear)
     off = (finding.where.angle_deg - crack.angle_deg + 180.0) % 360.0 - 180.0

@@ -1,4 +1,4 @@
-"""Lines where speed and teeth put them, or not: the speed, the meshes, the mains, the strongest unexplained line."""
+"""Lines at or away from where speed and teeth put them: speed, meshes, mains, and the strongest unexplained line."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ from gearsig.rig import GearPair, hunting_tooth_order
 from gearsig.spectra import Spectrum
 
 N_HARMONICS = 3
-"""Multiples of a mesh or shaft order that are looked at."""
+"""Multiples of a mesh or shaft order that are examined."""
 
 N_COUNTED = 12
-"""Multiples whose common divisor is asked for: half of them would be between those of a shaft twice as fast."""
+"""Multiples whose common divisor is sought: half of them would lie between those of a shaft twice as fast."""
 
 CLEAR_DB = 12.0
 """A line that noise alone exceeds once in 10⁷: power over mean floor is exponential, exp(-15.8) (12 dB)."""
 
 CONTRADICTED_DB, CONTRADICTED_BY_ONE_DB = 10.0, 20.0
-"""By so much the true mesh lines exceed the stated ones: more than sidebands exceed their carriers in several harmonics
-at once, always on the same side; the second where the first harmonic alone is to be seen."""
+"""Excess of true mesh lines over the stated ones: more than sidebands exceed their carriers in several harmonics at
+once, always on the same side; the second value applies if only the first harmonic shows."""
 
 UNEXPLAINED_DB = 15.0
-"""Power over mean floor that noise exceeds in one line of 10¹³: also over a million lines, a chance of 10⁻⁷."""
+"""Power over mean floor that noise exceeds in one line of 10¹³: a probability of 10⁻⁷ even over a million lines."""
 
 MESH_ELSEWHERE = "mesh-elsewhere"
 """Code of the finding that mesh lines lie at another multiple of the stated speed."""
@@ -57,7 +57,7 @@ SURER_BEYOND_ZERO = "An encoder, which tells the direction; or analyse the parts
 
 
 def speed_finding(angle: ShaftAngle | CannotTell) -> Finding:
-    """State the speed and how it was found, or that it is not known."""
+    """Return the finding on the speed and how it was found, or that it is not known."""
     if isinstance(angle, CannotTell):
         why = "The machine is at rest" if "at rest" in angle.reason else "The speed is not known"
         title = f"{why}: orders, synchronous averages and everything that rests on them are left out."
@@ -68,7 +68,7 @@ def speed_finding(angle: ShaftAngle | CannotTell) -> Finding:
     named = f"Shaft {angle.shaft}" if angle.shaft else "The shaft"
     text = f"{named} turns at {angle.mean_speed_rpm:.6g}{plus_minus} rpm"
     low, high = angle.speed_range_rpm
-    if not angle.is_steady():  # then an uncertainty of the mean would be taken for that of the speed
+    if not angle.is_steady():  # the mean's uncertainty would be mistaken for the speed's
         text = f"{named} turns at {low:.5g} to {high:.5g} rpm, {angle.mean_speed_rpm:.5g} rpm on average"
     elif not angle.is_steady(0.001):
         text += f", between {low:.5g} and {high:.5g} rpm"
@@ -84,7 +84,7 @@ def speed_finding(angle: ShaftAngle | CannotTell) -> Finding:
     )
 
 
-# Whether the vibration itself confirms the speed and the teeth: only then does "nothing shows" mean anything.
+# Whether the vibration itself confirms the speed and the teeth: only then is "nothing shows" meaningful.
 
 
 def clearest_line(signals: AnalysisSignals, order: float) -> tuple[PlacedLine, str, int] | None:
@@ -102,7 +102,7 @@ def clearest_line(signals: AnalysisSignals, order: float) -> tuple[PlacedLine, s
 
 
 def _is_clear(line: PlacedLine) -> bool:
-    """Whether a line stands out, where it is expected: a speed a little off moves it away."""
+    """Whether a line stands out at its expected place; a slightly wrong speed moves it away."""
     return line.is_highest and line.ratio_db >= CLEAR_DB
 
 
@@ -117,9 +117,9 @@ def mesh_is_confirmed(signals: AnalysisSignals, pair: GearPair) -> bool:
 
 
 def speed_is_confirmed(signals: AnalysisSignals) -> bool:
-    """Whether any mesh line, or where no mesh is known any shaft's line, stands where the speed puts it.
+    """Whether any mesh line, or any shaft's line if no mesh is known, stands where the speed puts it.
 
-    Not so where all that stands would be there as well if the shafts turned a whole number of times as fast.
+    False if all of these lines would also be there with shafts turning a whole number of times as fast.
     """
     orders = signals.known_mesh_orders.values() or signals.known_shaft_orders.values()
     seen = signals.angle is not None and any(_is_confirmed(signals, order) for order in orders)
@@ -129,9 +129,10 @@ def speed_is_confirmed(signals: AnalysisSignals) -> bool:
 def possible_speed_factor(signals: AnalysisSignals) -> int:
     r"""Return the factor of speed or sampling rate that the lines of shafts and meshes do not rule out; 1: none.
 
-    With a rate m times too high, or a speed stated m times too low, the lines stand at the orders m, 2m, ... and a part
-    that is named by its order is another. They rule it out if the greatest common divisor of the multiples h at which a
-    line stands, over all shafts, meshes and channels, is 1: the first alone does, or the second and the third.
+    If the rate is m times too high, or the speed stated m times too low, the lines stand at the orders m, 2m, ... and a
+    part identified by its order is the wrong one. The lines rule this out if the greatest common divisor of the
+    multiples h at which a line stands, over all shafts, meshes and channels, is 1: the first alone is enough, or the
+    second and the third.
 
     Parameters
     ----------
@@ -140,7 +141,8 @@ def possible_speed_factor(signals: AnalysisSignals) -> int:
     Returns
     -------
     int
-        1 too where no line stands or a lone high one, and of a measured speed, whose orders a wrong rate does not move.
+        Also 1 if no line stands out, or only a single high one, and for a measured speed, whose orders a wrong rate
+        does not move.
     """
     if signals.angle is None or signals.angle.method != "constant":
         return 1
@@ -153,23 +155,23 @@ def possible_speed_factor(signals: AnalysisSignals) -> int:
         if (line := line_at(excess, h * order)) is not None and _is_clear(line)
     }
     if len(seen) == 1 and not seen & set(range(1, N_HARMONICS + 1)):
-        return 1  # a lone line so high may be anything's
+        return 1  # a single line this high may have any cause
     return gcd(*seen) or 1
 
 
 SPREAD_OF_STATED = 0.01
-"""Relative distance to either side over which the lines of a shaft are spread where its speed is held constant: one
-that wanders by as much is called steady."""
+"""Relative half width over which a shaft's lines spread if its speed is taken as constant: a speed that varies by as
+much is called steady."""
 
 STANDING_OUT_DB, GONE_DB = 24.0, 12.0
-"""By which a line stands out of a few revolutions where it can be followed, and below its usual level is gone: noise
-alone leaves 24 dB, and two lines that beat do not vanish together."""
+"""Height at which a line can be followed over blocks of a few revolutions, and level below its usual one at which it is
+gone: noise alone leaves 24 dB, and two beating lines do not vanish together."""
 
 
 def detect_standstill(signals: AnalysisSignals) -> list[Finding]:
-    """Report that the lines of shafts and meshes are gone for a while, where no tachometer tells the speed.
+    """Report that the lines of shafts and meshes vanish for a while, if no tachometer gives the speed.
 
-    A stated speed, or one estimated from the lines of most of the record, knows nothing of a stop or a reversal.
+    A stated speed, or one estimated from the lines of most of the record, does not reveal a stop or a reversal.
     """
     angle = signals.angle
     if angle is None or angle.method not in ("constant", "tachless") or not angle.is_steady():
@@ -187,9 +189,9 @@ def detect_standstill(signals: AnalysisSignals) -> list[Finding]:
 
 
 def _without_lines(signals: AnalysisSignals) -> tuple[float, float] | None:
-    """Return from and to which revolution no line of a shaft or mesh is there, None where some always is.
+    """Return the first and last revolution without any line of a shaft or mesh, None if some line is always there.
 
-    Blocks of a few revolutions at half overlap are looked at, as short as two orders' lines stand out of them.
+    Blocks of a few revolutions overlap by half and are as short as lines of two orders allow to stand out.
     """
     signal = signals.over_angle
     if signal is None:
@@ -222,9 +224,9 @@ def _without_lines(signals: AnalysisSignals) -> tuple[float, float] | None:
 
 
 def _levels_over_blocks(values: FloatArray, n_block: int, bins: NDArray[np.int64]) -> FloatArray:
-    """Return the Hann-windowed spectrum's moduli at some bins, (n_lines, n_blocks, n_bins), of blocks at half overlap.
+    """Return the Hann-windowed spectrum's moduli at some bins, (n_lines, n_blocks, n_bins), of half overlapping blocks.
 
-    The blocks are a view, and transformed some at a time: no copy of a long signal is made.
+    The blocks are a view and are transformed a few at a time, so that a long signal is not copied.
     """
     blocks = np.lib.stride_tricks.sliding_window_view(values, n_block)[:: n_block // 2]
     window, n_at_once = np.hanning(n_block), max(1, 2**20 // n_block)
@@ -285,7 +287,7 @@ def _mesh_finding(signals: AnalysisSignals, pair: GearPair) -> Finding | None:
     if not line.is_highest:
         near = f"Near harmonic {harmonic} a line stands beside its place: the speed may be off by little, and small "
         near += "errors smear all averages."
-    # At which multiple of the stated speed the mesh lines do lie; where another pair's are at their place, nowhere.
+    # The multiple of the stated speed at which the mesh lines do lie; none if another pair's are at their place.
     others = (clearest_line(signals, order) for p in signals.rig.pairs if (order := signals.rig.mesh_order(p)))
     elsewhere = None if any(other and _is_clear(other[0]) for other in others) else signals.offset_comb
     title = (
@@ -305,11 +307,11 @@ def _mesh_finding(signals: AnalysisSignals, pair: GearPair) -> Finding | None:
 
 
 def teeth_are_contradicted(signals: AnalysisSignals, pair: GearPair) -> float | None:
-    """Return the order at which the mesh lines of `pair` really are, None where nothing contradicts the stated teeth.
+    """Return the order at which the mesh lines of `pair` really are, None if nothing contradicts the stated teeth.
 
-    With d teeth more than stated on the shaft that the mesh is reckoned from (up to three), the lines stand at
-    h·(mesh + d·shaft) instead of h·mesh. Those at the stated place are then mere sidebands, and all that is put down
-    to teeth is wrong.
+    With d teeth more than stated (up to three either way) on the gear from whose shaft the mesh order is computed, the
+    lines stand at h·(mesh + d·shaft) instead of h·mesh. Lines at the stated place are then only sidebands, and
+    everything attributed to teeth is wrong.
 
     Parameters
     ----------
@@ -324,8 +326,8 @@ def teeth_are_contradicted(signals: AnalysisSignals, pair: GearPair) -> float | 
     mesh = signals.rig.mesh_order(pair)
     if mesh is None or not signals.order_excess:
         return None
-    # The pair's shafts, as far as their orders are known without its own teeth; the contact may be this pair's. The
-    # pair stays: without a middle stage the gear train would fall apart.
+    # The pair's shafts, as far as their orders are known without its teeth; the contact may be this pair's. The pair
+    # itself stays: without a middle stage the gear train would fall apart.
     toothless = replace(pair, driver_teeth=None, driven_teeth=None)
     pairs = tuple(toothless if p is pair else p for p in signals.rig.pairs)
     without = replace(signals.rig, pairs=pairs, contact=None)
@@ -333,7 +335,7 @@ def teeth_are_contradicted(signals: AnalysisSignals, pair: GearPair) -> float | 
     near = max(3.0 * excess.spectrum.resolution for excess in signals.order_excess.values())
     meshes = [other for other in signals.known_mesh_orders.values() if abs(other - mesh) > near]
     others = [h * other for other in meshes for h in range(1, N_HARMONICS + 1)]
-    # A shaft beside the pair that is struck once a turn raises all its multiples; those of slower ones lie everywhere.
+    # Once-per-turn impacts on a shaft beside the pair raise all its multiples; those of slower shafts lie everywhere.
     faster = [
         turns
         for shaft, turns in signals.known_shaft_orders.items()
@@ -353,10 +355,10 @@ def teeth_are_contradicted(signals: AnalysisSignals, pair: GearPair) -> float | 
 
 
 def _margin_db(excess: LinesOverFloor, mesh: float, order: float) -> float | None:
-    """Return by how much the lines at multiples of `order` contradict those of `mesh` in the worst harmonic.
+    """Return by how many dB the lines at multiples of `order` contradict those of `mesh` in the worst harmonic.
 
-    Positive: they do. Each is compared with the stated line and with the one as far on its other side, as a
-    modulation has sidebands on both. None if no harmonic shows in either place, or only a higher one.
+    Positive: they do. Each is compared with the stated line and with its mirror image about it, as modulation has
+    sidebands on both sides. None if no harmonic shows in either place, or only a higher one.
     """
     margins: dict[int, float] = {}
     for h in range(1, N_HARMONICS + 1):
@@ -370,21 +372,21 @@ def _margin_db(excess: LinesOverFloor, mesh: float, order: float) -> float | Non
         elif _is_clear(stated):
             margins[h] = -CONTRADICTED_DB
     if not margins or set(margins) in ({2}, {3}):
-        return None  # a single line of a higher multiple is where a wrong speed puts any mesh by chance
+        return None  # a wrong speed can put any mesh on a single higher line by chance
     return min(margins.values()) - (CONTRADICTED_DB if len(margins) > 1 else CONTRADICTED_BY_ONE_DB)
 
 
-# Single lines: the mains', and the strongest that belongs to nothing known.
+# Single lines: the mains', and the strongest line that belongs to nothing known.
 
 
 def detect_lines(signals: AnalysisSignals, trains: Sequence[float] = (), named: Sequence[float] = ()) -> list[Finding]:
-    """Report mains hum and the strongest unexplained line; without speed the strongest line, as a start.
+    """Report mains hum and the strongest unexplained line; without a speed, the strongest line as a start.
 
     Parameters
     ----------
     signals : AnalysisSignals
     trains : sequence of float
-        Orders of impacts that the envelopes show: they stand beside the meshes as well.
+        Orders of impacts in the envelopes, which also appear beside the meshes.
     named : sequence of float
         Those among them that are a bearing's, which explains their multiples.
     """
@@ -393,9 +395,9 @@ def detect_lines(signals: AnalysisSignals, trains: Sequence[float] = (), named: 
 
 
 def _mains(signals: AnalysisSignals) -> Finding | None:
-    """Look for lines at the mains frequency and its first multiples that no shaft explains.
+    """Search for lines at the mains frequency and its first multiples that no shaft explains.
 
-    Where no speed is known, a shaft may: of two poles, or one that is not driven by the mains at all.
+    Without a speed, a shaft may still cause them: that of a two-pole motor, or one not driven by the mains at all.
     """
     lines = mains_lines(signals)
     if lines is None:
@@ -432,11 +434,11 @@ def mains_lines(
     scale : float
         True sampling rate over the stated one: the lines are sought at 1/scale of their frequency.
     slower : sequence of float
-        Stated speed over speeds that the shafts may turn at: what is a multiple of one of them is no mains line.
+        Stated speed over speeds at which the shafts may turn: a multiple of one of these is not a mains line.
     """
     for name, spectrum in signals.spectra.items():
         if spectrum.resolution * scale > 0.5:
-            continue  # a mains line is then not told from a shaft's
+            continue  # mains and shaft lines cannot be distinguished
         excess = lines_over_noise_floor(spectrum, 4.0 * max(MAINS_HZ) / scale)
         for mains in MAINS_HZ:
             lines = [_peak_at(excess, k * mains / scale, MAINS_WANDER) for k in (1, 2, 3)]
@@ -447,7 +449,7 @@ def mains_lines(
 
 
 def _peak_at(excess: LinesOverFloor, place: float, within: float) -> PlacedLine | None:
-    """Return the peak within a relative distance of a place, or a sixth of a line, between its lines; None without."""
+    """Return the interpolated peak within a relative distance of a place, or a sixth of a line; None if there is none."""
     spectrum = excess.spectrum
     reach = max(within * place, spectrum.resolution / 6)
     line = line_at(excess, place, reach + spectrum.resolution / 2)
@@ -463,13 +465,13 @@ def _is_synchronous(signals: AnalysisSignals, hertz: float, slower: float) -> bo
     if signals.angle is None:
         return False
     order = slower * hertz / signals.frequency_per_order_hz
-    # Also a half and a third of each: wheels that are not described often turn at those.
+    # Also a half and a third of each: shafts that are not described often turn at those.
     candidates = [o / part for o in signals.known_shaft_orders.values() for part in (1, 2, 3)]
     return any(abs(order / o - round(order / o)) * o < 0.01 for o in candidates)
 
 
 def magnetic_pull_at(hertz: float) -> str:
-    """Name the multiple of twice the mains' frequency that a frequency is on; empty if it is on none."""
+    """Return the multiple of twice the mains frequency at a frequency, in words; empty if there is none."""
     pull = magnetic_pull_near(hertz)
     if pull is None:
         return ""
@@ -478,13 +480,13 @@ def magnetic_pull_at(hertz: float) -> str:
 
 
 def _unexplained(signals: AnalysisSignals, trains: Sequence[float], named: Sequence[float]) -> Finding | None:
-    """Return the strongest order line that is no multiple of a known shaft's order, and no low one of a bearing's."""
+    """Return the strongest order line that is not a multiple of a known shaft's order, nor a low one of a bearing's."""
     best: tuple[float, str, int, LinesOverFloor] | None = None
     foot = RUN_UP_FOOT_ORDERS if signals.speed_varies else 0.0
     for name, excess in signals.order_excess.items():
         for order in signals.known_shaft_orders.values():
-            wide = foot if order >= 4 * foot else 0.0  # closer lines are masked at least themselves
-            # The skirt is a line's foot where the speed wanders by as little as that.
+            wide = foot if order >= 4 * foot else 0.0  # of closer lines, mask at least the lines themselves
+            # The skirt is the foot of a line if the speed varies by only this much.
             excess = excess.without_multiples(order, half_width=wide, skirt=5e-4)  # noqa: PLW2901
             if signals.angle is not None and signals.angle.method == "constant":
                 spread = excess.without_multiples(order, skirt=SPREAD_OF_STATED).masked
@@ -500,7 +502,7 @@ def _unexplained(signals: AnalysisSignals, trains: Sequence[float], named: Seque
         with np.errstate(divide="ignore", invalid="ignore"):
             clear = 20 * np.log10(spectrum.values / excess.floor) > UNEXPLAINED_DB
         if signals.speed_varies:
-            # Skirts of lines that pass a resonance are far above the floor, but not above what lies beside them.
+            # Skirts of lines that pass a resonance are far above the floor, but not above their neighbours.
             clear &= spectrum.values > neighbour_levels(spectrum) * 10 ** (UNEXPLAINED_DB / 20)
         height = np.where(clear & ~excess.masked & (spectrum.positions > 0.2), spectrum.values, 0.0)
         i = int(np.argmax(height))
@@ -535,17 +537,17 @@ def _unexplained(signals: AnalysisSignals, trains: Sequence[float], named: Seque
 
 
 BEARING_MULTIPLES = 6
-"""Multiples of a bearing's order that are left aside: those that its families are sought by. Of two bearings, all
-multiples with their slip would cover a large part of any spectrum, and hide what is stronger."""
+"""Multiples of a bearing's order that are excluded: those by which its families are sought. With two bearings, all
+multiples with their slip would cover a large part of any spectrum, and hide stronger lines."""
 
 
 def _without_bearing(excess: LinesOverFloor, order: float) -> LinesOverFloor:
-    """Mask the first multiples of an order of a bearing, with 2 % of the order to either side for its slip."""
+    """Mask the first multiples of an order of a bearing, with 2 % of the order on either side for its slip."""
     return _without_low_multiples(excess, order, half_width=0.02 * order)
 
 
 SPREAD_OF_FOUND = 2e-3
-"""Relative width of the multiples of a family that was found: how well its order is known, and how far it wanders."""
+"""Relative width of the multiples of a family that was found: how well its order is known, and how far it varies."""
 
 
 def _without_low_multiples(
@@ -557,13 +559,13 @@ def _without_low_multiples(
 
 
 BY_CHANCE = 0.1
-"""Part of all places that combinations may cover, for one that fits to say anything."""
+"""Share of all places that combinations may cover for a match to be significant."""
 
 
 def combination(signals: AnalysisSignals, order: float, spectrum: Spectrum, trains: Sequence[float]) -> str:
-    """Say which combination of known orders a line is; empty where it is none, or so many would be that one fits.
+    """Return the combination of known orders that a line is; empty if it is none, or if a match is likely by chance.
 
-    Impacts of order q that a mesh modulates, or is modulated by, stand at h·mesh ± k·q, and a shaft's order beside.
+    Impacts of order q that modulate a mesh, or are modulated by it, stand at h·mesh ± k·q, and a shaft's order beside.
 
     Parameters
     ----------
@@ -571,7 +573,7 @@ def combination(signals: AnalysisSignals, order: float, spectrum: Spectrum, trai
     order : float
         Of the reference shaft.
     spectrum : Spectrum
-        That shows the line.
+        The spectrum that shows the line.
     trains : sequence of float
         Orders of impacts.
     """
@@ -599,9 +601,9 @@ def combination(signals: AnalysisSignals, order: float, spectrum: Spectrum, trai
 
 
 def hunting_multiple(signals: AnalysisSignals, order: float, near: float) -> tuple[float, str] | None:
-    """Return the hunting-tooth order of which a multiple is near an order, and that multiple in words.
+    """Return the hunting-tooth order that has a multiple near an order, and that multiple in words.
 
-    It belongs to both gears together: each pair of teeth has its own meeting.
+    It belongs to both gears together: each pair of teeth meets at its own times.
     """
     for pair in signals.rig.pairs:
         hunting = hunting_tooth_order(signals.rig, pair)
@@ -611,15 +613,15 @@ def hunting_multiple(signals: AnalysisSignals, order: float, near: float) -> tup
 
 
 def _is_among_multiples(excess: LinesOverFloor, order: float, fundamental: float) -> bool:
-    """Whether a line is a multiple of an order by more than chance: its neighbours among the multiples stand out, too.
+    """Whether a line is a multiple of an order beyond chance, because its neighbours among the multiples stand out, too.
 
-    Multiples of a low order are dense, and one is near any line. Ten of them to either side must stand higher over the
-    floor in sum than the same comb does anywhere between, as chance does once in twenty times or less.
+    Multiples of a low order are dense, and one is near any line. Ten of them on either side must together stand higher
+    over the floor than the same comb does anywhere between, which happens by chance at most once in twenty times.
 
     Parameters
     ----------
     excess : LinesOverFloor
-        What is explained already is masked.
+        Lines explained already are masked.
     order : float
         Of the line.
     fundamental : float

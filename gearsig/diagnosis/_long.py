@@ -1,8 +1,8 @@
-"""Recordings that are longer than memory: cheap figures of all of it, the whole analysis of a few chosen parts.
+"""Recordings that are larger than memory: simple figures for the whole record, a full analysis of a few selected parts.
 
-All of the record goes through in blocks: level, peak, crest factor and kurtosis over time, and the mean power density,
-which equals that of the whole record at once. What is expensive, the detectors, looks at up to three parts: the usual
-level, the highest, and the most impulsive. Why a part was chosen is said with its result.
+The whole record is read in blocks: level, peak, crest factor and kurtosis over time, and the mean power density, which
+equals that of the whole record at once. The detectors, which are expensive, look at up to three parts: the usual level,
+the highest, and the most impulsive. Each result states why its part was chosen.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from gearsig.spectra import Spectrum, power_density
 
 MEMORY_BYTES = 2e9
 BYTES_PER_SAMPLE, BYTES_PER_CHANNEL = 330.0, 100.0
-"""What `analyze` takes at most for each sample in time, and of each channel besides: 3.36 GB were measured for 8.2
+"""Most memory that `analyze` takes per sample in time, and in addition per channel: 3.36 GB were measured for 8.2
 million samples of one channel whose speed no line confirms, 1.47 GB for 2.05 million of four."""
 
 PART_SAMPLES = 1 << 19
@@ -52,9 +52,9 @@ class LongOverview:
     channel_names, units : tuple of str
         Vibration channels.
     time_s : array, (n,)
-        Beginnings of intervals of one second; what is left at the end counts as an interval from half of one.
+        Starts of intervals of one second; a remainder of half an interval or more counts as an interval.
     rms, peak, crest_factor, kurtosis : array, (n_channels, n)
-        About each interval's mean; in the channel's unit, and plain numbers.
+        About each interval's mean; rms and peak in the channel's unit, the others dimensionless.
     densities : tuple of Spectrum
         Mean power density of each channel over all of the record (Hann, 8192 samples, half overlapping).
     """
@@ -93,7 +93,7 @@ class AnalysedPart:
 
 @dataclass(frozen=True)
 class LongAnalysis:
-    """What a record that is longer than memory shows.
+    """The analysis of a record that is larger than memory.
 
     Parameters
     ----------
@@ -111,13 +111,13 @@ class LongAnalysis:
 
     @property
     def outcome(self) -> Outcome:
-        """The most severe of the parts'."""
+        """The most severe outcome of the parts."""
         order = list(Outcome)
         return min((part.analysis.outcome for part in self.parts), key=order.index)
 
     @property
     def verdict(self) -> str:
-        """What the most severe part comes to, and how much of the record was looked at so closely."""
+        """The verdict on the most severe part, and how much of the record was examined as closely."""
         part = self.most_severe
         looked_s = sum(p.end_s - p.start_s for p in self.parts)
         return (
@@ -127,13 +127,13 @@ class LongAnalysis:
 
     @property
     def most_severe(self) -> AnalysedPart:
-        """The first part whose outcome is that of all."""
+        """The first part that has the overall outcome."""
         return next(part for part in self.parts if part.analysis.outcome is self.outcome)
 
     def as_one(self) -> Analysis:
-        """Return the most severe part's analysis for whoever shows one: verdict and a finding speak of all parts.
+        """Return the most severe part's analysis for callers that show only one; verdict and a finding cover all parts.
 
-        Its indicators are those of the part of usual level, so that recordings compare over time.
+        Its indicators are those of the part with the usual level, so that recordings can be compared over time.
         """
         shown, overview = self.most_severe, self.overview
         usual = next((part for part in self.parts if part.reason == USUAL), shown)
@@ -164,7 +164,7 @@ class LongAnalysis:
 
 
 def analysis_bytes(n_samples: int, n_channels: int) -> float:
-    """Return the memory that `analyze` takes of a recording, as an upper estimate."""
+    """Return an upper estimate of the memory in bytes that `analyze` needs for a recording."""
     return (BYTES_PER_SAMPLE + BYTES_PER_CHANNEL * n_channels) * n_samples
 
 
@@ -186,7 +186,7 @@ def analyze_file(
     path : str or Path
     rig : Rig or None
     memory_bytes : float
-        What may be taken, from 0.2 GB.
+        Memory that may be used, more than 0.2 GB.
     sampling_rate_hz, speed
         As in `read_recording`.
     reference, torque_nm
@@ -201,7 +201,7 @@ def analyze_file(
     Raises
     ------
     InputError
-        As `read_recording` and `analyze`; where the record does not fit and its format is only read whole.
+        As `read_recording` and `analyze`; and if the record does not fit and its format can only be read whole.
     """
     positive(memory_bytes - 2e8, "memory less 0.2 GB", "bytes", remedy="allow more than 0.2 GB")
     announce = on_stage or (lambda _: None)
@@ -230,19 +230,19 @@ def read_reference(
     reference_rate_hz: float | None = None,
     speed: SpeedSource | None = None,
 ) -> PreparedRecording:
-    """Read the recording of a healthy machine once, also for many that are compared with it; of a long one a part.
+    """Read the recording of a healthy machine once, also for many comparisons; of a long one, a part.
 
-    The part is of usual level. What is found in it stays with it: recordings that follow, in this process, share it.
+    The part has the usual level. Results computed from it are kept with it, for later comparisons in this process.
 
     Parameters
     ----------
     path : str or Path
     rig : Rig or None
-        Of the recording that is compared; see `rig_and_rate_of_reference`.
+        Of the recording to be compared; see `rig_and_rate_of_reference`.
     memory_bytes : float
-        What the analysis of both may take; the reference may take half of it.
+        Memory for the analysis of both; the reference may take half of it.
     sampling_rate_hz, speed
-        Stated for the recording that is compared, as in `read_recording`; pulse times belong to it alone.
+        Stated for the recording to be compared, as in `read_recording`; pulse times apply to it alone.
     reference_rate_hz : float or None
         Sampling rate of the reference, where it differs.
     """
@@ -264,7 +264,7 @@ def _read_reference(
     speed: SpeedSource | None,
     modified_ns: int,
 ) -> PreparedRecording:
-    del modified_ns  # tells the cache that the file is another one
+    del modified_ns  # part of the cache's key: a changed file is another one
     return prepare(
         read_typical_part(path, rig, memory_bytes=memory_bytes, sampling_rate_hz=sampling_rate_hz, speed=speed)
     )
@@ -278,7 +278,7 @@ def read_typical_part(
     sampling_rate_hz: float | None = None,
     speed: SpeedSource | None = None,
 ) -> Recording:
-    """Return a recording whole where its analysis fits into memory, else a part of usual level."""
+    """Return a recording whole if its analysis fits into memory, else a part of usual level."""
     record = record_blocks(path, rig, sampling_rate_hz=sampling_rate_hz, speed=speed)
     if _fits(record, memory_bytes):
         return record.whole()
@@ -289,12 +289,12 @@ def read_typical_part(
 def read_whole(
     path: str | Path, rig: Rig | None = None, *, sampling_rate_hz: float | None = None, speed: SpeedSource | None = None
 ) -> Recording:
-    """Read a recording for what looks at all of it at once; refuse before one that half of the free memory is less for.
+    """Read a whole recording, for callers that need all of it at once; refuse one that needs over half the free memory.
 
     Raises
     ------
     InputError
-        As `read_recording`, and where `analysis_bytes` is more than half of the memory that is free.
+        As `read_recording`, and if `analysis_bytes` is more than half of the free memory.
     """
     record = record_blocks(path, rig, sampling_rate_hz=sampling_rate_hz, speed=speed)
     if record.is_parted:
@@ -307,7 +307,7 @@ def _needed_bytes(recording: Recording, n_samples: int | None = None) -> float:
 
 
 def _fits(record: RecordBlocks, memory_bytes: float) -> bool:
-    """Whether all of a record may be analysed at once; refuse one that may not and is only read whole."""
+    """Whether a record can be analysed at once; refuse one that cannot and can only be read whole."""
     needed_bytes = _needed_bytes(record.head, record.n_samples)
     if needed_bytes > memory_bytes and not record.is_parted:
         n_channels = len(record.head.channels)
@@ -321,14 +321,14 @@ def _fits(record: RecordBlocks, memory_bytes: float) -> bool:
 
 
 def long_overview(head: Recording, n_samples: int, read: Callable[[slice], Recording]) -> LongOverview:
-    """Return figures of all of a record, read in blocks.
+    """Return figures of a whole record, read in blocks.
 
     Parameters
     ----------
     head : Recording
         Its beginning, for channels and rate.
     n_samples : int
-        Of all of it.
+        Of the whole record.
     read : callable
         A slice of samples → Recording.
     """
@@ -376,7 +376,7 @@ def _units(recording: Recording) -> tuple[str, ...]:
 
 
 def _step(head: Recording, interval: int) -> int:
-    """Return how far blocks are apart: whole intervals."""
+    """Return the distance between blocks: whole intervals."""
     return max(1, BLOCK_SAMPLES // len(head.channels) // interval) * interval
 
 
@@ -400,7 +400,7 @@ def _figures(x: FloatArray, interval: int, *, last: bool) -> Iterator[FloatArray
         power = square.mean(axis=1, dtype=np.float64)
         fourth = np.einsum("ij,ij->i", square, square, dtype=np.float64) / part.shape[1]
         rms, peak = np.sqrt(power), np.sqrt(square.max(axis=1).astype(np.float64))
-        # Of a channel that is dead for an interval both are 0, not 0/0.
+        # For a channel that is dead for an interval both are 0, not 0/0.
         crest_factor, kurtosis = peak / np.maximum(rms, 1e-150), fourth / np.maximum(power**2, 1e-300)
         yield np.stack([rms, peak, crest_factor, kurtosis])
 

@@ -1,4 +1,4 @@
-"""Damage at one tooth: a local event of the difference signal that comes back every revolution of its shaft."""
+"""Damage at one tooth: a local event of the difference signal that repeats every revolution of its shaft."""
 
 from __future__ import annotations
 
@@ -37,21 +37,21 @@ class Localisation:
     Parameters
     ----------
     angle_rev : float
-        Where in the window the event sets in, 0 to 1 revolution.
+        Onset of the event within the window, 0 to 1 revolution.
     start_rev : float
-        Where the window begins.
+        Start of the window.
     width_rev : float
     ratio_db : float
-        Energy in it over the median window's, summed over channels that are each scaled to unit energy.
+        Energy in the window over the median window's, summed over channels, each scaled to unit energy.
     p_value : float
-        The larger of two: the share of surrogates (same spectra, same relations between the channels, random phases)
-        with as high a ratio, and the chance of it among teeth that differ as those of a good gear may, or as the others
-        of this one do.
+        The larger of two: the fraction of surrogates (same spectra, same relations between channels, random phases)
+        with a ratio as high, and its probability among teeth that differ as those of a healthy gear may, or as the
+        other teeth of this gear do.
     repeatability : float
-        Correlation of odd and even revolutions within the window, -1 to 1; about 0 for noise, for impacts that are
-        not tied to this shaft, and for a single event in one revolution.
+        Correlation of odd and even revolutions within the window, -1 to 1; about 0 for noise, for impacts that are not
+        locked to this shaft, and for a single event in one revolution.
     channel_shares : tuple of float
-        Energy in the window over the median window's for each channel.
+        For each channel, energy in the window over the median window's.
     """
 
     angle_rev: float
@@ -66,28 +66,29 @@ class Localisation:
 def localise(
     signals: FloatArray, halves: FloatArray, width_rev: float, n_surrogates: int, rng: np.random.Generator
 ) -> Localisation:
-    """Test whether the energy of a synchronous average's difference signal sits at one tooth.
+    """Test whether the energy of a synchronous average's difference signal is concentrated at one tooth.
 
     Phase-randomised surrogates keep the spectrum: a residual of few lines, tooth-to-tooth scatter or coloured noise
-    gives windows of unequal energy too, and only what goes beyond them counts. The same random phases are used for all
-    channels, which keeps their relations.
+    also gives windows of unequal energy, and only what exceeds these counts. All channels get the same random phases,
+    which keeps their relations.
 
-    Surrogates know nothing of teeth. On a good gear each tooth is a little stronger or weaker than its neighbours, over
-    its whole engagement and in all harmonics at once, so that energies per tooth scatter like the square of one normal
-    number (chi-square with one degree of freedom), which is more than surrogates do: that is the second test. Where
-    many harmonics and channels make a tooth's energy, teeth scatter far less, and one that passes among such unequal
-    ones does not among its own neighbours: that is the third. The better of the last two counts, at twice its chance.
+    Surrogates know nothing of teeth. On a healthy gear each tooth is a little stronger or weaker than its neighbours,
+    over its whole engagement and in all harmonics at once. Energies per tooth then scatter like the square of one
+    normal variate (chi-square with one degree of freedom), which is more than surrogates do: this is the second test.
+    Where many harmonics and channels contribute to a tooth's energy, teeth scatter far less, and a tooth that passes
+    the second test may still stand out from its actual neighbours: this is the third. The smaller p-value of the last
+    two counts, doubled.
 
     Parameters
     ----------
     signals : array, (n_channels, n_angles)
         Over one revolution.
     halves : array, (n_channels, 2, n_angles)
-        The same of odd and even revolutions by themselves.
+        The same for odd and even revolutions separately.
     width_rev : float
         Width of the window in revolutions, e.g. one tooth pitch.
     n_surrogates : int
-        At most; the drawing stops early once it is plain that nothing is there.
+        Maximum number; drawing stops early once it is clear that nothing is there.
     rng : Generator
 
     Returns
@@ -142,10 +143,10 @@ def localise(
 
 
 def _p_among_surrogates(ratio: float, drawn: FloatArray) -> float:
-    """Return the share of surrogates with as high a ratio; beyond the highest, the tail of a Gumbel distribution.
+    """Return the fraction of surrogates with as high a ratio; beyond the highest, the tail of a Gumbel distribution.
 
-    Window energies of Gaussian signals have exponential tails, and the largest of many such is Gumbel distributed; mean
-    and standard deviation of the drawn ratios give its parameters (E. J. Gumbel, *Statistics of Extremes*, 1958).
+    Window energies of Gaussian signals have exponential tails, and the largest of many such is Gumbel distributed; the
+    mean and standard deviation of the drawn ratios give its parameters (E. J. Gumbel, *Statistics of Extremes*, 1958).
     """
     share = (float(np.sum(drawn >= ratio)) + 1) / (len(drawn) + 1)
     scale = float(drawn.std()) * np.sqrt(6) / np.pi
@@ -165,11 +166,11 @@ def _p_among_teeth(ratio: float, n_teeth: float) -> float:
 
 
 def _p_among_these(energies: FloatArray, start: int, width: int) -> float:
-    """Return P(largest of the teeth's energies stands as far over the others), by how these scatter.
+    """Return P(largest of the teeth's energies stands this far above the others), given the scatter of the others.
 
-    Logarithms of energies scatter to the right no more than normally: those of chi-square numbers of any degree less.
-    With mean and deviation of the other teeth, but for the two neighbours into which an impact rings, the largest
-    is Student's.
+    Upwards, logarithms of energies scatter no more than normally; those of chi-square variates of any degree scatter
+    less. With mean and deviation of the other teeth, except the two neighbours into which an impact rings, the largest
+    follows Student's t.
     """
     from scipy.stats import t as student
 
@@ -186,10 +187,10 @@ def _p_among_these(energies: FloatArray, start: int, width: int) -> float:
 
 
 def _onset(x: FloatArray, start: int, width: int) -> float:
-    """Return the angle within the window at which the energy has risen to half of its highest value.
+    """Return the angle within the window at which the energy has risen to half of its maximum.
 
-    An impact rises at once and rings on: its highest energy comes a little after it. Energy is taken over an eighth of
-    the window, and a little of what lies before the window is looked at too.
+    An impact rises at once and rings on, so its maximum energy comes a little later. Energy is averaged over an eighth
+    of the window, and a short interval before the window is included.
     """
     n, short = x.shape[1], max(1, width // 8)
     inside = (start - short + np.arange(width + short)) % n
@@ -206,16 +207,16 @@ class LocalEvent:
     ----------
     place : Localisation
     channel : str
-        Where it stands out most.
+        Where the event stands out most.
     rms, median_rms, average_rms, error_rms : float
         In that channel's unit: of the event's window, of the median window, of the whole average, and of the standard
         error of the average within the window.
     peaks_rev : tuple of float
         Starts of all windows that hold a similar energy, 0 to 1.
     share_of_revolutions : float
-        Part of the revolutions that carry it: 1 where it is in all, 1/2 where in every second one.
+        Fraction of the revolutions that contain the event: 1 for all, 1/2 for every second one.
     single_revolution : int or None
-        Number of the revolution that holds most of the energy by itself, None if there is no such one.
+        Number of the revolution that alone holds most of the energy, None if there is none.
     """
 
     place: Localisation
@@ -230,7 +231,7 @@ class LocalEvent:
 
     @property
     def is_equally_spaced(self) -> bool:
-        """Whether there are two or more events at equal distances: no tooth does that."""
+        """Whether there are two or more events at equal spacing, which no tooth causes."""
         n = len(self.peaks_rev)
         if n < 2:
             return False
@@ -241,8 +242,8 @@ class LocalEvent:
 def largest_event(shaft: ShaftSignals, signals: AnalysisSignals) -> LocalEvent:
     """Return the largest local event of a shaft that has separated averages.
 
-    Two tests are made and paid for: on the difference signals in full, and above 3.5 times the highest mesh order,
-    where impacts ring and teeth that merely differ do not show. The window is one pitch of the coarsest gear: events
+    Two tests are made and corrected for: on the full difference signals, and above 3.5 times the highest mesh order,
+    where impacts ring and teeth that merely differ do not show. The window is one pitch of the coarsest gear, as events
     last about as long as the tooth is in mesh.
     """
     names = list(shaft.separated)
@@ -285,7 +286,7 @@ def _above(values: FloatArray, lowest_order: int) -> FloatArray:
 
 
 def _within(values: FloatArray, lowest_order: int, highest_order: int) -> FloatArray:
-    """Return periodic signals, (…, n_angles), with the orders from the lowest to the highest alone."""
+    """Return periodic signals, (…, n_angles), with only the orders from the lowest to the highest."""
     lines = np.fft.rfft(values, axis=-1)
     lines[..., :lowest_order] = 0
     lines[..., highest_order + 1 :] = 0
@@ -293,7 +294,7 @@ def _within(values: FloatArray, lowest_order: int, highest_order: int) -> FloatA
 
 
 def _peaks(differences: FloatArray, width: int) -> tuple[float, ...]:
-    """Return the starts of the separate windows with a quarter of the largest one's energy or more, largest first."""
+    """Return the starts of the separate windows with at least a quarter of the largest one's energy, largest first."""
     n = differences.shape[1]
     scale = np.mean(differences**2, axis=1, keepdims=True)
     square = np.sum(differences**2 / np.where(scale > 0, scale, 1.0), axis=0)
@@ -313,14 +314,14 @@ def _peaks(differences: FloatArray, width: int) -> tuple[float, ...]:
 def _energy_by_revolution(shaft: ShaftSignals, patterns: Mapping[str, FloatArray], inside: FloatArray) -> FloatArray:
     """Return, for each revolution, the projection of its window on the mean window, summed over channels.
 
-    The projection is signed: noise averages out of it, which energy would not.
+    The projection is signed, so noise averages out, which it would not do in the energy.
     """
     total: FloatArray = np.zeros(0)
     for name, pattern in patterns.items():
         size = float(np.sum(pattern**2))
         if size == 0:
             continue
-        # The pattern has no mesh lines; what the raw revolution holds besides it is nearly orthogonal to it.
+        # The pattern has no mesh lines; the rest of the raw revolution is nearly orthogonal to it.
         revolutions, mean = whole_revolutions(shaft.signal, name)[:, inside], shaft.averages[name].values[inside]
         projection = (revolutions - mean) @ pattern / size + 1.0
         total = projection if len(total) == 0 else total + projection
@@ -328,9 +329,9 @@ def _energy_by_revolution(shaft: ShaftSignals, patterns: Mapping[str, FloatArray
 
 
 def _periods(signals: AnalysisSignals, shaft: ShaftSignals) -> set[int]:
-    """Return after how many revolutions, up to 12, each other shaft stands as before; 2 is always tried.
+    """Return after how many revolutions, up to 12, each other shaft is in the same position again; 2 is always tried.
 
-    Two for a machine that works every second revolution, and for pulses that are counted wrongly.
+    Two is for machines that work every second revolution, and for miscounted pulses.
     """
     ratio = signals.rig.ratio(shaft.shaft) or 1.0
     periods = {2}
@@ -342,15 +343,15 @@ def _periods(signals: AnalysisSignals, shaft: ShaftSignals) -> set[int]:
 
 
 CARRIES = 0.25
-"""Part of the highest class's event from which a class carries it: the next tooth's mates take it up unequally."""
+"""A class carries the event from this fraction of the strongest class's: the next tooth's mates respond unequally."""
 
 
 def _share(energies: FloatArray, period: int) -> float:
-    """Return the part of the revolutions of a period that carry the event, each class of them by its mean."""
+    """Return the fraction of the revolutions of a period that carry the event, judging each class by its mean."""
     if len(energies) < 4 * period:
         return 1.0
     classes = np.array([energies[i::period].mean() for i in range(period)])
-    # How far the classes' means scatter by noise alone; what is within it is no difference.
+    # How far the means of classes scatter by noise alone; smaller differences do not count.
     scatter = max(float(energies[i::period].std(ddof=1)) / np.sqrt(len(energies[i::period])) for i in range(period))
     highest = float(classes.max())
     if highest - float(classes.min()) < 4 * scatter or highest <= 0:
@@ -359,46 +360,46 @@ def _share(energies: FloatArray, period: int) -> float:
 
 
 def _single(energies: FloatArray) -> int | None:
-    """Return the revolution that holds more than half of all the event there is."""
+    """Return the revolution that holds more than half of the event's total energy."""
     total = float(np.sum(energies))
     i = int(np.argmax(energies)) if len(energies) else 0
     return i if total > 0 and len(energies) >= 4 and float(energies[i]) > 0.5 * total else None
 
 
 UNEQUAL_DB = 14.7
-"""Of some forty teeth the largest is so far over the median one on one gear in a hundred, where they scatter as much as
-teeth do: chi-square, one degree."""
+"""Of some forty teeth the largest exceeds the median by this much on one gear in a hundred, where they scatter as much
+as teeth can: chi-square, one degree of freedom."""
 
 ONE_ODD_TOOTH = 0.5
-"""Factor below that: a gear that is made with one odd tooth among equal ones shows as much."""
+"""Factor on the confidence below that: a gear made with one odd tooth among equal ones shows as much."""
 
 WORTH_SAYING, CLEAR = (0.01, 8.0), (0.001, UNEQUAL_DB)
-"""p-value at most, and dB of the window over the median window at least."""
+"""Maximum p-value, and minimum level of the window over the median window in dB."""
 
 DOUBTFUL = (0.05, 8.0)
-"""The same of an event besides which "no damage shows" is not said: the chance that statistics is used to."""
+"""The same for an event that rules out saying that no damage shows: the customary significance level."""
 
 SMALLEST_SHARE, SMALLEST_SIGNIFICANCE = 0.05, 3.0
-"""Rms in the window against that of the whole average, and against the average's standard error there: below, an event
-is too small to matter, or is made by the ends of the record."""
+"""Rms in the window relative to the whole average's, and to the average's standard error there: below either, an event
+is too small to matter, or is caused by the ends of the record."""
 
 REPEATS = 0.7
-"""Correlation of odd and even revolutions from which an event is alike in both."""
+"""Minimum correlation of odd and even revolutions for an event to count as the same in both."""
 
 AGREES, RULES = 0.5, 1.5
-"""How far an average's pattern of teeth must agree with the healthy one's for what differs to be a change; else rms of
-the event over what the healthy average has there, from which it is no tooth of the healthy pattern, wrongly placed."""
+"""Agreement of an average's tooth pattern with the healthy one's that makes a difference a change; otherwise, rms of
+the event over what the healthy average has there that rules out a misplaced tooth of the healthy pattern."""
 
 ODD_DB, SAME_SHAPE, PART = 6.0, 0.8, 0.5
-"""A tooth that stood out of the healthy gear as far, dB over the median, and differs by so small a part of what it was,
-in the same shape: another load has changed it, no damage."""
+"""A tooth that stood out at least as far on the healthy gear, in dB over the median, and has changed by at most this
+fraction, in the same shape, was changed by another load, not by damage."""
 
 
 @dataclass(frozen=True)
 class _Examined:
-    """A shaft with its largest local event, and the event's chance after all shafts that were tried.
+    """A shaft with its largest local event, and the event's p-value corrected for all shafts that were tried.
 
-    `since_reference` tells whether it is an event of what differs from the healthy average, not of the average itself.
+    `since_reference` says whether the event is in the difference from the healthy average, not in the average itself.
     """
 
     signals: AnalysisSignals
@@ -409,26 +410,26 @@ class _Examined:
 
     @property
     def has_mark(self) -> bool:
-        """Whether the angle of this very shaft counts from a mark that is there once per revolution."""
+        """Whether the angle of this shaft counts from a mark that is there once per revolution."""
         return self.signals.prepared.has_mark(self.shaft.shaft)
 
     @property
     def is_at_mark(self) -> bool:
-        """Whether the event is where the tachometer's pulse is, which crosses over into bad cables."""
+        """Whether the event is at the tachometer's pulse, which couples into bad cables."""
         degrees = 360 * self.event.place.angle_rev
         return self.has_mark and min(degrees, 360 - degrees) < 6.0
 
     @property
     def is_steady(self) -> bool:
-        """Whether the event is of some size, and in odd and even revolutions alike; chance impacts correlate by 0."""
+        """Whether the event is large enough and alike in odd and even revolutions; chance impacts do not correlate."""
         event = self.event
-        # The standard error counts other shafts' lines as well, which an average lessens and two averages share.
+        # The standard error includes other shafts' lines, which averaging reduces and two averages share.
         error = 0.0 if self.since_reference else SMALLEST_SIGNIFICANCE * event.error_rms
         return event.rms >= max(SMALLEST_SHARE * event.average_rms, error) and event.place.repeatability >= REPEATS
 
     @property
     def is_withheld(self) -> bool:
-        """Whether the event is no chance, of some size, and yet no tooth's: it differs from turn to turn."""
+        """Whether the event is not due to chance and large enough, yet no tooth's: it varies between revolutions."""
         is_large = self.event.rms >= SMALLEST_SHARE * self.event.average_rms
         return self.reaches((CLEAR[0], WORTH_SAYING[1])) and is_large and not self.is_steady
 
@@ -439,12 +440,12 @@ class _Examined:
 
     @property
     def smallest_visible(self) -> float:
-        """Rms in a window from which an event stands out from teeth that merely differ."""
+        """Rms in a window above which an event stands out from teeth that merely differ."""
         return self.event.median_rms * float(10 ** (UNEQUAL_DB / 20))
 
     @property
     def strength(self) -> Strength:
-        """The event's rms against the median window's."""
+        """The event's rms relative to the median window's."""
         event = self.event
         ratio_db = 20 * log10(event.rms / event.median_rms) if event.rms > 0 and event.median_rms > 0 else None
         of_what = "what differs from the reference" if self.since_reference else "the difference signal"
@@ -452,12 +453,12 @@ class _Examined:
         return Strength(event.rms, self.shaft.averages[event.channel].unit, event.median_rms, floor_is, ratio_db)
 
     def reaches(self, level: tuple[float, float]) -> bool:
-        """Whether the event is as unlikely by chance, and as large, as a level asks for."""
+        """Whether the event is as improbable by chance, and as large, as a level requires."""
         return self.p_value <= level[0] and self.event.place.ratio_db >= level[1]
 
 
 def detect_tooth_damage(signals: AnalysisSignals) -> list[Finding]:
-    """Look at each shaft's difference signals for a local event, and say which shafts could not be examined."""
+    """Search each shaft's difference signals for a local event, and report which shafts could not be examined."""
     able = _able(signals)
     events = [(s, largest_event(s, signals)) for s in able]
     examined = [_Examined(signals, s, event, min(1.0, event.place.p_value * len(able))) for s, event in events]
@@ -467,16 +468,16 @@ def detect_tooth_damage(signals: AnalysisSignals) -> list[Finding]:
 def with_changed_teeth(
     findings: Sequence[Finding], signals: AnalysisSignals, healthy: AnalysisSignals
 ) -> tuple[list[Finding], ChangedAverages]:
-    r"""Return the findings with what has changed at the teeth since the reference, where both averages compare.
+    r"""Return the findings with the changes at the teeth since the reference, where both averages compare.
 
-    What teeth are made with cancels in the difference of two averages at one speed, turned so that the same teeth meet:
+    Manufacturing differences cancel in the difference of two averages at one speed, turned so that the same teeth meet:
 
     .. math:: d[n] = x[n] - g_k r[n] e^{-2 \pi i n s}
 
-    with the shift s and each mesh harmonic's gain g of `gearsig.severity.difference_lines`. A local event of it is
-    tested as one of the average itself is. It takes the place of what the recording alone tells of teeth; where there
-    is none, "no damage shows" does so on shafts where a change of a useful size would have shown. The differences, of
-    all shafts that compare, come by shaft and channel.
+    with the shift s and each mesh harmonic's gain g of `gearsig.severity.difference_lines`. A local event in d is
+    tested like one in the average itself. It replaces what the recording alone says of teeth. If there is none, "no
+    damage shows" replaces it on shafts where a change of a relevant size would have shown. The differences of all
+    shafts that compare are returned by shaft and channel.
     """
     able = _able(signals)
     pairs = [(c, largest_event(c.since, signals)) for c in (_compared(signals, s, healthy) for s in able) if c]
@@ -485,7 +486,7 @@ def with_changed_teeth(
         for c, _ in pairs
         for name, parts in c.since.separated.items()
     }
-    # Looking at the recording alone came before: two tests for each shaft.
+    # The recording alone was tested before: two tests for each shaft.
     compared = [
         _Examined(signals, c.since, event, min(1.0, 2 * len(able) * event.place.p_value), since_reference=True)
         for c, event in pairs
@@ -501,7 +502,7 @@ def with_changed_teeth(
 
 
 ChangedAverages = Mapping[tuple[str, str], SynchronousAverage]
-"""Shaft and channel → what its average differs by from the reference's."""
+"""Shaft and channel → difference of its average from the reference's."""
 
 _STATEMENTS = ("no-tooth-local-damage", "tooth-damage-undecided")
 _OF_TEETH = (*_STATEMENTS, "tooth-local-damage")
@@ -509,7 +510,7 @@ _OF_TEETH = (*_STATEMENTS, "tooth-local-damage")
 
 @dataclass(frozen=True)
 class _Compared:
-    """What belongs to a shaft less what the healthy machine has there, and how far both patterns of teeth agree."""
+    """Difference of a shaft's signals from the healthy machine's, and how well the two tooth patterns agree."""
 
     since: ShaftSignals
     healthy: Mapping[str, FloatArray]
@@ -517,14 +518,14 @@ class _Compared:
     agreement: float
 
     def is_healthys(self, event: LocalEvent) -> bool:
-        """Whether a tooth of the healthy gear explains what differs: wrongly placed, or one that was odd before."""
+        """Whether a tooth of the healthy gear explains the difference: misplaced, or odd from the start."""
         n = len(self.healthy[event.channel])
         width = round(event.place.width_rev * n)
         inside = (round(event.place.start_rev * n) + np.arange(width)) % n
         if self.agreement < AGREES:
             was = float(np.sqrt(np.mean(self.healthy[event.channel][inside] ** 2)))
             return event.rms < RULES * was
-        # Channels of their own units: each relative to the healthy average's energy.
+        # Channels differ in unit: each is taken relative to the healthy average's energy.
         healthy = np.stack(list(self.healthy.values()))
         scale = np.sqrt(np.mean(healthy**2, axis=1, keepdims=True))
         before = np.divide(healthy, scale, out=np.zeros_like(healthy), where=scale > 0)
@@ -540,7 +541,7 @@ class _Compared:
 
 
 def _compared(signals: AnalysisSignals, shaft: ShaftSignals, healthy: AnalysisSignals) -> _Compared | None:
-    """Return a shaft beside the healthy machine's; None where the two do not compare."""
+    """Compare a shaft with the healthy machine's; None where the two do not compare."""
     before = next((s for s in healthy.shafts if s.shaft == shaft.shaft), None)
     if before is None:
         return None
@@ -565,9 +566,9 @@ def _compared(signals: AnalysisSignals, shaft: ShaftSignals, healthy: AnalysisSi
                 for lines in (row, was)
             )
             born[name] = healthy_parts.difference.values
-            # Both halves less the same: the whole healthy average.
+            # The same is subtracted from both halves: the whole healthy average.
             halves[name] = _within(shaft.halves[name], 0, highest) - born[name]
-    except (RefusalError, InputError):  # another speed, or nothing differs
+    except (RefusalError, InputError):  # different speeds, or no difference
         return None
     if not any(np.any(parts.difference.values) for parts in separated.values()):
         return None
@@ -577,7 +578,7 @@ def _compared(signals: AnalysisSignals, shaft: ShaftSignals, healthy: AnalysisSi
 def _lines_of(
     signals: AnalysisSignals, shaft: ShaftSignals, names: Sequence[str], highest: int, teeth: int
 ) -> ShaftLines:
-    """Return a shaft's averages in the form that the alignment takes, by the teeth of one of its gears."""
+    """Return a shaft's averages in the form that the alignment needs, by the teeth of one of its gears."""
     averages = [shaft.averages[name] for name in names]
     lines = np.stack([average.lines()[: highest + 1].astype(np.complex128) for average in averages])
     order_hz, is_marked = shaft.angle.mean_speed_rpm / 60.0, signals.prepared.has_mark(shaft.shaft)
@@ -596,17 +597,17 @@ def _findings(signals: AnalysisSignals, examined: list[_Examined]) -> list[Findi
     findings = [f for _, f in judged if f is not None]
     codes = {f.code for f in findings}
     shocks = [f for f in findings if f.code == "single-shock"]
-    findings = [f for f in findings if f not in shocks[1:]]  # every shaft's average shows the same one
+    findings = [f for f in findings if f not in shocks[1:]]  # every shaft's average shows the same shock
     if "tooth-local-damage" in codes:  # events of other shafts are its images
         findings = [f for f in findings if f.code in ("tooth-local-damage", "single-shock")]
-    elif "event-in-some-revolutions" not in codes:  # with it, even the speed is in doubt
+    elif "event-in-some-revolutions" not in codes:  # then even the speed is uncertain
         findings += _nothing_shows(signals, [e for e, f in judged if f is None])
         findings += _undecided([e for e, f in judged if f is not None], "other local events would cover damage")
     return findings
 
 
 def _one_per_speed(examined: list[_Examined]) -> list[_Examined]:
-    """Keep one of two shafts of equal speed: their averages hold the same events."""
+    """Keep one of two shafts of equal speed, as their averages hold the same events."""
     kept = list(examined)
     for one, other in combinations(examined, 2):
         ratio = one.signals.rig.ratio
@@ -621,7 +622,7 @@ def _finding(examined: _Examined) -> Finding | None:
     signals, shaft, event = examined.signals, examined.shaft, examined.event
     name, degrees = shaft.shaft, 360 * event.place.angle_rev
     if event.is_equally_spaced and examined.is_steady and event.place.ratio_db >= WORTH_SAYING[1]:
-        return Finding(  # their own energy raises the median: the test is not for them
+        return Finding(  # their energy raises the median, so the test does not apply
             "several-events-per-revolution",
             Kind.NOTICE,
             f"{len(event.peaks_rev)} equally spaced local events per revolution of shaft {name}: not a single tooth.",
@@ -647,7 +648,7 @@ def _finding(examined: _Examined) -> Finding | None:
             confidence_basis="more than half of what the average shows comes from that revolution",
             surer="Another recording: what the machine does comes back.",
         )
-    if event.share_of_revolutions < 0.75:  # then it is a slower shaft's
+    if event.share_of_revolutions < 0.75:  # then it belongs to a slower shaft
         ratio = signals.rig.ratio(name) or 1.0
         slower = [n for n, order in signals.known_shaft_orders.items() if order < ratio * (1 - 1e-9)]
         share, low = percent(event.share_of_revolutions), "are stated too low"
@@ -672,10 +673,10 @@ def _finding(examined: _Examined) -> Finding | None:
 def _damage(examined: _Examined) -> Finding:
     signals, shaft, place = examined.signals, examined.shaft, examined.event.place
     assumed = ", ".join(signals.rig.assumed)
-    # One in ten once-per-revolution events on a shaft with gears is no tooth's, but a key's, a coupling's or a rub's.
+    # One in ten once-per-revolution events on a shaft with gears comes from a key, a coupling or a rub, not a tooth.
     confidence = from_p_value(examined.p_value) * 0.9
     confidence *= WITH_ASSUMED_DATA if assumed or examined.is_at_mark else 1.0
-    is_odd = place.ratio_db < UNEQUAL_DB and not examined.since_reference  # what a gear is made with, both have
+    is_odd = place.ratio_db < UNEQUAL_DB and not examined.since_reference  # both have manufacturing differences
     confidence *= ONE_ODD_TOOTH if is_odd else 1.0
     level = (CLEAR[0], WORTH_SAYING[1]) if examined.since_reference else CLEAR
     clear = examined.reaches(level) and not assumed and not examined.is_at_mark
@@ -744,7 +745,7 @@ def _surer(signals: AnalysisSignals) -> str:
 
 
 def _nothing_shows(signals: AnalysisSignals, examined: list[_Examined]) -> list[Finding]:
-    """State that nothing shows, of those shafts where damage of a useful size would have shown.
+    """Report that nothing shows, for the shafts where damage of a relevant size would have shown.
 
     Where an event as large as half of the average's rms would not have shown, nothing is said about the teeth.
     """
@@ -754,7 +755,7 @@ def _nothing_shows(signals: AnalysisSignals, examined: list[_Examined]) -> list[
     doubtful = [e for e in examined if e.is_doubtful]
     examined = [e for e in examined if not (e.is_withheld or e.is_doubtful)]
     sharp = [e for e in examined if e.smallest_visible <= 0.5 * e.event.average_rms]
-    # Of the others the median tooth's part of the difference signal may be mostly noise that the average has left.
+    # On the others, the median tooth's share of the difference signal may be mostly noise left in the average.
     noisy = [e for e in examined if e not in sharp and e.event.median_rms <= SMALLEST_SIGNIFICANCE * e.event.error_rms]
     uneven = [e for e in examined if e not in sharp and e not in noisy]
     findings = []
@@ -838,7 +839,7 @@ def _visible_text(examined: _Examined) -> str:
 
 
 def _why_blind(signals: AnalysisSignals, shaft: ShaftSignals) -> str:
-    """Return why the teeth of a shaft cannot be looked at although there is an average; empty if they can."""
+    """Return why the teeth of a shaft cannot be examined although there is an average; empty if they can."""
     pairs = signals.rig.pairs_on(shaft.shaft)
     for pair in pairs:
         real = teeth_are_contradicted(signals, pair)
@@ -850,7 +851,7 @@ def _why_blind(signals: AnalysisSignals, shaft: ShaftSignals) -> str:
 
 
 def _not_examined(signals: AnalysisSignals, examined: set[str]) -> list[Finding]:
-    """Say of each shaft with gears why its teeth were not looked at."""
+    """Report for each shaft with gears why its teeth were not examined."""
     reasons: dict[str, list[str]] = {}
     for shaft in dict.fromkeys(s for pair in signals.rig.pairs for s in (pair.driver, pair.driven)):
         if shaft not in examined:

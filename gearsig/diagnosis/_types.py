@@ -219,7 +219,7 @@ class ChannelAnalysis(Result):
     averages : mapping
         (shaft, kind) → SynchronousAverage.
     kurtogram : Kurtogram or None
-        Of the channel without its tones, if bearing impacts were found in the band selected from it.
+        Of the channel without its tones, where its band confirms impacts of a bearing.
     kurtogram_band : BandCandidate or None
         The band selected from the kurtogram.
     order_levels : tuple of OrderLevel
