@@ -530,7 +530,7 @@ def _loudest(envelopes: list[BandEnvelope], family: Candidate) -> str:
 
 
 def _significant(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> list[Candidate]:
-    """Return the significant bearing parts, most certain first; of those that share lines, only the more certain one."""
+    """Return the significant bearing parts, most certain first, the more certain one of those that share lines."""
     allowed = signals.settings.false_alarm_probability
     candidates = [c for c in _at_parts(signals, envelopes) if c.p_value <= allowed and _has_own_lines(c.comb)]
     candidates.sort(key=lambda c: -_own_weight(signals, c))

@@ -355,7 +355,7 @@ class _Turns:
     highest_order: float = np.inf
 
     def between(self, first: int, last: int) -> Iterator[tuple[int, FloatArray]]:
-        """Yield the number of a revolution, and that revolution and those that follow as rows, (n, n_per_revolution)."""
+        """Yield the number of a revolution, and it and the following ones as rows, (n, n_per_revolution)."""
         angle, rate, n = self.angle, self.blocks.head.sampling_rate_hz, self.n_per_revolution
         # Approximate: they only determine what is read, with a twentieth of a revolution to spare.
         starts_s = np.interp(np.arange(first, last + 1), angle.revolutions, angle.time_s)

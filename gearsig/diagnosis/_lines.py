@@ -165,7 +165,7 @@ much is called steady."""
 
 STANDING_OUT_DB, GONE_DB = 24.0, 12.0
 """Height at which a line can be followed over blocks of a few revolutions, and level below its usual one at which it is
-gone: noise alone leaves 24 dB, and two beating lines do not vanish together."""
+gone: with noise alone it falls by 24 dB, and two beating lines do not vanish together."""
 
 
 def detect_standstill(signals: AnalysisSignals) -> list[Finding]:
@@ -449,7 +449,7 @@ def mains_lines(
 
 
 def _peak_at(excess: LinesOverFloor, place: float, within: float) -> PlacedLine | None:
-    """Return the interpolated peak within a relative distance of a place, or a sixth of a line; None if there is none."""
+    """Return the interpolated peak within a relative distance of a place, or a sixth of a line; None without one."""
     spectrum = excess.spectrum
     reach = max(within * place, spectrum.resolution / 6)
     line = line_at(excess, place, reach + spectrum.resolution / 2)
@@ -613,7 +613,7 @@ def hunting_multiple(signals: AnalysisSignals, order: float, near: float) -> tup
 
 
 def _is_among_multiples(excess: LinesOverFloor, order: float, fundamental: float) -> bool:
-    """Whether a line is a multiple of an order beyond chance, because its neighbours among the multiples stand out, too.
+    """Whether a line is a multiple of an order beyond chance: its neighbours among the multiples stand out, too.
 
     Multiples of a low order are dense, and one is near any line. Ten of them on either side must together stand higher
     over the floor than the same comb does anywhere between, which happens by chance at most once in twenty times.

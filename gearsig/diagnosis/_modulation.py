@@ -1,4 +1,4 @@
-"""How strongly a shaft modulates a mesh, from sidebands that stand out, on both sides, and belong to nothing else."""
+"""Modulation depth of a mesh by a shaft, from two-sided sidebands that stand out and belong to nothing else."""
 
 from __future__ import annotations
 
@@ -29,22 +29,22 @@ from gearsig.rig import GearPair, hunting_tooth_order
 from gearsig.spectra import Spectrum
 
 STRONG_DB = -10.0
-"""Sidebands over carrier, in power: an amplitude modulation of 45 %, or a third together with some phase modulation."""
+"""Power of sidebands over carrier: amplitude modulation of 45 %, or of a third with some phase modulation."""
 
 NOTABLE_DB = -16.0
 """An amplitude modulation of 22 %: worth a look, common on healthy machines."""
 
 N_CARRIERS = 3
 MAX_TIMES = 8
-"""Modulations per revolution that are looked for: planets, jaws of couplings, bolts."""
+"""Largest number of modulations per revolution sought: planets, jaws of couplings, bolts."""
 
 MIRROR_RATIO = 10.0
-"""Power over its mirror image from which a line may be another machine's."""
+"""Power over the mirror image above which a line may be another machine's."""
 
 APART_LINES = 3.0
 
 TRAIN_SKIRT = 5e-4
-"""Relative: a bearing's slip wanders."""
+"""Relative width, as a bearing's slip varies."""
 
 Cells = dict[tuple[int, int], tuple[float, float]]
 """(mesh harmonic, k) → power of the lower and of the upper sideband."""
@@ -52,17 +52,17 @@ Cells = dict[tuple[int, int], tuple[float, float]]
 
 @dataclass(frozen=True)
 class Modulation:
-    """How a mesh is modulated, as one channel has it.
+    """The modulation of a mesh in one channel.
 
     Parameters
     ----------
     times : int
-        Per revolution of the shaft.
+        Modulations per revolution of the shaft.
     spacing : float
         Of the sidebands, in orders of the reference shaft.
     level_db : float
-        Power of the first two sidebands on each side over that of the mesh harmonics; where none stand out, the
-        level that noise would hide.
+        Power of the first two sidebands on each side over that of the mesh harmonics; if none stand out, the level that
+        noise would hide.
     """
 
     times: int
@@ -73,13 +73,13 @@ class Modulation:
 def mesh_modulation(signals: AnalysisSignals, pair: GearPair, shaft: str) -> dict[str, Modulation]:
     """Return the modulation of `pair` by `shaft` for the channels in which a notable one would show.
 
-    Empty where the orders are not known or no sideband can be told from its carrier or from other lines.
+    Empty if the orders are unknown, or no sideband is distinguishable from its carrier or from other lines.
     """
     mesh, order = signals.rig.mesh_order(pair), signals.rig.ratio(shaft)
     if mesh is None or order is None:
         return {}
     others = [other for name, other in signals.known_shaft_orders.items() if name != shaft]
-    # Where lines of other elements stand: of the meshes, and the first of other shafts themselves.
+    # Places of other elements' lines: of the meshes, and the first of the other shafts themselves.
     foreign = [h * other for other in {mesh, *signals.known_mesh_orders.values()} for h in range(1, 11)]
     foreign += [k * other for other in others for k in range(1, 4)]
     by_channel = {}
@@ -87,7 +87,7 @@ def mesh_modulation(signals: AnalysisSignals, pair: GearPair, shaft: str) -> dic
         if order < sideband_distance(excess.spectrum, RUN_UP_FOOT_ORDERS if signals.speed_varies else 0.0):
             continue
         near = APART_LINES * excess.spectrum.resolution
-        multiples = tuple(  # that are no smaller multiple of another shaft: that would be the simpler cause
+        multiples = tuple(  # a smaller multiple of another shaft would be the simpler cause
             k
             for k in range(1, MAX_TIMES + 1)
             if not any(abs(k * order - j * other) <= near for other in others for j in range(1, k))
@@ -99,14 +99,14 @@ def mesh_modulation(signals: AnalysisSignals, pair: GearPair, shaft: str) -> dic
 
 
 def sideband_distance(spectrum: Spectrum, foot: float = 0.0) -> float:
-    """Return the smallest spacing at which a sideband can be told from its carrier: clear of both main lobes."""
+    """Return the smallest spacing at which a sideband separates from its carrier, clear of both main lobes."""
     return max(foot, (2 * lobe_lines(spectrum) + 1) * spectrum.resolution)
 
 
 def modulation_of(
     excess: LinesOverFloor, mesh: float, order: float, foreign: tuple[float, ...], multiples: tuple[int, ...]
 ) -> Modulation | None:
-    """Return the modulation of a mesh by a shaft, None where a notable one would be hidden by noise.
+    """Return the modulation of a mesh by a shaft, None if noise would hide a notable one.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def modulation_of(
     mesh, order : float
         Of the mesh and of the shaft.
     foreign : tuple of float
-        Orders of other elements; sidebands that meet them are not counted.
+        Orders of other elements; sidebands that coincide with them are not counted.
     multiples : tuple of int
         k for which lines at k·order from the mesh belong to this shaft.
     """
@@ -140,7 +140,7 @@ def modulation_of(
 def _summed(cells: Cells, order: float, carriers: float, floor: float) -> Modulation | None:
     power = {k: sum(sum(cell) for (_, number), cell in cells.items() if number == k) for k in range(1, MAX_TIMES + 1)}
     total = sum(power.values())
-    # What a pair needs in order to count: below it, "not modulated" and "hidden" are the same.
+    # The level a pair needs in order to count: below it, "not modulated" and "hidden" are the same.
     hidden_db = 10 * log10(max(2 * 10 ** (CLEAR_DB / 10) * floor / (carriers + total), 1e-30))
     if hidden_db >= NOTABLE_DB:
         return None
@@ -162,7 +162,7 @@ def _times_per_revolution(power: dict[int, float]) -> int:
 
 
 def _without_one_foreign_line(cells: Cells, carriers: dict[int, float]) -> Cells:
-    """Cut the strongest lines beside one carrier that have no like: one tone of another machine does that.
+    """Remove the strongest lines beside one carrier that have no counterpart, as one tone of another machine causes.
 
     Amplitude and phase modulation together also make one side larger than the other, but at several harmonics.
     """
@@ -181,7 +181,7 @@ def _without_one_foreign_line(cells: Cells, carriers: dict[int, float]) -> Cells
 
 
 def _comes_again(cells: Cells, carriers: dict[int, float], h: int, k: int, side: int) -> bool:
-    """Whether the same sideband of another harmonic is of the same size, each against its carrier."""
+    """Whether the same sideband of another harmonic has a similar size relative to its carrier."""
     size = cells[h, k][side] / MIRROR_RATIO
     return any(
         cell[side] * carriers[h] >= size * carriers[own_h] > 0
@@ -191,11 +191,11 @@ def _comes_again(cells: Cells, carriers: dict[int, float], h: int, k: int, side:
 
 
 def _sideband(excess: LinesOverFloor, place: float, order: float) -> float:
-    """Return the power of a sideband, 0 where no line stands out of the floor and of what lies beside it."""
+    """Return the power of a sideband, 0 if no line stands out from the floor and from its neighbours."""
     apart = order / excess.spectrum.resolution
     line = line_at(excess, place, around=min(6.0, apart / 2) * excess.spectrum.resolution)
     if line is None or not line.is_highest:
-        return 0.0  # a sideband is the highest line of its surroundings; the foot of its carrier is not
+        return 0.0  # a sideband is the highest line around; the foot of its carrier is not
     beside = neighbour_level(excess.spectrum, line.position, apart - INNER_LINES)
     if beside is not None and line.amplitude < beside * 10 ** (CLEAR_DB / 20):
         return 0.0
@@ -203,10 +203,10 @@ def _sideband(excess: LinesOverFloor, place: float, order: float) -> float:
 
 
 def _power(excess: LinesOverFloor, place: float) -> float:
-    """Return the power of the line at `place` less what noise adds to it, 0 where it is not clear of the floor.
+    """Return the power of the line at `place` minus what noise adds to it, 0 if it is not clear of the floor.
 
-    Noise adds the expected largest of its four lines there: 1 + 1/2 + 1/3 + 1/4 of their mean. Clear of the floor is
-    among four lines what noise is above once in two million.
+    Noise adds the expected maximum of the four lines there: 1 + 1/2 + 1/3 + 1/4 of their mean. Clear of the floor is a
+    level that noise exceeds in four lines once in two million.
     """
     line, floor = line_at(excess, place), _floor_power(excess, place)
     if line is None or line.amplitude**2 <= floor * 10 ** (CLEAR_DB / 10):
@@ -219,18 +219,18 @@ def _floor_power(excess: LinesOverFloor, place: float) -> float:
 
 
 def detect_sidebands(signals: AnalysisSignals, trains: Sequence[float] = ()) -> list[Finding]:
-    """Report strong modulation by known shafts, and sideband families of shafts that the rig does not know.
+    """Report strong modulation by known shafts, and sideband families of shafts missing from the rig.
 
     Parameters
     ----------
     signals : AnalysisSignals
     trains : sequence of float
-        Orders of impacts that the envelopes show: their sidebands are no shaft's.
+        Orders of impacts in the envelopes, whose sidebands are no shaft's.
     """
     findings: list[Finding] = []
     for pair in signals.rig.pairs:
         if not mesh_is_confirmed(signals, pair) or teeth_are_contradicted(signals, pair) is not None:
-            continue  # without a carrier there are no sidebands of it
+            continue  # without a carrier there are no sidebands
         for shaft in (pair.driver, pair.driven):
             by_channel = mesh_modulation(signals, pair, shaft)
             median = float(np.median([m.level_db for m in by_channel.values()])) if by_channel else -np.inf
@@ -267,7 +267,7 @@ def _modulated(
         "mesh-modulated",
         Kind.NOTICE,  # what is usual differs by machine: only one whose reference lacks it is suspected, see `_change`
         f"The mesh of {pair.name} is {how} {times} per revolution of shaft {shaft}.",
-        # Of a ratio between lines, a frequency says nothing.
+        # A ratio between lines has no frequency.
         replace(signals.where(strongest.spacing, channel, shaft=shaft, gear=f"{pair.name}/{shaft}"), frequency_hz=None),
         Strength(value, "of the carrier", limit, "common on healthy machines", median - NOTABLE_DB),
         confidence=0.95 * (WITH_ASSUMED_DATA if rig.assumed else 1.0),
@@ -278,7 +278,7 @@ def _modulated(
 
 
 def _unknown_family(signals: AnalysisSignals, pair: GearPair, trains: Sequence[float]) -> Iterator[Finding]:
-    """Find sidebands whose spacing is no known shaft's: that is how a wheel shows whose teeth are not given."""
+    """Yield sidebands whose spacing is no known shaft's: a gear without stated teeth shows in this way."""
     mesh = signals.rig.mesh_order(pair)
     if mesh is None:
         return
@@ -290,7 +290,7 @@ def _unknown_family(signals: AnalysisSignals, pair: GearPair, trains: Sequence[f
     comb, excess = found_combs[channel], signals.order_excess[channel]
     p_value = min(1.0, comb.p_value * len(combs))
     shafts = signals.known_shaft_orders.values()
-    # The spacing may be a known shaft's after all: skirts of its lines, where the speed is not exactly known.
+    # The spacing may be a known shaft's after all: skirts of its lines, if the speed is not known exactly.
     is_known = any(abs(k * order / comb.fundamental - 1) < 0.01 for order in shafts for k in (1, 2))
     hunting = hunting_tooth_order(signals.rig, pair)
     known = (*trains, hunting) if hunting is not None else trains
@@ -305,7 +305,7 @@ def _unknown_family(signals: AnalysisSignals, pair: GearPair, trains: Sequence[f
         evidence.append(f"A gear with {round(teeth)} teeth on shaft {other_shaft} would modulate the mesh just so.")
         surer = f"Count the teeth on shaft {other_shaft}; with them in the rig file that gear is examined as well."
     if signals.angle is not None and signals.angle.method == "pulses":
-        # Pulses per revolution are mistaken by factors up to 4: the marks of a coupling, of a four-hole disc.
+        # Pulses per revolution are wrong by factors up to 4: the marks of a coupling or a four-hole disc.
         wrong = [n for n in (2, 3, 4) if abs(comb.fundamental - 1 / n) <= excess.spectrum.resolution]
         of_speed = "of the speed found from the pulses: pulses_per_revolution may be wrong by"
         evidence += [f"The spacing is 1/{n} {of_speed} {n}." for n in wrong[:1]]
@@ -337,10 +337,11 @@ def _unknown_family(signals: AnalysisSignals, pair: GearPair, trains: Sequence[f
 
 
 def _miscounted(signals: AnalysisSignals, pair: GearPair, teeth: float) -> tuple[str, int] | None:
-    """Return the shaft and the stated teeth of the gear that really has `teeth`, None where it is none.
+    """Return the shaft and the stated teeth of the gear that really has `teeth`, None if there is none.
 
-    A speed that was found from the mesh is wrong as the teeth are: the mesh stands where it should, and the sidebands
-    of the miscounted gear's shaft a little beside. Up to a tenth more or less, another shaft is not as likely.
+    A speed found from the mesh is wrong by the same factor as the teeth: the mesh stands where it should, and the
+    sidebands of the miscounted gear's shaft a little beside their place. Within a tenth of the stated teeth, another
+    shaft is less likely.
     """
     if signals.angle is None or signals.angle.method != "tachless" or abs(teeth - round(teeth)) > 0.05:
         return None
@@ -354,40 +355,40 @@ MOST_PARTS = 16
 
 
 def _is_part_of(spacing: float, orders: Sequence[float], resolution: float) -> bool:
-    """Whether a spacing is a part m/n of an order: two combs of lines have common ones then.
+    """Whether a spacing is a fraction m/n of an order: two combs of lines then have common lines.
 
-    A cage turns n times slower than the elements of its bearing pass. The multiple is as exact as the spacing, which
-    its third multiples give to a sixth of a line.
+    A cage turns n times slower than the elements of its bearing pass. The multiple is as exact as the spacing, whose
+    third multiples give it to a sixth of a line.
     """
     whole = [(m * order, round(m * order / spacing)) for order in orders for m in (1, 2, 3)]
     return any(1 <= n <= MOST_PARTS and abs(order - n * spacing) <= n * resolution / 6 for order, n in whole)
 
 
 CLOSEST_LINES = 8.0
-"""Spacing, in lines, below which the lines of a family leave none beside them to stand out of."""
+"""Spacing in lines below which a family leaves no lines between its own to stand out from."""
 
 LARGEST_SPACING, SPACINGS = 1.9, 3
-"""Widest spacing of sidebands that is looked for, and how many of them to either side of the mesh."""
+"""Widest spacing of sidebands that is sought, and their number on either side of the mesh."""
 
 
 COMBINATIONS = ((1, 1), (1, 2), (2, 1), (1, 3), (2, 2), (3, 1))
-"""j and k of the sidebands at j·a ± k·b of a mesh that two shafts, of orders a and b, modulate: its own, or one of them
-and the next, whose load comes through the train."""
+"""j and k of the sidebands at j·a ± k·b of a mesh modulated by two shafts of orders a and b: its own shafts, or one of
+them and the next, whose load is transmitted through the train."""
 
 
 def _without_sidebands(
     excess: LinesOverFloor, mesh: float, distance: float, *, half_width: float = 0.0
 ) -> LinesOverFloor:
-    """Return lines without those so far from any harmonic of a mesh, on either side."""
+    """Return the lines without those at a given distance from any harmonic of a mesh, on either side."""
     above = excess.without_multiples(mesh, start=distance, half_width=half_width)
     return above.without_multiples(mesh, start=-distance, half_width=half_width)
 
 
 def _without_combinations(signals: AnalysisSignals, excess: LinesOverFloor, mesh: float) -> LinesOverFloor:
-    """Return lines without the sidebands of a mesh that two shafts make together.
+    """Return the lines without the sidebands of a mesh that two shafts cause together.
 
-    Of products beyond `COMBINATIONS` those are left that are stronger than one of their factors' own sidebands: depths
-    are below 1, so that no product is.
+    Products beyond `COMBINATIONS` are kept if they exceed one of their factors' own sidebands: depths are below 1, so
+    no true product does.
     """
     for one, other in combinations(signals.known_shaft_orders.values(), 2):
         for j, k in COMBINATIONS:
@@ -408,11 +409,11 @@ def _without_combinations(signals: AnalysisSignals, excess: LinesOverFloor, mesh
 
 
 def _products(signals: AnalysisSignals, closest: float) -> Iterator[tuple[float, tuple[float, ...]]]:
-    """Yield how far from the mesh sidebands of two shafts together lie, and the distances of their factors.
+    """Yield the distances from the mesh of sidebands of two shafts together, and those of their factors.
 
-    Teeth that differ modulate by all multiples of their shaft's order, if these are not closer than `closest`, and the
-    other shaft each of those by its first two, as an eccentric or oval gear does. An angle that was found from the
-    vibration at some points a turn has images of what it follows.
+    Teeth that differ modulate by all multiples of their shaft's order, if these are not closer than `closest`; the
+    other shaft modulates each of those by its first two multiples, as an eccentric or oval gear does. An angle found
+    from the vibration at a few points per turn has images of what it follows.
     """
     shafts, farthest = tuple(signals.known_shaft_orders.values()), SPACINGS * LARGEST_SPACING
     for one, other in permutations((order for order in shafts if order >= closest), 2):
@@ -428,7 +429,7 @@ def _products(signals: AnalysisSignals, closest: float) -> Iterator[tuple[float,
 
 
 def _knots(signals: AnalysisSignals) -> tuple[float, ...]:
-    """Return how often a turn an angle that was found from the vibration is known; of others, nothing."""
+    """Return at how many points per turn an angle found from the vibration is known; nothing for other angles."""
     angle = signals.angle
     if angle is None or angle.method != "tachless":
         return ()
@@ -436,10 +437,10 @@ def _knots(signals: AnalysisSignals) -> tuple[float, ...]:
 
 
 def _family(signals: AnalysisSignals, excess: LinesOverFloor, pair: GearPair, trains: Sequence[float]) -> Comb | None:
-    """Return the best family of sidebands of a pair's mesh that neither its shafts nor anything else known makes.
+    """Return the best family of sidebands of a pair's mesh that neither its shafts nor any other known cause explains.
 
-    Its lines are those that stand out of what lies beside them: the skirt of a mesh line is far above the noise floor,
-    and any spacing fits lines of a skirt.
+    Its lines must stand out from their neighbours: the skirt of a mesh line is far above the noise floor, and any
+    spacing fits lines of a skirt.
     """
     mesh, hunting = signals.rig.mesh_order(pair), hunting_tooth_order(signals.rig, pair)
     if mesh is None:
@@ -455,12 +456,12 @@ def _family(signals: AnalysisSignals, excess: LinesOverFloor, pair: GearPair, tr
         excess = excess.without_multiples(order, start=mesh, half_width=wide)
     excess = _without_combinations(signals, excess, mesh)
     if hunting is not None:
-        excess = excess.without_multiples(hunting)  # of both gears together, and the mesh is one of them
+        excess = excess.without_multiples(hunting)  # of both gears together; the mesh is one of its multiples
     for train in trains:  # with each shaft's sidebands
         for start in (0.0, mesh, *(mesh + k * o for o in signals.known_shaft_orders.values() for k in (-2, -1, 1, 2))):
             excess = excess.without_multiples(train, start=start, skirt=TRAIN_SKIRT)
     for _, part, order in expected_parts(signals):
-        # Rolling elements under the load are stiffer or softer by turns, and shift the gears, in healthy bearings too.
+        # Stiffness varies as rolling elements pass the load, and displaces the gears, in healthy bearings too.
         for passing in (order, 2 * order) if part == "BPFO" else ():
             excess = _without_sidebands(excess, mesh, passing, half_width=passing * slip_of(signals))
     centres = mesh * np.arange(1, N_CARRIERS + 1)
@@ -473,14 +474,14 @@ def _family(signals: AnalysisSignals, excess: LinesOverFloor, pair: GearPair, tr
     step = 1 if comb is None else gcd(*(k for _, k in _numbers(comb, mesh)))
     if comb is None or step <= 1 or (spacing := step * comb.fundamental) > LARGEST_SPACING:
         return comb
-    # Every second or third multiple alone: the spacing is so much wider, and has been as likely to be found.
+    # Only every second or third multiple: the spacing is that much wider, and its p-value is no smaller than before.
     near = excess.spectrum.resolution / 2
     wider = best_comb(excess, spacing - near, spacing + near, offsets=offsets, centres=centres)
     return comb if wider is None else replace(wider, p_value=max(comb.p_value, wider.p_value))
 
 
 def _numbers(comb: Comb, mesh: float) -> list[tuple[int, int]]:
-    """Return of which harmonic of the mesh each line is a sideband, and how many spacings it lies beside that."""
+    """Return for each line the mesh harmonic of which it is a sideband, and its distance from that in spacings."""
     harmonics = [max(1, round(position / mesh)) for position in comb.positions]
     return [
         (h, round((position - h * mesh) / comb.fundamental))
@@ -489,11 +490,11 @@ def _numbers(comb: Comb, mesh: float) -> list[tuple[int, int]]:
 
 
 def _is_family(comb: Comb, mesh: float) -> bool:
-    """Whether three of the lines are there, two of them on both sides of one carrier, and one is clear by itself.
+    """Whether three of the lines are there, two of them on both sides of one carrier, and one is clear on its own.
 
-    A shaft shows by its first multiple before all others: second and third ones alone are products of other lines. An
-    amplitude that wanders at random puts the same noise about all harmonics of the mesh, on both sides: its lines are
-    as one line, and together no less likely than that.
+    A shaft shows by its first multiple before all others: second and third ones alone are products of other lines. A
+    randomly varying amplitude puts the same noise on both sides of all harmonics of the mesh: its lines count as one
+    line, no less probable together than alone.
     """
     places = _numbers(comb, mesh)
     is_clear = max(comb.ratios_db, default=0.0) >= CLEAR_DB

@@ -1,6 +1,6 @@
-"""A wrong sampling rate or stated speed: everything lies a factor beside the place where speed and geometry put it.
+"""A wrong sampling rate or stated speed: all lines are a factor away from where speed and geometry put them.
 
-Orders are the same with either, so that both are said. A clock decides: the mains, whose frequency is known.
+Both errors give the same orders, so both are reported. A clock decides between them: the mains, of known frequency.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ SAMPLING_RATE = "sampling-rate-doubtful"
 """Code of the finding; it opens the verdict."""
 
 USUAL_FACTORS = (2.0, 2.56, 4.0, 5.0, 8.0, 10.0)
-"""By which rates are mistaken, up or down: decimation, a prefix or a digit, bandwidth for rate (2.56)."""
+"""Factors by which rates are mistaken, up or down: decimation, a prefix or a digit, bandwidth for rate (2.56)."""
 
 COMMON_RATES_HZ = (
     *(1000.0 * rate for rate in (1, 2, 2.5, 4, 5, 6.25, 8, 10, 12, 12.5, 16, 20, 24, 25, 32, 40, 48, 50, 64, 96, 100)),
@@ -36,69 +36,70 @@ COMMON_RATES_HZ = (
     *(4096.0 * 2**power for power in range(6)),
     11025.0, 22050.0, 44100.0,
 )  # fmt: skip
-"""Of acquisition systems; where one recording of a set was taken at another of them, the factor is their ratio."""
+"""Rates of acquisition systems; if one recording of a set was taken at another of them, the factor is their ratio."""
 
 SLIPS = np.linspace(0.985, 1.015, 61)
-"""Of a part's order over its kinematic one."""
+"""Of a part's order relative to its kinematic order."""
 
 CLOSE_TOLERANCE = 0.005
-"""Of the speed, by which rates are told apart that differ by less than a stated speed is to be trusted."""
+"""Of the speed, for distinguishing rates that differ by less than the tolerance of a stated speed."""
 
 SMEAR = 0.003
-"""Relative width of a part's lines: by so much impacts that slip come together and apart."""
+"""Relative width of a part's lines, as slip makes the intervals of impacts vary."""
 
 NEAR_TOLERANCE = 0.015
-"""Of the speed, where nothing but multiples of one order speaks for a rate: a motor's slip under load."""
+"""Of the speed, where only multiples of one order support a rate: a motor's slip under load."""
 
 N_LINES = 12
 HIGHEST_ORDER = 12.0
 CLEAR_DB = 12.0
-"""The strongest lines of a spectrum, up to that order of the shaft: those that a machine's own parts make."""
+"""The strongest lines of a spectrum, up to this order of the shaft: those that a machine's own parts cause."""
 
 ENOUGH_EVIDENCE = -20.0
-"""Sum over all spectra of lg p from which a rate explains what is seen."""
+"""Sum over all spectra of lg p below which a rate explains the lines."""
 
 ENOUGH_OF_EACH = -5.0
-"""The same of the shafts' lines alone, and of what the races explain beside them."""
+"""The same for the shafts' lines alone, and for what the races explain in addition."""
 
 SHARE_OF_STATED = 0.25
-"""The stated rate explains nothing where its own sum is below that share of another rate's."""
+"""The stated rate explains nothing if its sum is below this share of another rate's."""
 
 BY_ONE_RACE = 1 / 3
-"""Share of another rate's sum from which the shafts and one race at the stated rate are explanation enough, or the
-shafts alone where that rate is so many times higher that they share few lines with its own."""
+"""Share of another rate's sum at which the shafts and one race at the stated rate are sufficient explanation, or the
+shafts alone if that rate is so many times higher that they share few lines with its own."""
 
 FEW_SHARED = 4.5
-"""Factor from which less than a quarter of a slower shaft's multiples are those of the stated one."""
+"""Factor above which less than a quarter of a slower shaft's multiples are those of the stated one."""
 
 SHARE_OF_LEFT = 0.4
-"""A lower rate is none where the stated one explains what that leaves by that share of what it explains itself: of
-drawn motors 0.25 or less at a rate that is too high, at the right one 0.5 or more for rates 2.5 to 10 times lower."""
+"""A lower rate is rejected if the stated one explains the lines that it leaves by this share of its own sum: for
+simulated motors 0.25 or less at a rate that is too high, at the right one 0.5 or more for rates 2.5 to 10 times
+lower."""
 
 AS_GOOD = 0.6
-"""Share of the best factor's sum that makes a smaller one preferred, where it is far apart."""
+"""Share of the best factor's sum at which a smaller factor is preferred, if it is far apart."""
 
 FAR_APART = 2.5
-"""Ratio of factors from which the larger may stand for a slower shaft that explains a race as well."""
+"""Ratio of factors above which the larger may stand for a slower shaft that explains a race as well."""
 
 LOWEST_OF_VELOCITY = 0.1
 """Share of a shaft's order below which velocity is mostly the drift of the sensor."""
 
 SLIGHT = 0.12
-"""By which a stated speed may be wrong without a slip of the pen: that of a motor's field, or of another load."""
+"""Relative error of a stated speed that is not a slip of the pen: speed of a motor's field, or of another load."""
 
 NAMED_AS_WELL = 0.35
-"""Share of the best factor's sum from which another factor is said beside the preferred one."""
+"""Share of the best factor's sum above which another factor is named beside the preferred one."""
 
 
 def detect_sampling_rate(
     signals: AnalysisSignals, angle: ShaftAngle | CannotTell, envelopes: Sequence[BandEnvelope]
 ) -> Finding | None:
-    """Say that sampling rate or speed is probably wrong, and by which factor, None where nothing speaks for it.
+    """Report that sampling rate or speed is probably wrong, and by which factor; None if nothing indicates it.
 
-    With gears, their comb of mesh lines and sidebands is sought at other multiples of the stated speed. Without, the
-    strongest lines are explained by shafts and races at each of the usual factors; a tachometer or encoder is compared
-    with the nominal speed.
+    With gears, their comb of mesh lines and sidebands is sought at other multiples of the stated speed. Without gears,
+    the strongest lines are explained by shafts and races at each of the usual factors. A tachometer or encoder is
+    compared with the nominal speed.
     """
     recording, rig = signals.recording, signals.rig
     source = recording.speed_source
@@ -127,14 +128,14 @@ def _finding(
     signals : AnalysisSignals
     factor : float
     stated_rpm : float
-        Speed that was stated for the machine.
+        Speed stated for the machine.
     evidence : str
     also : sequence of str
-        What else may be wrong and do the same.
+        Other errors with the same effect.
     others : sequence of float
         Further factors that explain nearly as much.
     shaft_rpm : float or None
-        The speed that fits best, where the factor is one of a list.
+        The best fitting speed, if the factor is one of a list.
     """
     stated_hz = signals.recording.sampling_rate_hz
     factors = (factor, *others)
@@ -142,7 +143,7 @@ def _finding(
     rate = f"{hertz[0]} instead of the stated {stated_hz:.6g} Hz"
     rpm[0] = rpm[0] if shaft_rpm is None else f"{shaft_rpm:.5g} rpm"
     speed = f"{rpm[0]} instead of the stated {stated_rpm:.5g} rpm"
-    # The mains show which of the two is right; where a shaft turns at their frequency as well, they show nothing.
+    # The mains show which of the two is right, unless a shaft also turns at their frequency.
     scales = (1.0, factor)
     right, wrong = (mains_lines(signals, scale, scales) if signals.angle else None for scale in scales)
     if wrong and not right:
@@ -171,13 +172,13 @@ def _finding(
 
 
 def _power_text(log10_p: float) -> str:
-    """Write a probability by its power of ten."""
+    """Return a probability as text, by its power of ten."""
     power = round(log10_p)
     return unit_text(f"10^{power}") if power < 0 else "1"
 
 
 def _usual(factor: float, tolerance: float) -> float | None:
-    """Return the usual factor, or one over it, that a measured one is within a relative tolerance of."""
+    """Return the usual factor, or its reciprocal, within a relative tolerance of a measured one."""
     near = [f for usual in USUAL_FACTORS for f in (usual, 1 / usual) if abs(factor / f - 1) <= tolerance]
     return min(near, key=lambda f: abs(factor / f - 1), default=None)
 
@@ -214,21 +215,21 @@ def _by_gears(signals: AnalysisSignals, angle: ShaftAngle | CannotTell) -> Findi
 
 
 # --------------------
-# Without gears: which rate lets shafts and races explain the strongest lines.
+# Without gears: the rate at which shafts and races explain the strongest lines.
 # --------------------
 
 
 @dataclass(frozen=True)
 class StrongLines:
-    """The strongest lines of one spectrum over order, as it looks at the stated rate.
+    """The strongest lines of one spectrum over order, at the stated rate.
 
     Parameters
     ----------
     orders : array, (n_lines,)
     half_width : float
-        How far a line may be beside its place, in orders.
+        Largest distance of a line from its place, in orders.
     lowest, highest : float
-        Orders between which they were sought.
+        Range of orders in which they were sought.
     """
 
     orders: FloatArray
@@ -248,14 +249,14 @@ def _strong_lines(excess: LinesOverFloor, highest: float) -> StrongLines | None:
     places = np.flatnonzero(clear & (spectrum.positions < highest))
     places = places[np.argsort(-spectrum.values[places])][:N_LINES]
     if len(places) < 5:
-        return None  # chance then explains them as well
+        return None  # too few to rule out chance
     return StrongLines(spectrum.positions[places], 1.5 * spectrum.resolution, lowest, highest)
 
 
 class StrongSpectra:
-    """The strongest lines of several spectra: how likely it is by chance that so many lie where something puts them.
+    """The strongest lines of several spectra: the chance that this many lie at given places.
 
-    What many questions share is worked out once: the speed that shafts ask for, and which lines a part explains.
+    Results needed repeatedly are computed once: the speed that fits the shafts, and the lines that a part explains.
 
     Parameters
     ----------
@@ -272,14 +273,14 @@ class StrongSpectra:
         self._near_parts = cache(self._at_part)
 
     def log_p(self, factor: float, parts: Sequence[tuple[float, float]], tolerance: float) -> float:
-        r"""Return lg of the chance that so many strong lines lie on the places of shafts and races, in all spectra.
+        r"""Return lg of the chance that this many strong lines lie at the places of shafts and races, in all spectra.
 
         .. math:: p = T \prod_s \sum_{k \ge m_s} \binom{n_s}{k} c_s^k (1 - c_s)^{n_s - k}
 
-        m of n lines lie on the places, which cover the share c of the range; T is the number of speeds and slips tried:
-        the true speed may be that tolerance beside the stated one, a part 1.5 % beside its kinematic order, each alike
-        in all spectra. Each multiple of a part has two sidebands to either side: of a race at its shaft's order, of a
-        rolling element at the cage's. Impacts that come unevenly smear a part's lines, the more the higher.
+        m of n lines lie at the places, which cover the share c of the range; T is the number of speeds and slips tried.
+        The true speed may differ from the stated one by the tolerance, a part's order from its kinematic one by 1.5 %,
+        each the same in all spectra. Each multiple of a part has two sidebands on either side: at its shaft's order for
+        a race, at the cage's for a rolling element. Uneven intervals of impacts smear a part's lines, higher ones more.
         """
         if not self.spectra:
             return 0.0
@@ -302,7 +303,7 @@ class StrongSpectra:
         return self._speeds(factor, STATED_SPEED_TOLERANCE)[0]
 
     def _speed_of_shafts(self, factor: float, tolerance: float) -> tuple[float, int]:
-        """Return the speed that puts most lines on the first shaft's, the nearest of such, and how many were tried."""
+        """Return the speed that puts most lines on the first shaft's, the nearest if several, and the number tried."""
         half_width = min(x.half_width for x in self.spectra)
         n_speeds = min(4001, int(2 * tolerance * max(self.highest, 1.0) / (half_width / 1.5)) + 2)
         speeds = np.linspace(1 - tolerance, 1 + tolerance, n_speeds) / factor
@@ -326,7 +327,7 @@ class StrongSpectra:
     def _with_part(
         self, part: tuple[float, float], speed: float, seen: Sequence[NDArray[np.bool_]]
     ) -> tuple[float, int, list[NDArray[np.bool_]]]:
-        """Return the slip at which a part explains most further lines, how many, and what is seen with it."""
+        """Return the slip at which a part explains most further lines, their number, and all lines then explained."""
         near = self._near_parts(*part, speed)
         new = sum((x & ~y).sum(axis=1) for x, y in zip(near, seen, strict=True))
         best = int(np.argmax(new))
@@ -349,7 +350,7 @@ class StrongSpectra:
         for lines, on_place in zip(self.spectra, seen, strict=True):
             m, n = int(on_place.sum()), len(lines.orders)
             if not m:
-                continue  # so many or more lie there for certain
+                continue  # this many or more lie there with certainty
             widths = np.concatenate([np.full(len(places), lines.half_width), _smeared(lines, smeared)])
             middles = np.concatenate([places, smeared])
             covered = _covered(middles - widths, middles + widths, lines.lowest, lines.highest)
@@ -363,13 +364,13 @@ def _strong_of_all(spectra: Sequence[LinesOverFloor], shafts: Sequence[float], h
 
 
 def _near(lines: StrongLines, places: FloatArray) -> NDArray[np.bool_]:
-    """Which of the lines lie at one of the places."""
+    """Return which of the lines lie at one of the places."""
     beside: NDArray[np.bool_] = np.any(np.abs(lines.orders - places[:, None]) < lines.half_width, axis=0)
     return beside
 
 
 def _smeared(lines: StrongLines, places: FloatArray) -> FloatArray:
-    """Return the half widths within which lines of parts are at their places."""
+    """Return the half widths within which lines of parts count as at their places."""
     widths: FloatArray = np.maximum(lines.half_width, SMEAR * np.abs(places))
     return widths
 
@@ -383,7 +384,7 @@ def _covered(starts: FloatArray, ends: FloatArray, lowest: float, highest: float
 
 
 def _near_family(lines: StrongLines, parts: FloatArray, sideband: float) -> NDArray[np.bool_]:
-    """Which of the lines lie at a multiple of a part's order or at one of its sidebands, (n_parts, n_lines)."""
+    """Return which lines lie at a multiple of a part's order or one of its sidebands, (n_parts, n_lines)."""
     carrier = lines.orders - sideband * np.arange(-2, 3)[:, None]  # (n_sidebands, n_lines)
     parts = parts[:, None, None]
     multiple = np.clip(np.rint(carrier / parts), 1, np.floor(lines.highest / parts) + 1)
@@ -393,7 +394,7 @@ def _near_family(lines: StrongLines, parts: FloatArray, sideband: float) -> NDAr
 
 
 def _family(part: float, sideband: float, highest: float) -> FloatArray:
-    """Orders of a part's multiples with their sidebands."""
+    """Return the orders of a part's multiples with their sidebands."""
     multiples = part * np.arange(1, int(highest / part) + 2)
     return (multiples[:, None] + sideband * np.arange(-2, 3)).ravel()
 
@@ -410,12 +411,12 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
         tolerance: float = STATED_SPEED_TOLERANCE,
         at: Sequence[tuple[float, float]] | None = None,
     ) -> float:
-        """Return lg of the chance that lines up to an order lie as well."""
+        """Return lg of the chance that lines up to an order lie this well."""
         at = at if at is not None else parts if factor == 1.0 else races
         return strong_to(highest).log_p(factor, at, tolerance)
 
     def of_one_part(factor: float) -> float:
-        """Return the least of one race at a factor; without races, of a part of any order: what is near fractions."""
+        """Return the minimum over one race at a factor; without races, over a part of any order, near fractions."""
         if not races:
             return _of_unknown_part(strong_to(ranges[factor]), factor)
         return min(evidence(factor, ranges[factor], at=[race]) for race in races)
@@ -427,18 +428,18 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
     usual, common = _factors(signals.recording.sampling_rate_hz, with_parts=bool(parts))
     candidates = [*usual, *common]
     factors = _apart(candidates)
-    # A rate that is too high moves everything up, and more of the spectrum counts.
+    # A rate that is too high moves everything up, so that more of the spectrum counts.
     ranges = {factor: HIGHEST_ORDER * max(1.0, 1 / factor) for factor in factors}
     sums = {factor: evidence(factor, ranges[factor]) for factor in factors}
-    # One family alone may be the shaft's or a race's at some rate and some speed: both must speak for a rate that is
-    # one of many, and for a usual factor without races the speed must be near the stated one.
+    # One family alone may be the shaft's or a race's at some rate and some speed: both must support a rate that is one
+    # of many, and for a usual factor without races the speed must be near the stated one.
     for factor in factors:
         of_shafts = evidence(factor, ranges[factor], at=())
         if max(of_shafts, sums[factor] - of_shafts) > ENOUGH_OF_EACH:
             sums[factor] = 0.0
         if factor in usual and not sums[factor]:
             sums[factor] = evidence(factor, ranges[factor], NEAR_TOLERANCE)
-            # Halves of the shaft's order are looseness, multiples blades or poles: shafts alone tell no such rate.
+            # Half orders of the shaft mean looseness, multiples blades or poles: shafts alone cannot show such a rate.
             alone = evidence(factor, ranges[factor], NEAR_TOLERANCE, ()) if factor > 2 else 0.0
             if alone < min(sums[factor], evidence(2.0, HIGHEST_ORDER, NEAR_TOLERANCE, ())):
                 sums[factor] = alone
@@ -447,16 +448,16 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
         return None
     factor = _preferred(sums, usual, of_one_part)
     if factor < 1 and races:
-        # At a rate k times too high all lies at multiples of k orders, of which a whole k makes those of the shaft and
-        # the races as well. The shaft's other orders and a race's first ones tell: at the right rate they are there,
-        # and at the lower one nothing would be. Multiples of the shaft's order alone are blades or poles as well.
+        # At a rate k times too high all lines are at multiples of k orders, and a whole k gives those of the shaft and
+        # the races as well. The shaft's other orders and a race's first ones decide: at the right rate they are there,
+        # and at the lower one nothing would be. Multiples of the shaft's order alone may be blades or poles as well.
         sums[factor] = min(sums[factor], of_one_part(factor))
         of_races = sums[factor] - evidence(factor, ranges[factor], at=())
         left = _of_the_left(strong_to(ranges[factor]), factor, races)
         if of_races > ENOUGH_OF_EACH or left <= SHARE_OF_LEFT * sums[factor]:
             return None
-    # Where no race is described, one or another part may make impacts: that asks for no mistake, and its order may be
-    # near a fraction of the shaft's. So may one that nobody described beside the shaft's own orders.
+    # If no race is described, impacts of some part need no wrong rate as explanation, and its order may be near a
+    # fraction of the shaft's. The same holds for a part missing from the rig beside the shaft's own orders.
     if (not races or factor < 1) and has_unknown_part(ranges[factor], sums[factor] if races else AS_GOOD * best):
         return None
     for milder in sorted(f for f in factors if f in usual and 1 < f <= factor / FAR_APART):
@@ -466,18 +467,18 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
             break
     others = sorted((f for f in factors if f != factor and sums[f] <= NAMED_AS_WELL * best), key=lambda f: sums[f])
     # With all parts of all bearings nearly every order is some part's, and lines there say nothing: one race at a time
-    # says more. In a short record q times its order is a whole number, and all of its lines are then those of a shaft
-    # that turns q times slower as well.
+    # says more. In a short record q times its order is a whole number, and all of its lines are then also those of a
+    # shaft that turns q times slower.
     of_shafts = evidence(1.0, ranges[factor], at=())
     by_one_race = min((evidence(1.0, ranges[factor], at=[race]) for race in races), default=0.0)
-    # Where some race strikes nearly 18 times in five turns, or a cage turns twice, all lies at multiples of a fifth. Of
-    # a shaft that turns so slowly few lines would be the stated one's; of four times, also those of a motor's supply.
+    # If some race has nearly 18 impacts in five turns, or a cage two, all lines are at multiples of a fifth. Few lines
+    # of a shaft that turns so slowly would be the stated one's; of four times, also those of a motor's supply.
     by_shafts = factor > FEW_SHARED and of_shafts <= BY_ONE_RACE * sums[factor]
     by_race = factor > 1 and by_one_race - of_shafts <= ENOUGH_OF_EACH and by_one_race <= BY_ONE_RACE * sums[factor]
     if by_shafts or by_race:
         return None
     stated, explained, highest = evidence(1.0, ranges[factor]), sums[factor], ranges[factor]
-    # So does one race or element, which strikes twice a spin: the stated rate asks for no mistake.
+    # The same holds for one race or element, which strikes twice a spin: no error of the rate is needed.
     by_one_part = min((evidence(1.0, highest, CLOSE_TOLERANCE, at=[part]) for part in ones), default=0.0)
     stands = (factor < 1 and _turns_as_stated(signals)) or (
         (factor > 1 or not races)
@@ -500,10 +501,10 @@ def _by_lines(signals: AnalysisSignals, envelopes: Sequence[BandEnvelope]) -> Fi
 
 
 def _turns_as_stated(signals: AnalysisSignals) -> bool:
-    """Whether a channel moves most, as velocity, at the order of a shaft as it is stated.
+    """Whether the largest velocity of a channel is at the stated order of a shaft.
 
-    Were the rate too high or the speed too low by a factor, nothing would turn so slowly: blades have an unbalanced
-    wheel's line below their own.
+    If the rate were too high or the speed too low by a factor, nothing would turn so slowly: below the line of blades
+    there is the one of their unbalanced wheel.
     """
     for channel, excess in signals.order_excess.items():
         orders = excess.spectrum.positions
@@ -518,17 +519,17 @@ def _turns_as_stated(signals: AnalysisSignals) -> bool:
 
 
 def _preferred(sums: dict[float, float], usual: Sequence[float], of_one_part: Callable[[float], float]) -> float:
-    """Return the factor that explains most, and put into `sums` what one race tells at those near it.
+    """Return the factor that explains most, and lower `sums` by what one race explains at the factors near it.
 
-    A sum counts its places; but where q times a race's order is nearly a whole number, a shaft that turns q times
-    slower explains shaft and race together. So the smallest factor that explains nearly as much gives way only to one
-    that is less than `FAR_APART` times as large. One of the usual factors goes before ratios to common rates, which are
-    many, but a speed that is stated a little wrong before all. Of a rate that is too low one damaged race tells more
-    than all, whose places cover much of the range.
+    A sum includes all places; but if q times a race's order is nearly a whole number, a shaft that turns q times slower
+    explains shaft and race together. So the smallest factor that explains nearly as much yields only to one less than
+    `FAR_APART` times as large. The usual factors take precedence over ratios to common rates, which are many, and a
+    slightly wrong stated speed over both. For a rate that is too low, one damaged race says more than all races, whose
+    places cover much of the range.
     """
     as_good = [f for f in sums if sums[f] <= AS_GOOD * min(sums.values())]
     slight = [f for f in as_good if abs(f - 1) <= SLIGHT]
-    if slight and min(sums, key=lambda f: sums[f]) > 1:  # a slower shaft has the lines of one as stated, and more
+    if slight and min(sums, key=lambda f: sums[f]) > 1:  # a slower shaft has the stated shaft's lines and more
         return min(slight, key=lambda f: sums[f])
     as_good = [f for f in as_good if f in usual] or as_good
     near = [f for f in as_good if f < FAR_APART * min(as_good)]
@@ -547,8 +548,8 @@ def _of_the_left(strong: StrongSpectra, factor: float, races: Sequence[tuple[flo
 def _of_unknown_part(strong: StrongSpectra, factor: float = 1.0) -> float:
     """Return lg p of shafts and one part of unknown order, that of a strong line, at a factor times the stated rate.
 
-    Its impacts are as strong all along, or modulated by the shaft. Where impacts are of no known order and
-    nothing else shows, that is likelier than a rate that puts it on a shaft or a race.
+    Its impacts are constant in strength, or modulated by the shaft. If impacts are at no known order and nothing else
+    shows, this is more likely than a rate that puts them on a shaft or a race.
     """
     orders = sorted({round(float(order), 2) for x in strong.spectra for order in x.orders if order > 0.3})
     tried = [(factor * order, sideband) for order in orders for sideband in (0.0, *strong.shafts)]
@@ -559,7 +560,7 @@ def _of_unknown_part(strong: StrongSpectra, factor: float = 1.0) -> float:
 def _factors(stated_hz: float, *, with_parts: bool) -> tuple[list[float], list[float]]:
     """Return the factors to try: the usual ones, and those to common rates.
 
-    Halves of the shaft's order are looseness, and multiples blades or poles: races must tell these rates apart.
+    Half orders of the shaft mean looseness, multiples blades or poles: distinguishing these rates takes races.
     """
     usual = [f for factor in USUAL_FACTORS for f in (factor, 1 / factor) if with_parts or f > 2]
     common = [rate / stated_hz for rate in COMMON_RATES_HZ if with_parts and 0.2 <= rate / stated_hz <= 5.0]
@@ -567,7 +568,7 @@ def _factors(stated_hz: float, *, with_parts: bool) -> tuple[list[float], list[f
 
 
 def _apart(factors: Sequence[float]) -> list[float]:
-    """Return the first of those factors that the speed's tolerance makes one."""
+    """Return the first of the factors that are equal within the speed's tolerance."""
     apart: list[float] = []
     for factor in factors:
         if all(abs(factor / other - 1) > STATED_SPEED_TOLERANCE for other in apart):
@@ -576,10 +577,10 @@ def _apart(factors: Sequence[float]) -> list[float]:
 
 
 def _parts(signals: AnalysisSignals, *, with_elements: bool) -> Iterator[tuple[float, float]]:
-    """Yield the order of each part of a bearing, and that of what modulates its impacts: the shaft, or the cage.
+    """Yield the order of each bearing part, and of what modulates its impacts: the shaft, or the cage.
 
-    An element passes the load once a turn of the cage. Elements and cage speak for the stated rate only: n elements
-    pass an outer race, so that all lines of one would be the cage's at 1/n of the rate.
+    An element passes the load once per turn of the cage. Elements and cage may support only the stated rate: n elements
+    pass an outer race, so that all of its lines would be the cage's at 1/n of the rate.
     """
     for bearing in signals.rig.bearings:
         ratio = signals.rig.ratio(bearing.shaft)
