@@ -1,4 +1,4 @@
-"""A simulation beside a recording: aligned in angle, compared by order, band and angle. Names no cause."""
+"""A simulation compared with a recording: aligned in angle, by order, band and angle. Identifies no cause."""
 
 from gearsig.comparison._compare import ALIGN, compare
 from gearsig.comparison._lines import (

@@ -1,4 +1,4 @@
-"""A simulation beside a recording: the plain comparison, which names no cause."""
+"""A simulation compared with a recording, without identifying causes."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ HalvedSpectra = Mapping[str, tuple[Spectrum, Spectrum]]
 
 @dataclass(frozen=True)
 class _Shared:
-    """What all channels share; pairs and lists are of the simulation and of the recording."""
+    """What all channels share; pairs and lists are ordered simulation, recording."""
 
     rig: Rig
     ratios: dict[str, float]
@@ -89,22 +89,22 @@ def compare(
     channels: Sequence[tuple[str, str]] = (),
     align_by: str = "auto",
 ) -> Comparison:
-    """Compare a simulation with a recording by order, band and angle, without looking for the cause of what differs.
+    """Compare a simulation with a recording by order, band and angle, without looking for causes of differences.
 
-    Both are sampled over the angle of each shaft, so that they may differ in speed, sampling rate and length. Each
-    figure comes with its repeatability, from both halves of either record: what is smaller is noise.
+    Both are sampled over the angle of each shaft, so they may differ in speed, sampling rate and length. Each figure
+    comes with its repeatability, from the two halves of each record: smaller differences are noise.
 
     Parameters
     ----------
     simulated, recorded : Recording or PreparedRecording
-        With at least 8 revolutions of the reference shaft each. Two recordings, or two simulations, will do as well.
+        Each with at least 8 revolutions of the reference shaft. Two recordings, or two simulations, work as well.
     rig : Rig or None
-        The machine; default: the recording's own, else the simulation's.
+        The machine; default: the recording's, else the simulation's.
     channels : sequence of (str, str)
         (simulated, recorded) names; default: equal names, or the only vibration channel of each.
     align_by : str
-        "marks": angle 0 is the same tooth in both; "correlation": the simulation's averages are turned to where they
-        fit best; "auto": by marks for shafts that have one in both records.
+        "marks": angle 0 is the same tooth in both; "correlation": the simulation's averages are turned to the best fit;
+        "auto": by marks for shafts that have one in both records.
 
     Returns
     -------
@@ -114,15 +114,14 @@ def compare(
     Raises
     ------
     InputError
-        If the channels cannot be paired, measure different things, or the gears differ.
+        If the channels cannot be paired, measure different quantities, or the gears differ.
     RefusalError
-        If a channel is dead, a speed cannot be known, a record is too short, or marks are asked for where there are
-        none.
+        If a channel is dead, a speed cannot be determined, a record is too short, or marks are requested but missing.
 
     Notes
     -----
-    Not a diagnosis: a difference has a size here, but no cause. Levels by frequency (third octaves) of records at
-    different speeds are levels of different orders; compare by order then.
+    This is not a diagnosis: differences have a size, but no cause. At different speeds, levels by frequency (third
+    octaves) are levels of different orders; compare by order then.
 
     References
     ----------
@@ -198,7 +197,7 @@ def _common_lines(sides: Sides, ratios: Mapping[str, float]) -> dict[str, tuple[
 
 def _order_spectra(halves: Sequence[tuple[AngleSignal, AngleSignal]], highest: float) -> list[HalvedSpectra]:
     """Return the order spectra of the halves of both sides, by channel, from blocks of equally many revolutions."""
-    # As many as the shortest half holds; lines 1/64 of an order apart tell slow shafts from the shaft's own orders.
+    # As many as the shortest half holds; lines 1/64 of an order apart separate slow shafts from the shaft's own orders.
     block = int(min(64, *(half.samples.shape[1] // half.samples_per_revolution for pair in halves for half in pair)))
     n = int(highest * block) + 1
 
@@ -268,7 +267,7 @@ def _compare_shaft(
     simulated, recorded = lines
     n_lines, teeth = simulated.first.shape[1], rig.teeth_on(shaft)
     every = slice(1, n_lines)
-    # Enough angles for the highest order, and some more, so that the average's peaks are drawn as they are.
+    # Enough angles for the highest order, and some more, so that the average's peaks are drawn correctly.
     n_angles = int(next_fast_len(max(4 * n_lines, 360), real=True) // 2 * 2)
     return ShaftComparison(
         shaft=shaft,
@@ -301,10 +300,10 @@ def _average(lines: HalvedLines, i: int, n_angles: int, shaft: str, channel: str
 
 
 def _coherent_share(shared: _Shared, side: int, i: int, totals: FloatArray) -> RepeatableValue:
-    """Return the share of energy that both halves have in common, line by line: Σ Re(a b*) over the mean square.
+    """Return the share of energy common to both halves, line by line: Σ Re(a b*) over the mean square.
 
-    The noise of one half has nothing to do with that of the other, and adds nothing. An order of several shafts
-    counts once.
+    The noise of one half is independent of the other's, and adds nothing. An order shared by several shafts counts
+    once.
     """
     counted: set[float] = set()
     powers = np.zeros(3)

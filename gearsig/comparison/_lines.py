@@ -1,4 +1,4 @@
-"""Lines of both records side by side: those of a shaft's averages, those that kinematics give, and all others."""
+"""Corresponding lines of both records: those of a shaft's averages, those that kinematics give, and all others."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ class HalvedLines:
     Parameters
     ----------
     first, second : complex array, (n_channels, n_orders)
-        Of the halves.
+        Of the two halves.
     n_revolutions : int
-        In both together.
+        Of both halves together.
     """
 
     first: ComplexArray
@@ -49,7 +49,7 @@ class HalvedLines:
 
     @property
     def whole(self) -> ComplexArray:
-        """Of the whole record: the mean of its halves."""
+        """Lines of the whole record: the mean of its halves."""
         return 0.5 * (self.first + self.second)
 
     def turned(self, shift_rev: float) -> HalvedLines:
@@ -63,11 +63,11 @@ class HalvedLines:
     def noise(self) -> FloatArray:
         """Return the standard error of `whole`, rms over both quadratures, (n_channels, n_orders).
 
-        |a - b|/2 of the halves' amplitudes, or its rms over neighbouring lines where that is larger.
+        |a - b|/2 of the halves' amplitudes, or its rms over neighbouring lines if that is larger.
         """
         square = 0.25 * np.abs(self.first - self.second) ** 2
-        square[:, 0] = square[:, 1]  # a sensor's drift is no measure of what surrounds the shaft's lines
-        reach = 4  # nine lines: one line's own scatter of two halves says little
+        square[:, 0] = square[:, 1]  # a sensor's drift does not represent the noise around the shaft's lines
+        reach = 4  # nine lines: the scatter of one line between two halves says little
         padded = np.pad(square, ((0, 0), (reach, reach)), mode="reflect" if square.shape[1] > reach else "edge")
         kernel = np.ones(9) / 9
         smooth = np.stack([np.convolve(row, kernel, mode="valid") for row in padded])
@@ -78,8 +78,8 @@ class HalvedLines:
 def halved_lines(halves: Sequence[AngleSignal]) -> HalvedLines:
     """Return the lines of the averages of two halves, their revolutions weighted by a Hann window.
 
-    Another shaft's order that lies near a whole one leaks less by it: a comparison of records of different lengths
-    compares lines, not leakage.
+    The window reduces leakage from another shaft's order near a whole one, so that records of different lengths are
+    compared by their lines, not by leakage.
     """
     first, second = (average_lines(half, weighting="hann", scaling="amplitude rms") for half in halves)
     return HalvedLines(first.whole, second.whole, int(first.n_revolutions.sum() + second.n_revolutions.sum()))
@@ -93,10 +93,10 @@ def waveform(lines: ComplexArray, n_angles: int) -> FloatArray:
 def align(
     shaft: str, simulated: HalvedLines, recorded: HalvedLines, n_teeth: int | None, *, by_marks: bool
 ) -> Alignment:
-    """Return the shift of the simulation's average with the largest correlation, or none where marks are trusted.
+    """Return the shift of the simulation's average with the largest correlation, or none if marks are trusted.
 
-    ρ(s) = Σ_c Re Σ_n Y_c[n] X_c*[n] e^{2πi n s} / (|X_c| |Y_c|) / n_channels, with the lines X of the simulation
-    and Y of the recording, all channels c together: the same shaft turns under all sensors.
+    ρ(s) = Σ_c Re Σ_n Y_c[n] X_c*[n] e^{2πi n s} / (|X_c| |Y_c|) / n_channels, with the lines X of the simulation and Y
+    of the recording, all channels c together, since the same shaft turns under all sensors.
 
     Parameters
     ----------
@@ -104,9 +104,9 @@ def align(
     simulated, recorded : HalvedLines
         Up to the same order.
     n_teeth : int or None
-        To tell whether the shift is certain to the tooth.
+        For deciding whether the shift is certain to the tooth.
     by_marks : bool
-        Whether to leave the simulation as it is: both count from a mark.
+        Whether to leave the simulation as it is, because both count from a mark.
     """
     x, y = simulated.whole, recorded.whole
     cross = _cross_spectrum(x, y)
@@ -124,7 +124,7 @@ def align(
 
 
 def _cross_spectrum(x: ComplexArray, y: ComplexArray) -> ComplexArray:
-    """Cross spectrum, each channel over its own size, mean over the channels; the mean value counts for nothing."""
+    """Return the cross spectrum, each channel normalised, averaged over the channels, without the mean value."""
     product = y * np.conj(x)
     product[:, 0] = 0.0
     size = np.sqrt(np.sum(np.abs(x[:, 1:]) ** 2, axis=1) * np.sum(np.abs(y[:, 1:]) ** 2, axis=1))
@@ -139,9 +139,9 @@ def _angle_distance_rev(a: float, b: float) -> float:
 
 
 def _is_certain(x: ComplexArray, y: ComplexArray, best: float, shifts: list[float], n_teeth: int) -> bool:
-    """Say whether all halves choose the same tooth, and what differs from tooth to tooth is alike in both records.
+    """Return whether all halves give the same tooth, and differences between teeth are alike in both records.
 
-    The mesh harmonics are left out of the second test: they say nothing of which tooth is which.
+    The mesh harmonics are left out of the second test, as they do not distinguish teeth.
     """
     if max(_angle_distance_rev(best, shift) for shift in shifts) >= 0.5 / n_teeth:
         return False
@@ -149,7 +149,7 @@ def _is_certain(x: ComplexArray, y: ComplexArray, best: float, shifts: list[floa
     alike = shift_scores(
         _cross_spectrum(np.where(is_beside_mesh, x, 0.0), np.where(is_beside_mesh, y, 0.0)), np.array([best])
     )[0]
-    return bool(alike > 0.5)  # patterns of different gears reach 0.3 to 0.4 at the best of all teeth
+    return bool(alike > 0.5)  # patterns of different gears reach 0.3 to 0.4 at the best tooth
 
 
 Figure = Callable[[ComplexArray, ComplexArray], float]
@@ -158,12 +158,12 @@ Figure = Callable[[ComplexArray, ComplexArray], float]
 def frac(x: ComplexArray | FloatArray, y: ComplexArray | FloatArray) -> float:
     """Return the frequency response assurance criterion of two sets of lines, here of order lines.
 
-    FRAC = |Σ x y*|² / (Σ|x|² Σ|y|²): 1 where one is a multiple of the other, whatever the (complex) factor.
+    FRAC = |Σ x y*|² / (Σ|x|² Σ|y|²): 1 if one is a multiple of the other, for any (complex) factor.
 
-    Two runs of a machine have no coherence in its usual sense: their noise has nothing in common, and only what turns
-    with the shaft repeats from one to the other. Taken over the lines of two synchronous averages that were aligned in
-    angle, FRAC is what coherence would be: the share of energy that one complex factor carries from one to the other.
-    Of magnitudes instead of complex lines, it does without the alignment, and without the phases of the path.
+    Two runs of a machine have no coherence in the usual sense: their noise is independent, and only what is locked to
+    the shaft repeats. Over the lines of two synchronous averages aligned in angle, FRAC takes the place of coherence:
+    it is the share of energy that one complex factor maps from one to the other. With magnitudes instead of complex
+    lines, it needs no alignment, and ignores the phases of the path.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ def frac(x: ComplexArray | FloatArray, y: ComplexArray | FloatArray) -> float:
     Returns
     -------
     float
-        0 to 1; 0 where one has no energy.
+        0 to 1; 0 if one has no energy.
 
     Raises
     ------
@@ -228,7 +228,7 @@ def agreement(simulated: HalvedLines, recorded: HalvedLines, channel: int, part:
 
 
 def reliability(lines: HalvedLines, channel: int) -> float:
-    """Return how well an average repeats itself: r = 2ρ/(1 + ρ) with the correlation ρ of its halves, at least 0.
+    """Return how well an average repeats: r = 2ρ/(1 + ρ) with the correlation ρ of its halves, at least 0.
 
     References
     ----------
@@ -260,19 +260,19 @@ def tooth_powers(values: FloatArray, n_teeth: int) -> FloatArray:
 
 
 # --------------------
-# Levels of the lines that the machine's kinematics give, and of those that belong to nothing it does.
+# Levels of the lines that the machine's kinematics give, and of those that belong to none of its parts.
 # --------------------
 
 
 OTHER_OVER_FLOOR_DB = 15.0
-"""A line that belongs to nothing must stand out so far: noise does so in one line of 10¹³."""
+"""Height at which an unexplained line must stand out: noise does so in one line of 10¹³."""
 _PRIORITY = {"mesh": 0, "shaft": 1, "sideband": 2}
 
 
 def line_levels(
     rig: Rig, reference: str, lines: Mapping[str, tuple[HalvedLines, HalvedLines]], channel: int
 ) -> tuple[LineLevel, ...]:
-    """Return mesh harmonics, sidebands and shaft orders of one channel, by rising order; each order once."""
+    """Return mesh harmonics, sidebands and shaft orders of one channel, in ascending order; each order once."""
     levels: dict[float, LineLevel] = {}
     for line in sorted(expected_lines(rig, reference), key=lambda expected: _PRIORITY[expected.kind]):
         shaft, order = _shaft_of(line, rig, lines), round(line.order, 6)
@@ -293,7 +293,7 @@ def line_levels(
 
 
 def expected_lines(rig: Rig, reference: str) -> tuple[OrderLine, ...]:
-    """Return the lines that turn with the shafts; the reference shaft's harmonics alone where no gears are known."""
+    """Return the lines locked to the shafts; only the reference shaft's harmonics if no gears are known."""
     if not rig.shafts:
         name = reference or "shaft"
         return tuple(OrderLine(float(k), "shaft", f"{k}× {name}", name, k) for k in range(1, 13))
@@ -317,8 +317,8 @@ def _read(lines: HalvedLines, channel: int, n: int) -> tuple[float, float, bool]
     """Return level, its standard error, and whether the line is seen."""
     amplitudes, noise = np.abs(lines.whole[channel]), lines.noise()[channel, n]
     strongest = float(np.max(amplitudes[1:] ** 2, initial=0.0))
-    is_seen = bool(amplitudes[n] > 3.0 * noise)  # noise alone is so high in one line of 8000
-    # What is not seen is at most the noise: the level is a bound then.
+    is_seen = bool(amplitudes[n] > 3.0 * noise)  # noise alone is this high in one line of 8000
+    # A line that is not seen is at most as high as the noise: its level is then a bound.
     level_or_noise = amplitudes[n] if is_seen else max(amplitudes[n], noise)
     level = float(decibel(np.array([level_or_noise**2]), strongest)[0])
     return level, float(amplitude_error_db(np.array([level_or_noise]), np.array([noise]))[0]), is_seen
@@ -331,7 +331,7 @@ def other_lines(
     mesh_orders: Sequence[float],
     highest: float,
 ) -> tuple[LineLevel, ...]:
-    """Return the strongest lines of either record that are no whole order of any shaft, strongest first.
+    """Return the strongest lines of either record that are not a whole order of any shaft, strongest first.
 
     Parameters
     ----------
@@ -340,7 +340,7 @@ def other_lines(
     ratios, mesh_orders : sequences of float
         Orders of the shafts and the meshes.
     highest : float
-        Order up to which they are looked for.
+        Highest order examined.
     """
     places: dict[int, None] = {}
     for spectra in (recorded, simulated):
@@ -361,7 +361,7 @@ def other_lines(
 def _strongest(
     halves: Sequence[Spectrum], ratios: Sequence[float], mesh_orders: Sequence[float], highest: float
 ) -> list[int]:
-    """Return the strongest local maxima outside of the shafts' own lines that both halves show, at most five."""
+    """Return the strongest local maxima, at most five, that both halves show outside the shafts' own lines."""
     ratios_db, masked = [], None
     for half in halves:
         excess = lines_over_floor(half, noise_floor(half).values)
@@ -375,14 +375,14 @@ def _strongest(
     is_peak = np.r_[False, (inner >= power[:-2]) & (inner > power[2:]), False] & ~np.asarray(masked)
     is_peak &= np.min(ratios_db, axis=0) > OTHER_OVER_FLOOR_DB
     is_peak &= np.arange(len(power)) * halves[0].resolution <= highest
-    # A peak within one order of a line 20 dB stronger is that line's foot, smeared by a wandering speed.
+    # A peak within one order of a line 20 dB stronger is that line's foot, smeared by a varying speed.
     is_peak &= power > 0.01 * maximum_filter1d(power, 2 * round(1.0 / halves[0].resolution) + 1)
     lines = np.flatnonzero(is_peak)
     return [int(line) for line in lines[np.argsort(-power[lines])][:5]]
 
 
 def other_label(order: float, mesh_orders: Sequence[float]) -> str:
-    """Name a line by its order, and by its distance from the mesh harmonic that it may be a sideband of.
+    """Return a label with the line's order, and its distance from the mesh harmonic whose sideband it may be.
 
     Examples
     --------
@@ -400,7 +400,7 @@ def other_label(order: float, mesh_orders: Sequence[float]) -> str:
 def _other_level(
     label: str, order: float, line: int, simulated: Sequence[Spectrum], recorded: Sequence[Spectrum]
 ) -> LineLevel:
-    """Read both records at one order; a slightly other speed or slip may move the line by one."""
+    """Return both records' level at one order; a slight difference in speed or slip may shift the line by one."""
     levels, errors, are_seen = [], [], []
     for halves in (simulated, recorded):
         power = np.stack([half.values for half in halves])
@@ -450,13 +450,13 @@ def third_octaves(
     recorded: tuple[FloatArray, FloatArray],
     recorded_rate_hz: float,
 ) -> tuple[BandLevel, ...]:
-    """Return third-octave levels of one channel, from both halves of either record.
+    """Return third-octave levels of one channel, from the two halves of each record.
 
-    Power densities of equally long blocks are summed over each band; lines on an edge count by their share.
+    Power densities of equally long blocks are summed over each band; lines on an edge count proportionally.
     """
     shortest_s = min(len(simulated[0]) / simulated_rate_hz, len(recorded[0]) / recorded_rate_hz)
     block_s = min(4.0, shortest_s / 2.0)
-    # Four lines in the lowest band; above 45 % of the sampling rate anti-aliasing filters have taken over.
+    # Four lines in the lowest band; above 45 % of the sampling rate anti-aliasing filters dominate.
     lowest = 4 / block_s / (OCTAVE_RATIO ** (1 / 6) - OCTAVE_RATIO ** (-1 / 6))
     limits = third_octave_limits(lowest, 0.45 * min(simulated_rate_hz, recorded_rate_hz))
     if not limits:
@@ -473,7 +473,7 @@ def third_octaves(
 
 
 def band_powers(density: Spectrum, limits: Sequence[tuple[float, float]]) -> FloatArray:
-    """Return the mean square in each band of a power density; a line covers half a step to either side."""
+    """Return the mean square in each band of a power density; a line covers half a step on either side."""
     edges = np.concatenate([[0.0], density.positions + density.resolution / 2.0])
     total = np.concatenate([[0.0], np.cumsum(density.values * density.resolution)])
     powers: FloatArray = np.array([float(np.diff(np.interp(band, edges, total))[0]) for band in limits])
@@ -481,7 +481,7 @@ def band_powers(density: Spectrum, limits: Sequence[tuple[float, float]]) -> Flo
 
 
 def order_band_limits(mesh_order: float | None, name: str, highest: float) -> tuple[tuple[str, float, float], ...]:
-    """Return (label, low, high): bands of one mesh order around its harmonics; ten equal bands without a mesh."""
+    """Return (label, low, high) of bands one mesh order wide around its harmonics; ten equal bands without a mesh."""
     if mesh_order is not None and 1.5 * mesh_order <= highest:
         n = min(int(highest / mesh_order - 0.5), 10)
         around = [(f"around {k}× mesh {name}".rstrip(), (k - 0.5) * mesh_order) for k in range(1, n + 1)]
@@ -497,7 +497,7 @@ def order_bands(
     lines: tuple[HalvedLines, HalvedLines],
     channel: int,
 ) -> tuple[BandLevel, ...]:
-    """Return levels of bands over order, and how alike the reference shaft's lines in each are.
+    """Return levels of bands over order, and the agreement of the reference shaft's lines in each.
 
     Parameters
     ----------

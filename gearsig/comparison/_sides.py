@@ -1,4 +1,4 @@
-"""One record made ready: its shafts' angles, its channels over them, and both halves of whole revolutions."""
+"""One record prepared for comparison: its shafts' angles, its channels over them, and both halves of revolutions."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from gearsig.recording import SI_FACTORS, Channel, Recording, si_factor
 from gearsig.rig import ConstantSpeed, PulseTimes, Rig, SpeedSource
 
 MIN_REVOLUTIONS = 8
-"""Of a shaft: four in each half. Fewer leave other shafts' orders in its average, and say nothing of scatter."""
+"""Of a shaft: four in each half. Fewer leave other shafts' orders in its average, and give no measure of scatter."""
 
 
 SIMULATION_OPTIONS = {"--fs": "--sim-fs", "--speed-rpm": "--sim-speed-rpm", "--rig": "--sim-rig"}
-"""Options of the command line → those that state the same of the simulation."""
+"""Options of the command line → the corresponding options of the simulation."""
 
 
 @dataclass(frozen=True)
 class ComparedSide:
-    """One record.
+    """One record of a comparison.
 
     Parameters
     ----------
     recording : Recording
-        Of the compared channels only, in the common unit.
+        Only the compared channels, in the common unit.
     angle : ShaftAngle
-        Of the shaft that the result counts orders of.
+        Of the shaft to which the result's orders refer.
     signals : mapping
         Shaft (as in the recording's rig) → its signals of the first and of the second half.
     marked : frozenset of str
@@ -59,18 +59,18 @@ def make_side(
     prepared : PreparedRecording
         With the rig of this side.
     channels : mapping
-        Name → factor that turns its values into the unit of the comparison.
+        Name → factor that converts its values to the unit of the comparison.
     names : mapping
-        Shaft as the result calls it → as this side's rig calls it.
+        Name of the shaft in the result → name in this side's rig.
     ratios : mapping
-        Shaft as the result calls it → its revolutions per revolution of the first one.
+        Name of the shaft in the result → its revolutions per revolution of the first one.
     side_name : str
         "simulation" or "recording".
 
     Raises
     ------
     RefusalError
-        If the speed cannot be known, or the reference shaft makes too few turns.
+        If the speed cannot be determined, or the reference shaft makes too few revolutions.
     """
     recording, rig = prepared.recording, prepared.rig
     reference = next(iter(ratios))
@@ -107,7 +107,7 @@ def make_side(
 
 
 def _reference_ratio(prepared: PreparedRecording, shaft: str, side_name: str) -> float:
-    """Return revolutions of the shaft that the result counts orders of, per revolution of this side's reference."""
+    """Return the revolutions of the shaft to which orders refer, per revolution of this side's reference shaft."""
     try:
         with options_named(SIMULATION_OPTIONS if side_name == "simulation" else {}):
             angle = prepared.followed_angle
@@ -153,14 +153,14 @@ def time_halves(recording: Recording, row: int) -> tuple[FloatArray, FloatArray]
 
 @dataclass(frozen=True)
 class ChannelPair:
-    """Two channels that measure the same.
+    """Two channels that measure the same quantity.
 
     Parameters
     ----------
     simulated, recorded : str
     quantity : str
     unit : str
-        The recording's; empty where either is not known.
+        The recording's unit; empty if either is unknown.
     factor : float
         The simulation's values times this are in `unit`.
     levels_compare : bool
@@ -178,12 +178,12 @@ class ChannelPair:
 def pair_channels(
     simulated: Recording, recorded: Recording, channels: Sequence[tuple[str, str]] = ()
 ) -> tuple[ChannelPair, ...]:
-    """Return the channels that are compared: those named, else those of equal names, else the only one of each.
+    """Return the channels to compare: those named, else those with equal names, else the only one of each.
 
     Raises
     ------
     InputError
-        If it is not clear which belong together, or two measure different things.
+        If it is unclear which belong together, or two measure different quantities.
     """
     for place, pair in enumerate(listed(channels, "channels", tuple | list)):
         if len(listed(pair, f"channels[{place}]", str)) != 2:
@@ -253,7 +253,7 @@ def _factor(unit: str, target_unit: str, quantity: str) -> float | None:
 
 
 def check_live(side: PreparedRecording, channels: Sequence[str], side_name: str) -> tuple[str, ...]:
-    """Refuse dead channels, whose level is that of nothing; return what is wrong with the others.
+    """Refuse dead channels, whose level means nothing; return the problems of the others as texts.
 
     Raises
     ------
@@ -274,19 +274,19 @@ def common_machine(
 ) -> tuple[Rig, Rig, dict[str, str], list[str]]:
     """Return the rigs of both sides after checking that they have the same gears.
 
-    A side without a rig takes the other's gears, but not its sensors and its tachometer: those belong to a measurement.
-    A simulation that states no speed takes the rig's, where that is constant.
+    A side without a rig takes the other's gears, but not its sensors and tachometer, which belong to a measurement. A
+    simulation that states no speed takes the rig's, if that is constant.
 
     Returns
     -------
     (Rig, Rig, dict, list of str)
-        The simulation's, and the recording's, which orders are counted by, empty where nothing is known; the shafts'
-        names in the first by those in the second; what is to be said of it.
+        The rigs of the simulation and of the recording, whose orders are used, empty if nothing is known; the shafts'
+        names in the first by those in the second; notes for the reader.
 
     Raises
     ------
     InputError
-        If the teeth differ, or the shafts of two rigs cannot be told to be the same.
+        If the teeth differ, or it is unclear which shafts of the two rigs are the same.
     """
     notes: list[str] = []
     simulated_rig = simulated.rig if simulated.rig is not None and simulated.rig.shafts else None
@@ -310,20 +310,20 @@ def common_machine(
 
 
 def gears_only(rig: Rig, speed: SpeedSource | None = None) -> Rig:
-    """Return what a rig says of the machine, without its measurement; with another speed source."""
+    """Return a rig's machine data, without its measurement; with another speed source."""
     if speed is not None and speed.shaft and speed.shaft not in rig.shaft_names:
         speed = None
     return replace(rig, sensors=(), speed=speed, sampling_rate_hz=None)
 
 
 def for_simulation(rig: Rig, speed: SpeedSource | None = None) -> Rig:
-    """Return what the recording's rig says of a simulation without a rig of its own."""
+    """Return the part of the recording's rig that applies to a simulation without a rig of its own."""
     stated = rig.speed if isinstance(rig.speed, ConstantSpeed) else None
     return gears_only(rig, speed if speed is not None else stated)
 
 
 def usable_speed(rig: Rig, recording: Recording) -> SpeedSource | None:
-    """Return a rig's speed source if the recording has what it names: a constant speed, or a channel."""
+    """Return a rig's speed source if the recording has what it needs: nothing for a constant speed, or a channel."""
     source = rig.speed
     if source is None or isinstance(source, ConstantSpeed):
         return source

@@ -1,4 +1,4 @@
-"""Results of a comparison of a simulation with a recording: levels, agreement, how well each figure repeats."""
+"""Results of a comparison of a simulation with a recording: levels, agreement, and repeatability of each figure."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from gearsig.results import Result, verdict_html
 from gearsig.spectra import Spectrum
 
 BEYOND = 2.0
-"""A difference counts where it exceeds so many times its repeatability."""
+"""A difference counts if it exceeds its repeatability by this factor."""
 
 BETTER_TURNED = 0.1
-"""Gain of correlation from which marks are doubted: a simulation's need not sit where the rig's does."""
+"""Gain of correlation above which marks are questioned: a simulation's need not be where the rig's is."""
 
 LineKind = Literal["mesh", "sideband", "shaft", "other"]
 AlignmentMethod = Literal["marks", "correlation"]
@@ -24,13 +24,13 @@ AlignmentMethod = Literal["marks", "correlation"]
 
 @dataclass(frozen=True)
 class RepeatableValue:
-    """A figure, and how well it repeats.
+    """A figure and its repeatability.
 
     Parameters
     ----------
     value : float
     repeatability : float
-        Standard error that follows from the first half of each record against its second half.
+        Standard error, estimated from the first half of each record against its second half.
     """
 
     value: float
@@ -45,7 +45,7 @@ class LevelPair:
     ----------
     simulated_db, recorded_db : float
     repeatability_db : float
-        Of the difference: standard errors of both, from their halves, added as squares.
+        Of the difference: the standard errors of both, from their halves, added as squares.
     """
 
     simulated_db: float
@@ -54,12 +54,12 @@ class LevelPair:
 
     @property
     def difference_db(self) -> float:
-        """Simulated less recorded: negative where the simulation is too weak."""
+        """Simulated minus recorded level; negative if the simulation is too weak."""
         return self.simulated_db - self.recorded_db
 
     @property
     def is_beyond(self) -> bool:
-        """Whether the difference is larger than the records' own scatter explains."""
+        """Whether the difference is larger than the records' scatter explains."""
         return abs(self.difference_db) > BEYOND * self.repeatability_db
 
 
@@ -72,15 +72,15 @@ class LineLevel:
     label : str
         E.g. "2× mesh stage 1".
     kind : str
-        "mesh", "sideband", "shaft"; "other": a line that belongs to no shaft and no mesh.
+        "mesh", "sideband" or "shaft"; "other": a line that belongs to no shaft and no mesh.
     order : float
         Of the reference shaft.
     shaft : str
-        Whose synchronous average it was read from; empty for other lines.
+        Shaft whose synchronous average it was read from; empty for other lines.
     level : LevelPair
         A line that is not seen has the level of the noise that would hide it.
     simulated_is_seen, recorded_is_seen : bool
-        Whether it stands above the record's own noise.
+        Whether it stands above that record's noise.
     """
 
     label: str
@@ -99,16 +99,16 @@ class LineLevel:
 
 @dataclass(frozen=True)
 class Agreement:
-    """How alike two sets of order lines are, whatever their gain.
+    """Similarity of two sets of order lines, for any gain.
 
     Parameters
     ----------
     complex_frac : RepeatableValue
         FRAC of the aligned complex lines, 0 to 1.
     magnitude_frac : RepeatableValue
-        FRAC of their magnitudes; spectra that have nothing to do with each other still reach about 0.6.
+        FRAC of their magnitudes; even unrelated spectra reach about 0.6.
     complex_by_chance : float
-        Mean of the complex FRAC over all alignments: what one line that outweighs all others gives for nothing.
+        Mean of the complex FRAC over all alignments: the value that a single dominant line gives without similarity.
     n_lines : int
     """
 
@@ -131,9 +131,9 @@ class BandLevel:
     axis : str
         "frequency" or "order".
     level : LevelPair
-        Of everything in the band, noise included.
+        Of everything in the band, including noise.
     agreement : Agreement or None
-        Of the lines in the band that turn with the reference shaft; None for bands over frequency, or without lines.
+        Of the band's lines that are locked to the reference shaft; None for bands over frequency, or without lines.
     """
 
     label: str
@@ -146,7 +146,7 @@ class BandLevel:
 
 @dataclass(frozen=True)
 class Alignment:
-    """How the simulation was turned so that the same angles meet.
+    """How the simulation was turned so that the same angles coincide.
 
     Parameters
     ----------
@@ -154,16 +154,16 @@ class Alignment:
     method : str
         "marks": both count from a mark on this shaft; "correlation": the shift with the largest correlation.
     shift_deg : float
-        The simulation was turned forward by so much, -180 to 180.
+        Angle by which the simulation was turned forward, -180 to 180.
     repeatability_deg : float
         From the halves of the records; 0 for marks.
     tooth_is_certain : bool or None
-        Whether the halves agree on the tooth, and what differs from tooth to tooth is alike in both; None where the
-        teeth are not known.
+        Whether the halves agree on the tooth, and differences between teeth are alike in both; None if the teeth are
+        not known.
     best_shift_deg : float
-        Beyond `shift_deg`, the shift that would raise the correlation most.
+        Shift in addition to `shift_deg` that would raise the correlation most.
     gain : float
-        By how much the correlation would rise there: the simulation's mark may sit elsewhere than the rig's.
+        Increase of the correlation at that shift: the simulation's mark may be elsewhere than the rig's.
     """
 
     shaft: str
@@ -176,7 +176,7 @@ class Alignment:
 
     @property
     def is_doubted(self) -> bool:
-        """Whether what lies at one angle may be different teeth in both records."""
+        """Whether the same angle may be different teeth in the two records."""
         return self.gain > BETTER_TURNED if self.method == "marks" else self.tooth_is_certain is False
 
 
@@ -188,18 +188,18 @@ class ShaftComparison:
     ----------
     shaft : str
     n_teeth : int or None
-        Of the gear that `tooth_levels` count; the first one's, where there are several.
+        Of the gear to which `tooth_levels` refer; the first one's, if there are several.
     simulated, recorded : SynchronousAverage
         At the same angles, both up to the same order, without their mean.
     correlation : RepeatableValue
         Of the two, -1 to 1.
     simulated_reliability, recorded_reliability : float
-        How well each average repeats itself: 1 is exactly, 0 is noise. Their geometric mean is the highest correlation
-        that two noisy averages of the same motion reach.
+        How well each average repeats: 1 is exactly, 0 is noise. Their geometric mean is the highest correlation that
+        two noisy averages of the same motion can reach.
     agreement : Agreement
         Over all lines.
     tooth_levels : tuple of LevelPair
-        Of each tooth pitch from shaft angle 0 on; empty where the teeth are not known.
+        Of each tooth pitch, starting at shaft angle 0; empty if the teeth are not known.
     """
 
     shaft: str
@@ -214,7 +214,7 @@ class ShaftComparison:
 
     @property
     def best_correlation(self) -> float:
-        """The highest correlation that two such averages of the same motion reach."""
+        """The highest correlation that two such averages of the same motion can reach."""
         return float(np.sqrt(self.simulated_reliability * self.recorded_reliability))
 
 
@@ -228,25 +228,25 @@ class Locked:
 
 @dataclass(frozen=True)
 class ChannelComparison(Result, rows="lines"):
-    """One channel of the simulation beside one of the recording.
+    """One channel of the simulation compared with one of the recording.
 
     Parameters
     ----------
     simulated_name, recorded_name : str
     quantity, unit : str
-        Both in the recording's unit; empty where it is not known.
+        Of both, in the recording's unit; empty if unknown.
     levels_compare : bool
-        Whether both units are known, so that level differences mean something; shapes compare in any case.
+        Whether both units are known, so that level differences are meaningful; shapes compare in any case.
     simulated_spectrum, recorded_spectrum : Spectrum
-        Over order, rms amplitudes, from blocks of equally many revolutions.
+        Rms amplitudes over order, from blocks of equally many revolutions.
     lines : tuple of LineLevel
-        Shaft orders, mesh harmonics, sidebands; by rising order.
+        Shaft orders, mesh harmonics and sidebands, in ascending order.
     other_lines : tuple of LineLevel
         The strongest ones that belong to no shaft, strongest first.
     order_bands, third_octaves : tuple of BandLevel
     shafts : tuple of ShaftComparison
     overall : LevelPair
-        Of all orders that both records hold.
+        Of all orders that both records contain.
     locked : Locked
         To any of the shafts.
     """
@@ -275,7 +275,7 @@ class ChannelComparison(Result, rows="lines"):
 
 @dataclass(frozen=True)
 class RecordFacts:
-    """Where one side comes from, and how it turns.
+    """Source, speed and length of one side's record.
 
     Parameters
     ----------
@@ -288,7 +288,7 @@ class RecordFacts:
     speed_method : str
         See `ShaftAngle.method`.
     notes : tuple of str
-        Of the reader and of the search for the speed.
+        From the reader and from the determination of the speed.
     """
 
     source: str
@@ -304,28 +304,28 @@ class RecordFacts:
 
 @dataclass(frozen=True)
 class Comparison(Result, rows="channels"):
-    """A simulation beside a recording.
+    """A simulation compared with a recording.
 
     Parameters
     ----------
     simulated, recorded : RecordFacts
     machine : str
-        Name of the rig; empty where none is known.
+        Name of the rig; empty if unknown.
     reference_shaft : str
-        That orders are counted on.
+        Shaft to which orders refer.
     mesh_orders : tuple of float
         Of the reference shaft, one per pair whose teeth are known.
     highest_order : float
-        Up to which both records hold.
+        Highest order that both records contain.
     alignments : tuple of Alignment
         One per shaft.
     channels : tuple of ChannelComparison
     notes : tuple of str
-        What the reader should know before believing a figure.
+        What the reader should know before relying on a figure.
     verdict : str
-        What differs most beyond the records' scatter, per channel.
+        The largest differences beyond the records' scatter, per channel.
     findings : tuple of str
-        Lines that only one side has, shapes of the averages, energy that turns with the shafts.
+        On lines that only one side has, shapes of the averages, and energy locked to the shafts.
     """
 
     simulated: RecordFacts
@@ -346,11 +346,11 @@ class Comparison(Result, rows="channels"):
 
 
 DEEPEST_DB = 160.0
-"""Below the strongest level of a channel, nothing is told apart: that is rounding."""
+"""Levels this far below a channel's strongest are rounding errors and not distinguished."""
 
 
 def decibel(power: FloatArray, strongest: float) -> FloatArray:
-    """Return 10 lg of mean squares, none more than `DEEPEST_DB` below the strongest."""
+    """Return 10 lg of mean squares, limited to `DEEPEST_DB` below the strongest."""
     smallest = max(strongest * 10.0 ** (-DEEPEST_DB / 10.0), 1e-300)
     levels: FloatArray = 10.0 * np.log10(np.maximum(power, smallest))
     return levels
@@ -359,8 +359,8 @@ def decibel(power: FloatArray, strongest: float) -> FloatArray:
 def power_levels(simulated: FloatArray, recorded: FloatArray, *, smooth: int = 5) -> tuple[LevelPair, ...]:
     """Return levels of mean squares, each (2, n): of the first and of the second half.
 
-    The level's standard error is half the difference between the halves; or its rms over `smooth` neighbours,
-    where that is larger: two halves agree by chance now and then.
+    The level's standard error is half the difference between the halves, or its rms over `smooth` neighbours if that is
+    larger, since two halves occasionally agree by chance.
     """
     levels_of_sides = []
     for power in (simulated, recorded):

@@ -1,7 +1,7 @@
 """The verdict of a comparison: differences beyond the scatter of both records, largest first, in a few sentences.
 
-Lines and teeth are ranked by one measure, the part of the vibration's mean square by which they differ: that of a
-revolution is the sum over its lines as it is over its teeth.
+Lines and teeth are ranked by one measure, the part of the vibration's mean square by which they differ: the mean square
+of a revolution is the sum over its lines, and also over its teeth.
 """
 
 from __future__ import annotations
@@ -16,19 +16,19 @@ from gearsig.comparison._types import BEYOND, Alignment, ChannelComparison, Leve
 from gearsig.formatting import counted, enumerated, percent, plus_minus, signed
 
 MIN_REPEATED = 0.3
-"""Correlation that two averages could reach, below which they say nothing of each other: their halves differ."""
+"""Correlation that two averages could reach, below which they cannot be compared because their halves differ."""
 
 WITHIN_DB = 3.0
 """Levels this close are called agreement: a factor of √2."""
 
 CHANCE = 0.05
-"""That of all lines, or of all teeth, which are looked at any one exceeds its scatter by accident."""
+"""Probability that any one of the lines, or of the teeth, exceeds its scatter by accident."""
 
 FREEDOM = 16
 """Degrees of freedom of a scatter: of two halves over nine lines, in two quadratures that are not quite independent."""
 
 WORTH_DB = 0.5
-"""Smaller differences are not worth a word: one record of a machine against another at 6 % more load."""
+"""Smaller differences are not reported: one record of a machine against another at 6 % more load."""
 
 WORTH_CORRELATION = 0.01
 
@@ -43,16 +43,16 @@ class ToothDifference:
     tooth : int
         From 1 at angle 0.
     angle_deg : float
-        Of its middle.
+        Of its centre.
     level : LevelPair
     off_db : float
-        Its difference; less the median of all teeth where that is worth a word.
+        Its difference, minus the median of all teeth if that is worth reporting.
     is_beside_others : bool
-        Whether the median is taken off.
+        Whether the median is subtracted.
     is_marked : bool
         Whether angle 0 is a mark of both records.
     power : float
-        By which the averages' mean squares over the revolution differ there.
+        The tooth's part of the difference between the averages' mean squares over the revolution.
     """
 
     shaft: str
@@ -66,15 +66,15 @@ class ToothDifference:
 
     @property
     def place(self) -> str:
-        """Name it by shaft, angle and, where it counts from a mark, number."""
+        """Shaft, angle and, if it counts from a mark, number of the tooth, in words."""
         of = f" of {self.shaft}" if self.shaft else ""
         return f"tooth {self.tooth}{of} ({self.angle_deg:.0f}°)" if self.is_marked else f"{self.angle_deg:.0f}°{of}"
 
 
 def times_scatter(n: int) -> float:
-    """Return by how many standard errors one of `n` figures must differ to be no accident.
+    """Return by how many standard errors one of `n` figures must differ not to be an accident.
 
-    Quantile of Student's t at `CHANCE` / n (Bonferroni), and never less than `BEYOND`.
+    Quantile of Student's t at `CHANCE` / n (Bonferroni), but at least `BEYOND`.
 
     Examples
     --------
@@ -87,14 +87,14 @@ def times_scatter(n: int) -> float:
 
 
 def is_hidden(line: LineLevel) -> bool:
-    """Whether the record that does not show a line would not show it either if it were there."""
+    """Return whether the record that does not show a line could not show it even if it were there."""
     difference_db = line.level.difference_db
     # 6 dB: a line half as large would be seen above the other record's noise.
     return (difference_db if line.simulated_is_seen else -difference_db) <= 6.0
 
 
 def mesh_lines(channel: ChannelComparison) -> tuple[LineLevel, ...]:
-    """Return the mesh harmonics that the recording shows; the shaft orders where it shows none."""
+    """Return the mesh harmonics that the recording shows, or the shaft orders if it shows none."""
     for kind in ("mesh", "shaft"):
         lines = tuple(line for line in channel.lines if line.kind == kind and line.recorded_is_seen)
         if lines:
@@ -103,14 +103,14 @@ def mesh_lines(channel: ChannelComparison) -> tuple[LineLevel, ...]:
 
 
 def further_lines(channel: ChannelComparison) -> tuple[LineLevel, ...]:
-    """Return the lines beside the mesh harmonics that can be compared: one of both shows them, and none hides them."""
+    """Return the comparable lines beside the mesh harmonics: at least one record shows them, and none hides them."""
     mesh = mesh_lines(channel)
     lines = (line for line in (*channel.lines, *channel.other_lines) if line.is_seen and line not in mesh)
     return tuple(line for line in lines if (line.simulated_is_seen and line.recorded_is_seen) or not is_hidden(line))
 
 
 def differing_lines(channel: ChannelComparison) -> tuple[LineLevel, ...]:
-    """Return the further lines whose difference is no accident and not the mesh harmonics' own, largest first."""
+    """Return the further lines whose difference is neither an accident nor the mesh harmonics' own, largest first."""
     lines, gain_db = further_lines(channel), common_gain_db(channel)
     needed = times_scatter(len(lines))
     differing = [
@@ -122,18 +122,18 @@ def differing_lines(channel: ChannelComparison) -> tuple[LineLevel, ...]:
 
 
 def common_gain_db(channel: ChannelComparison) -> float:
-    """Return the mesh harmonics' median difference where it is no agreement, or the levels do not compare; else 0."""
+    """Return the mesh harmonics' median difference in dB if it is no agreement, or levels do not compare; else 0."""
     gain_db = float(np.median([line.level.difference_db for line in mesh_lines(channel)] or [0.0]))
     return gain_db if abs(gain_db) > WITHIN_DB or not channel.levels_compare else 0.0
 
 
 def power_difference(level: LevelPair, gain_db: float = 0.0) -> float:
-    """Return by how much the mean squares differ, the simulation's after a gain."""
+    """Return the difference of the mean squares, with a gain removed from the simulation's."""
     return float(abs(10.0 ** ((level.simulated_db - gain_db) / 10.0) - 10.0 ** (level.recorded_db / 10.0)))
 
 
 def differing_tooth(channel: ChannelComparison, alignments: Sequence[Alignment]) -> ToothDifference | None:
-    """Return the tooth at which an average differs most from its others beyond scatter; None where none does."""
+    """Return the tooth whose difference stands out most from the others', beyond scatter; None if there is none."""
     aligned = {alignment.shaft: alignment for alignment in alignments}
     teeth = [
         tooth
@@ -170,7 +170,7 @@ def comparable_averages(channel: ChannelComparison, alignments: Sequence[Alignme
 
 
 def differing_average(channel: ChannelComparison) -> ShaftComparison | None:
-    """Return the average whose correlation is furthest below what is possible, beyond scatter; None where none is."""
+    """Return the average whose correlation is furthest below what is possible, beyond scatter; None if none is."""
 
     def lack(shaft: ShaftComparison) -> float:
         return shaft.best_correlation - shaft.correlation.value
@@ -190,9 +190,9 @@ _WHERE = {"mesh": "mesh harmonics", "shaft": "shaft orders"}
 
 
 def missing_line_text(line: LineLevel) -> str:
-    """Say which record lacks a line, or would hide it in its own scatter; empty where both show it.
+    """Return which record lacks a line, or would hide it in its own scatter, in words; empty if both show it.
 
-    The level of a line that is not seen is that of the noise: where that is no lower, the line may well be there.
+    The level of a line that is not seen is that of the noise: if that is no lower, the line may well be there.
     """
     if line.simulated_is_seen and line.recorded_is_seen:
         return ""
@@ -201,17 +201,17 @@ def missing_line_text(line: LineLevel) -> str:
 
 
 def verdict_of(channels: Sequence[ChannelComparison], alignments: Sequence[Alignment]) -> str:
-    """Return per channel what differs most beyond scatter, the largest first.
+    """Return per channel the largest differences beyond scatter.
 
-    One sentence is on the mesh harmonics, or else the shaft orders; one on the line or the tooth beside them that
-    differs most, or on the averages' correlation, where one does. Of both the first is on the larger difference of
-    power, unless what the mesh harmonics differ by is called agreement.
+    One sentence is about the mesh harmonics, or else the shaft orders; one about the line or tooth beside them that
+    differs most, or the averages' correlation, if any differs. The one with the larger difference of power comes first,
+    unless the mesh harmonics' difference is called agreement.
     """
     return " ".join(_headline(channel, channels) + _verdict_text(channel, alignments) for channel in channels)
 
 
 def findings_of(channels: Sequence[ChannelComparison]) -> tuple[str, ...]:
-    """Return sentences on the lines that only one side has, the averages' shapes, and the energy that is locked."""
+    """Return sentences on lines that only one side has, the averages' shapes, and the energy locked to the shafts."""
     texts = []
     for channel in channels:
         if mesh_lines(channel):
@@ -241,7 +241,7 @@ def _verdict_text(channel: ChannelComparison, alignments: Sequence[Alignment]) -
 
 
 def _elsewhere_text(channel: ChannelComparison, alignments: Sequence[Alignment]) -> tuple[str, float]:
-    """Return a sentence on what differs most beside the mesh harmonics, and its power; empty where nothing does."""
+    """Return a sentence on the largest difference beside the mesh harmonics, and its power; empty if there is none."""
     tooth = differing_tooth(channel, alignments)
     lines, gain_db = differing_lines(channel), common_gain_db(channel)
     line_powers = [power_difference(line.level, gain_db) for line in lines]
@@ -265,7 +265,7 @@ def _elsewhere_text(channel: ChannelComparison, alignments: Sequence[Alignment])
 
 
 TURNED_ABOUT = -0.5
-"""Correlation up to which one average is the other one's, times −1."""
+"""Correlation below which one average is the other with reversed sign."""
 
 
 def _most_text(channel: ChannelComparison, line: LineLevel, gain_db: float) -> str:
@@ -285,7 +285,7 @@ def _word(off_db: float) -> str:
 
 
 def _levels_text(channel: ChannelComparison, alignments: Sequence[Alignment] | None = None) -> str:
-    """Say how far the mesh harmonics are apart; with alignments also that nothing else is, where nothing is at all."""
+    """Return how far apart the mesh harmonics are; with alignments also that nothing else differs, if so."""
     lines = mesh_lines(channel)
     if not lines:
         return "No line of the recording stands above its own noise: only the floors can be compared."
@@ -300,7 +300,7 @@ def _levels_text(channel: ChannelComparison, alignments: Sequence[Alignment] | N
 
 
 def _further_places(channel: ChannelComparison, alignments: Sequence[Alignment]) -> tuple[str, ...]:
-    """Name what was compared besides the mesh harmonics."""
+    """Return the names of what was compared besides the mesh harmonics."""
     n = len(further_lines(channel))
     by_tooth = any(shaft.tooth_levels for shaft in comparable_averages(channel, alignments))
     return (*((f"{counted(n, 'other line')}",) if n else ()), *(("tooth by tooth",) if by_tooth else ()))
@@ -326,7 +326,7 @@ def _lines_text(lines: Sequence[LineLevel], where: str, further: Sequence[str], 
         return f"Simulation and recording agree within {largest:.1f} dB at {n}."
     spread = float(np.max(np.abs(differences - gain)))
     text = f"Simulation and recording differ by up to {largest:.1f} dB at {n}{_line_text(worst, 0.0)}"
-    # A common gain beyond 3 dB is named on its own: it is the path's or the sensor's, not the gears'.
+    # A common gain beyond 3 dB is reported separately: it belongs to the path or the sensor, not to the gears.
     if len(lines) > 1 and abs(gain) > 3.0 and spread < largest:
         text += f"; a common gain of {signed(-gain)} dB would bring them within {spread:.1f} dB"
     return f"{text}."
@@ -338,7 +338,7 @@ def _line_text(line: LineLevel, gain: float) -> str:
 
 
 def _missing_texts(channel: ChannelComparison) -> list[str]:
-    """Name the strongest lines that only one of the two shows."""
+    """Return texts on the strongest lines that only one of the two shows."""
     texts = []
     for seen_field, lacking_field, words in (
         ("recorded_is_seen", "simulated_is_seen", "The simulation lacks"),
@@ -351,7 +351,7 @@ def _missing_texts(channel: ChannelComparison) -> list[str]:
         ]
         side = "recorded_db" if seen_field.startswith("recorded") else "simulated_db"
         strongest = max(getattr(line.level, side) for line in (*channel.lines, *channel.other_lines))
-        # A line that one record lacks is named if it is within 40 dB of the other's strongest.
+        # A line that one record lacks is reported if it is within 40 dB of the other's strongest.
         missing = [line for line in missing if getattr(line.level, side) > strongest - 40.0]
         missing.sort(key=lambda line: -float(getattr(line.level, side)))
         if missing:
@@ -389,10 +389,10 @@ def _shape_texts(channel: ChannelComparison) -> list[str]:
 
 
 SAME_SPEED, OTHER_SPEED = 0.03, 0.10
-"""Relative differences of speed: not worth a word; and so large that resonances meet other orders."""
+"""Relative differences of speed: the first is not worth reporting; from the second, resonances meet other orders."""
 
 STEADY = 0.03
-"""Relative range of speed within one record up to which one average stands for all of it."""
+"""Relative range of speed within one record up to which one average represents all of it."""
 
 
 def notes_of(
@@ -402,7 +402,7 @@ def notes_of(
     channels: Sequence[ChannelComparison],
     ratios: Mapping[str, float],
 ) -> tuple[str, ...]:
-    """Return remarks on speeds, shafts left out, alignment and units."""
+    """Return notes on speeds, shafts left out, alignment and units."""
     texts = _speed_texts(simulated_side, recorded_side)
     left_out = [shaft for shaft in ratios if shaft not in {a.shaft for a in alignments}]
     if left_out:
@@ -422,7 +422,7 @@ def notes_of(
 
 
 def _speed_texts(simulated_side: ComparedSide, recorded_side: ComparedSide) -> list[str]:
-    """Return one text on both speeds: a run-up has no speed of its own that could be compared with another."""
+    """Return one text on both speeds; a run-up has no single speed that could be compared with another."""
     if not (simulated_side.angle.is_steady(STEADY) and recorded_side.angle.is_steady(STEADY)):
         unsteady = [
             name

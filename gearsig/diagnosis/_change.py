@@ -345,7 +345,7 @@ def _sum(levels: Sequence[_Levels]) -> _Levels:
 def _lines_and_noise(signals: AnalysisSignals, reference: AnalysisSignals, block_rev: int) -> Iterator[_Quantity]:
     for channel in signals.recording.channels:
         name, unit = channel.name, channel.unit
-        assert signals.over_angle is not None  # noqa: S101 - `_segment_rev` has refused; narrows the type
+        assert signals.over_angle is not None  # noqa: S101 - `_segment_rev` would have refused; narrows the type
         assert reference.over_angle is not None  # noqa: S101
         if name not in reference.over_angle.channel_names:
             continue  # dead in the reference

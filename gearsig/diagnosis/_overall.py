@@ -1,4 +1,4 @@
-"""Overall vibration against the zones of ISO 20816-3, where the rig file says what the machine is."""
+"""Overall vibration against the zones of ISO 20816-3, if the rig file describes the machine's size and mounting."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ MEANINGS = {
     "D": "severe enough to damage the machine",
 }
 CAN_DO_THAT = "can do that."
-"""Ends the sentence of what may be behind the source of most of the vibration."""
+"""Ends the sentence on possible causes behind the source of most of the vibration."""
 
 DOMINANT = 0.7
-"""Share of the squared velocity from which one source makes it."""
+"""Share of the squared velocity at which one source counts as causing it."""
 
 N_MESH_HARMONICS = 5
 CAUSES = {
@@ -37,9 +37,9 @@ SPEED_RANGE_RPM = (120.0, 30_000.0)
 
 
 def detect_vibration_zone(signals: AnalysisSignals, indicators: Iterable[Indicator]) -> list[Finding]:
-    """Judge the largest overall velocity by machine group and mounting, or say why the standard does not apply.
+    """Judge the largest overall velocity by machine group and mounting, or report why the standard does not apply.
 
-    Of machines whose rig file has no [machine] only what makes most of it is said.
+    For machines without [machine] in the rig file only the source of most of it is reported.
     """
     machine = signals.rig.machine
     velocities = [i for i in indicators if i.name == "overall velocity"]
@@ -84,7 +84,7 @@ def detect_vibration_zone(signals: AnalysisSignals, indicators: Iterable[Indicat
 
 
 def _without_zone(signals: AnalysisSignals, largest: Indicator) -> Finding:
-    """Return the overall velocity of a machine whose zones are not known, and what makes most of it."""
+    """Return the overall velocity of a machine whose zones are unknown, and what causes most of it."""
     source, causes = _source(signals, largest)
     lowest = min(limits[2] for limits in ZONE_LIMITS_MM_PER_S.values())
     is_loud = largest.value > lowest
@@ -106,9 +106,9 @@ def _possible(source: str, causes: str) -> list[str]:
 
 
 def _source(signals: AnalysisSignals, velocity: Indicator) -> tuple[str, str]:
-    """Return which source makes most of an overall velocity, and what may be behind it; empty where no single one does.
+    """Return the source of most of an overall velocity, and its possible causes; empty if no single one dominates.
 
-    Of sources there are the first two orders of each shaft, and each gear pair's mesh harmonics.
+    The sources are the first two orders of each shaft, and each gear pair's mesh harmonics.
     """
     if signals.angle is None:
         return "", ""

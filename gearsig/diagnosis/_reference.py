@@ -1,4 +1,4 @@
-"""A recording beside that of the healthy machine: indicators and findings, then and now."""
+"""A recording compared with that of the healthy machine: indicators and findings, then and now."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ from gearsig.rig import Rig, SpeedSource
 
 @dataclass(frozen=True)
 class IndicatorChange:
-    """An indicator's value in the reference, and how far it has moved.
+    """An indicator's value in the reference, and its change since.
 
     Parameters
     ----------
     reference_value : float
     change_db : float or None
-        20 lg(value/reference), or the difference of levels that are in dB already; None where a ratio has no meaning.
+        20 lg(value/reference), or the difference of levels already in dB; None where a ratio has no meaning.
     """
 
     reference_value: float
@@ -47,9 +47,9 @@ class ReferenceFinding:
     ----------
     finding : Finding
     is_comparable : bool
-        Whether both rest on the same channel and band.
+        Whether both come from the same channel and band.
     change_db : float or None
-        Since then; None where levels do not compare.
+        Change since the reference; None where levels do not compare.
     """
 
     finding: Finding
@@ -58,7 +58,7 @@ class ReferenceFinding:
 
 
 REFERENCE_OPTIONS = {"--fs": "--reference-fs"}
-"""Options of the command line → those that state the same of the reference."""
+"""Options of the command line → the corresponding options of the reference."""
 
 
 def rig_and_rate_of_reference(
@@ -69,26 +69,26 @@ def rig_and_rate_of_reference(
     *,
     is_same_machine: bool = False,
 ) -> tuple[Rig | None, float | None]:
-    """Return (rig, sampling rate) of the healthy reference of a recording, by the rig file beside the reference.
+    """Return (rig, sampling rate) for the healthy reference of a recording, using the rig file beside the reference.
 
     Parameters
     ----------
     path : str or Path
         Of the reference.
     rig : Rig or None
-        Of the recording: it holds for the reference, but for what the file beside it states of the measurement:
+        Of the recording. It applies to the reference, except for what the file beside it states of the measurement:
         sensors, speed source, sampling rate, torque.
     stated_hz : float or None
-        Sampling rate that was stated for the recording: it holds for the reference, unless that file states one.
+        Sampling rate stated for the recording; it applies to the reference, unless that file states one.
     reference_rate_hz : float or None
-        Sampling rate that was stated for the reference.
+        Sampling rate stated for the reference.
     is_same_machine : bool
-        Whether that was said: other teeth in the file beside the reference are a mistake there then.
+        Whether the user said so: then other teeth in the file beside the reference are a mistake.
 
     Raises
     ------
     InputError
-        If that rig file has gears with other teeth, unless `is_same_machine`, or tells the speed of another shaft.
+        If that rig file has gears with other teeth, unless `is_same_machine`, or gives the speed of another shaft.
     """
     from gearsig.rig import read_rig, rig_file_beside
 
@@ -105,7 +105,7 @@ def rig_and_rate_of_reference(
 
 
 def _rig_at_reference(path: str | Path, rig: Rig, rig_beside: Rig, *, is_same_machine: bool) -> Rig:
-    """Return the recording's machine with what the file beside the reference states of the measurement."""
+    """Return the recording's machine with the measurement data of the file beside the reference."""
     teeth, others = (", ".join(f"{p.driver_teeth}/{p.driven_teeth}" for p in r.pairs) for r in (rig, rig_beside))
     if not is_same_machine and rig.pairs and rig_beside.pairs and teeth != others:
         raise InputError(
@@ -126,7 +126,7 @@ def _speed_at_reference(path: str | Path, rig: Rig, speed: SpeedSource | None) -
         return speed
     if not rig.shafts:
         return replace(speed, shaft="")
-    if rig.speed is None:  # the recording itself tells its speed, and so may the reference
+    if rig.speed is None:  # the recording itself gives its speed, and so may the reference
         return None
     raise InputError(
         f"its rig file tells the speed of shaft {speed.shaft!r}, the recording's that of {rig.reference_shaft!r}",
@@ -137,16 +137,16 @@ def _speed_at_reference(path: str | Path, rig: Rig, speed: SpeedSource | None) -
 
 
 def changes(analysis: Analysis) -> tuple[IndicatorChange | None, ...]:
-    """Return for each indicator of an analysis what it was in the reference; None where it has none there.
+    """Return for each indicator of an analysis its value in the reference; None where it has none there.
 
-    Indicators belong together that agree in name, channel, gear, shaft, bearing, band and the signal they rest on.
+    Indicators correspond if they agree in name, channel, gear, shaft, bearing, band and underlying signal.
     """
     then = {_key(i): i for i in analysis.reference.indicators} if analysis.reference is not None else {}
     return tuple(_change(now, then.get(_key(now))) for now in analysis.indicators)
 
 
 def reference_unfit(reference: Analysis) -> Finding:
-    """Say that a reference is not compared, since nothing could be analysed in it, with its own reason."""
+    """Return the finding that a reference is not used because nothing in it could be analysed, with the reason."""
     name = reference.recording.provenance.source or "the reference"
     reason = next((f for f in reference.findings if f.kind is Kind.DATA_PROBLEM), None)
     return Finding(
@@ -163,7 +163,7 @@ def reference_unfit(reference: Analysis) -> Finding:
 def reference_not_healthy(
     reference: Analysis, measured: Callable[[Finding], LevelChange | None], *, shows_fault: bool
 ) -> list[Finding]:
-    """Say which fault a reference shows itself: what it has is not new, and what has fallen is no improvement.
+    """Report a fault that the reference itself shows: it is not new, and a decrease is no improvement.
 
     Parameters
     ----------
@@ -172,8 +172,8 @@ def reference_not_healthy(
     measured : callable
         See `beside_reference`.
     shows_fault : bool
-        Whether the recording shows one; else, and where it has not as much of the reference's, the two may have been
-        exchanged.
+        Whether the recording shows a fault; if not, and if it shows less of the reference's fault, the two may have
+        been exchanged.
     """
     if reference.outcome is not Outcome.FAULT:
         return []
@@ -200,10 +200,10 @@ def reference_not_healthy(
 def beside_reference(
     findings: Iterable[Finding], reference: Analysis, measured: Callable[[Finding], LevelChange | None] = lambda _: None
 ) -> list[Finding]:
-    """Return the findings, each fault or suspicion with a sentence on what the reference shows of it.
+    """Return the findings, with a sentence in each fault or suspicion on what the reference shows of it.
 
-    A suspicion that the healthy machine gives as much reason for is a notice; damage that shows there as strongly is no
-    more than a suspicion, as it is not new, or the reference is not of a healthy machine.
+    A suspicion for which the healthy machine gives as much reason becomes a notice. Damage that is as strong there is
+    at most a suspicion: it is not new, or the reference is not of a healthy machine.
 
     Parameters
     ----------
@@ -234,8 +234,7 @@ def _beside(finding: Finding, reference: Analysis, measured: LevelChange | None)
     if kind is Kind.SUSPICION and not is_new:
         kind = Kind.NOTICE
     elif kind is Kind.FAULT and earlier is not None and change_db is not None and change_db < MIN_CHANGE_DB / 2:
-        # A reference with a fault of its own is not healthy, as is said besides; what it has short of one, healthy
-        # machines have.
+        # A reference with a fault is not healthy, and a finding says so; healthy machines may have anything less.
         kind = Kind.SUSPICION if earlier.finding.kind is Kind.FAULT else Kind.NOTICE
         title = f"{title.removesuffix('.')}, as strong in the reference: it is not new."
         title = f"Perhaps {title[:1].lower()}{title[1:]}" if kind is Kind.NOTICE else title
@@ -248,7 +247,7 @@ def in_reference(finding: Finding, reference: Analysis) -> ReferenceFinding | No
     same = [f for f in alike if _has_same_witness(f, finding)]
     if same:
         return ReferenceFinding(same[0], True, _change_db(same[0], finding))
-    return ReferenceFinding(alike[0], False, None) if alike else None  # levels elsewhere are of another size
+    return ReferenceFinding(alike[0], False, None) if alike else None  # levels elsewhere do not compare
 
 
 def _then(finding: Finding, earlier: ReferenceFinding | None) -> str:
@@ -279,7 +278,7 @@ def _is_alike(old: Finding, new: Finding, rig: Rig | None) -> bool:
     then, now = old.where, new.where
     if (old.code, then.shaft, then.gear) != (new.code, now.shaft, now.gear):
         return False
-    # Of bearings that cannot be told apart any may be the first of those that a finding names.
+    # Of bearings that cannot be distinguished, any may be the first that a finding names.
     if then.bearing != now.bearing and not (then.bearing and now.bearing and then.bearing in new.title):
         return False
     if not _is_near(then.order, now.order):
@@ -290,15 +289,15 @@ def _is_alike(old: Finding, new: Finding, rig: Rig | None) -> bool:
 
 
 def _has_same_witness(old: Finding, new: Finding) -> bool:
-    """Whether two findings rest on the same channel and band, so that their levels compare.
+    """Whether two findings come from the same channel and band, so that their levels compare.
 
-    What a mesh's sidebands say is a ratio, the median of all channels: of them the channel is no witness.
+    A mesh's sideband ratio is the median of all channels, so the channel does not matter for it.
     """
     then, now = old.where, new.where
     if then.band_hz is not None and now.band_hz is not None:
         if max(then.band_hz[0], now.band_hz[0]) >= min(then.band_hz[1], now.band_hz[1]):
             return False
-    elif then.band_hz is not now.band_hz:  # one of both has none
+    elif then.band_hz is not now.band_hz:  # one of them has none
         return False
     rests_on_channel = now.band_hz is not None or now.angle_deg is not None or not _is_placed(new)
     return not rests_on_channel or then.channels == now.channels or bool(set(then.channels) & set(now.channels))
@@ -315,12 +314,12 @@ def _is_near(then: float | None, now: float | None) -> bool:
 
 
 def _names_tooth(old: Finding, new: Finding) -> bool:
-    """Whether both count teeth from a mark; without one, an angle holds for its own record only."""
+    """Whether both count teeth from a mark; without one, an angle is valid only for its own record."""
     return old.where.tooth is not None and new.where.tooth is not None
 
 
 def _is_same_tooth(then: Where, now: Where, rig: Rig | None) -> bool:
-    """Whether two teeth are the same or neighbours: either place is good to about one tooth."""
+    """Whether two teeth are the same or neighbours, as each is located to about one tooth."""
     off = abs((then.tooth or 0) - (now.tooth or 0))
     teeth = rig.teeth_of(now.gear) if rig is not None else None
     return min(off, teeth - off if teeth is not None else off) <= 1

@@ -1,4 +1,4 @@
-"""Resonances: frequencies at which several orders peak as the speed runs through."""
+"""Resonances: frequencies at which several orders peak during a sweep of speed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from gearsig.orders import SeparatedOrder
 from gearsig.prepared import LinesOverFloor
 
 NARROWEST, WIDEST = 0.01, 0.05
-"""Relative width within which peaks count as together: steps of speed and filters move them by as much at least."""
+"""Relative width within which peaks count as coincident: steps of speed and filters shift them by at least as much."""
 
 
 @dataclass(frozen=True)
@@ -43,16 +43,16 @@ class _Cluster:
 
     @property
     def frequency_hz(self) -> float:
-        """Mean of the peaks', more prominent ones counting more."""
+        """Mean frequency of the peaks, weighted by prominence, in Hz."""
         weights = [peak.prominence_db for peak in self.peaks]
         return float(np.average([peak.frequency_hz for peak in self.peaks], weights=weights))
 
 
 def detect_resonances(levels: Mapping[str, Sequence[OrderLevel]]) -> list[Finding]:
-    """Report frequencies at which several orders peak, each at its own speed: the structure answers there.
+    """Report frequencies at which several orders peak, each at its own speed, because the structure resonates there.
 
-    An order's level may rise and fall with speed for other reasons. If it did so by chance, peaks of two orders would
-    rarely lie at one frequency: the chance follows from the number of peaks and the range of frequencies they pass.
+    An order's level may rise and fall with speed for other reasons. Peaks of two orders would then rarely lie at one
+    frequency: the probability follows from the number of peaks and the range of frequencies they sweep.
     """
     clusters = sorted((c for name in levels for c in _clusters(name, levels[name])), key=lambda c: c.p_value)
     kept: list[_Cluster] = []
@@ -69,7 +69,7 @@ def _clusters(channel: str, levels: Sequence[OrderLevel]) -> list[_Cluster]:
 
 
 def _peaks(level: OrderLevel) -> list[_Peak]:
-    """Return the peaks of a level with twice the amplitude of what is on both sides; the ends of the run are none."""
+    """Return the peaks with at least twice the amplitude of the level on both sides, excluding the ends of the run."""
     from scipy.signal import find_peaks
 
     decibels = 20 * np.log10(np.maximum(level.amplitude, 1e-300))
@@ -78,7 +78,7 @@ def _peaks(level: OrderLevel) -> list[_Peak]:
 
 
 def _around(channel: str, centre: _Peak, peaks: Sequence[_Peak], levels: Sequence[OrderLevel]) -> _Cluster | None:
-    """Return the peaks of other orders nearest to one, as many as make their coincidence least likely."""
+    """Return the peaks of other orders nearest to one, in the number that makes their coincidence least likely."""
     nearest: list[tuple[float, _Peak]] = []
     chances = []
     for level in levels:
@@ -94,9 +94,9 @@ def _around(channel: str, centre: _Peak, peaks: Sequence[_Peak], levels: Sequenc
         width = max(distance, NARROWEST)
         if width > WIDEST:
             break
-        # Every set of n + 1 peaks is looked at from each of them: so many fewer are the sets.
+        # Every set of n + 1 peaks is examined from each of them, so that there are fewer sets.
         n_sets = len(peaks) / (n + 1)
-        # Any of an order's peaks lies within ± width by chance; the probability that at least n of the orders do so.
+        # Any peak of an order lies within ± width by chance; find the probability that at least n orders have one.
         distribution = np.array([1.0])
         for n_own, span in chances:
             by_chance = 1.0 - max(0.0, 1.0 - 2.0 * width / span) ** n_own
@@ -122,7 +122,7 @@ def _finding(cluster: _Cluster, every: Sequence[_Cluster]) -> Finding:
         f"A resonance at about {hertz:.4g} Hz: {speeds} peak there.",
         Where(tuple(dict.fromkeys([cluster.channel, *near])), frequency_hz=hertz),
         Strength(largest, strongest.level.unit, beside, "level beside the peak", strongest.prominence_db),
-        # Every structure has resonances: who looks at one frequency in a run-up finds one more often than not.
+        # Every structure has resonances: a frequency examined in a run-up is more likely than not to have one.
         confidence=from_p_value(cluster.p_value, prior=0.8, limit=0.95),
         confidence_basis=f"chance that peaks of {len(peaks)} orders meet at one frequency {p_text(cluster.p_value)}",
         evidence=("Levels measured there are the structure's as much as the gears': compare them at the same speed.",),
@@ -130,14 +130,14 @@ def _finding(cluster: _Cluster, every: Sequence[_Cluster]) -> Finding:
     )
 
 
-# Levels of mesh harmonics and other orders over speed, where the speed runs through a range.
+# Levels of mesh harmonics and other orders over speed, where the speed sweeps a range.
 
 
 def order_levels(signals: AnalysisSignals) -> dict[str, tuple[OrderLevel, ...]]:
-    """Return the levels of each channel's orders over speed; empty where the speed changes by less than a fifth.
+    """Return the levels of each channel's orders over speed; empty if the speed changes by less than a fifth.
 
-    Mesh harmonics where the mesh is confirmed, and the strongest multiples of half a shaft order. Each is taken out by
-    a Vold–Kalman filter of two poles, as wide as its neighbours allow: a narrower one smooths resonances.
+    These are mesh harmonics where the mesh is confirmed, and the strongest multiples of half a shaft order. Each is
+    extracted by a two-pole Vold–Kalman filter, as wide as neighbouring orders allow: a narrower one smooths resonances.
     """
     low, high = signals.angle.speed_range_rpm if signals.angle is not None else (0.0, 0.0)
     if not (high >= 1.2 * max(low, 0.0) > 0 or (low <= 0 < high)):
@@ -170,7 +170,7 @@ def _levels(signals: AnalysisSignals, channel: str) -> Iterator[OrderLevel]:
 
 
 def _over_speed(order: SeparatedOrder) -> tuple[FloatArray, FloatArray]:
-    """Return the root mean square of the amplitude in 160 equal steps of speed, those that never occurred left out."""
+    """Return the rms amplitude in 160 equal steps of speed, leaving out speeds that never occurred."""
     at = np.flatnonzero(order.valid)
     if len(at) == 0:
         return np.zeros(0), np.zeros(0)
@@ -186,9 +186,9 @@ def _over_speed(order: SeparatedOrder) -> tuple[FloatArray, FloatArray]:
 
 def _orders_to_track(signals: AnalysisSignals, channel: str) -> list[tuple[str, float, str, int]]:
     """Return name, order, pair and harmonic of the orders to follow, mesh harmonics of two pairs first."""
-    assert signals.angle is not None  # noqa: S101 - `order_levels` has seen to it; narrows the type
+    assert signals.angle is not None  # noqa: S101 - `order_levels` has checked it; narrows the type
     low, high = (max(rpm, 0.0) / 60.0 for rpm in signals.angle.speed_range_rpm)
-    # Half the sampling rate lies above an order in two fifths of the speed range at least.
+    # Orders that lie below half the sampling rate in at least two fifths of the speed range.
     highest = 0.5 * signals.recording.sampling_rate_hz / (low + 0.4 * (high - low))
     meshes = [
         (f"{h}× mesh of {pair.name}", h * mesh, pair.name, h)
@@ -197,7 +197,7 @@ def _orders_to_track(signals: AnalysisSignals, channel: str) -> list[tuple[str, 
         for h in range(1, 5)
         if h * mesh < highest
     ]
-    # Other orders above half the lowest mesh order are of teeth that differ, or sidebands.
+    # Other orders above half the lowest mesh order come from unequal teeth, or are sidebands.
     below = min(highest, min((0.5 * order for _, order, _, _ in meshes), default=highest))
     others = _strongest(signals, signals.order_excess[channel], below)[: max(0, 6 - len(meshes))]
     return meshes + [(f"order {order:g}", order, "", 0) for order in sorted(others)]
@@ -206,21 +206,21 @@ def _orders_to_track(signals: AnalysisSignals, channel: str) -> list[tuple[str, 
 def _strongest(signals: AnalysisSignals, excess: LinesOverFloor, highest: float) -> list[float]:
     """Return the multiples of half a shaft order at which a clear line stands, the strongest first.
 
-    Half orders are those of four-stroke engines. Lines elsewhere are noise of a fixed frequency, smeared by the speed,
-    or belong to what is not described.
+    Half orders are those of four-stroke engines. Other lines are noise of a fixed frequency, smeared by the speed, or
+    belong to parts that are not described.
     """
     spectrum = excess.spectrum
     lines: dict[float, float] = {}
     strongest = float(spectrum.values.max())
     for shaft in signals.known_shaft_orders.values():
-        # Multiples above 48 are seldom a shaft's own.
+        # Multiples above 48 seldom belong to a shaft itself.
         n_orders = min(48, int(min(highest, spectrum.positions[-1]) / (shaft / 2)))
         for order in (float(o) for o in np.arange(1, n_orders + 1) * shaft / 2):
-            # A level that changes with speed makes a line broad.
+            # A level that changes with speed broadens a line.
             line = line_at(excess, order, max(0.02, 1.5 * spectrum.resolution), max(0.1, 6 * spectrum.resolution))
             if line is None or not line.is_highest or any(abs(order - other) <= 0.1 for other in lines):
                 continue
-            # 15 dB over the floor; what is 30 dB below the strongest line does not rule the vibration at any speed.
+            # 15 dB over the floor; a line 30 dB below the strongest dominates the vibration at no speed.
             if line.amplitude > max(line.floor * 10 ** (15.0 / 20), strongest * 10 ** (-30 / 20)):
                 lines[order] = line.amplitude
     return sorted(lines, key=lambda order: -lines[order])

@@ -1,4 +1,4 @@
-"""Lines between the multiples of a rotor's speed: halves and thirds of loose or rubbing parts, and whirling oil."""
+"""Lines between the multiples of a rotor's speed: halves and thirds from loose or rubbing parts, and oil whirl."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ HALF_ORDERS, OIL_WHIRL = "half-orders", "oil-whirl"
 """Codes of the findings."""
 
 WHIRL_ORDERS = (0.38, 0.49)
-"""Of the oil in plain bearings, which turns with a little less than half the shaft's speed; exactly half is a rub's or
-a loose part's (ISO 13373-3:2015; A. Muszynska, *Rotordynamics*, 2005, ch. 4)."""
+"""Of the oil in plain bearings, which rotates at a little less than half the shaft's speed; exactly half is a rub or a
+loose part (ISO 13373-3:2015; A. Muszynska, *Rotordynamics*, 2005, ch. 4)."""
 
 CONFIRMS_WHIRL = (
     "An orbit that is round and turns with the shaft; the line keeps its share of the speed, and changes with the "
@@ -29,24 +29,24 @@ CLEAR_DB = 12.0
 """A line that noise alone exceeds once in 10⁷."""
 
 N_FRACTIONS, MINIMUM_FRACTIONS = 8, 3
-"""Halves or thirds of the order that are looked at, from the first on, and how many are a family."""
+"""Number of halves or thirds of the order examined, starting with the first, and the minimum number for a family."""
 
 FRACTIONS = {2: "halves", 3: "thirds"}
-"""Parts of a shaft's order at which loose and rubbing parts strike: every other turn, or every third."""
+"""Fractions of a shaft's order at which loose and rubbing parts cause impacts: every other turn, or every third."""
 
 N_OF_A_PART = 3
-"""Multiples of a bearing part's order that its lines reach to."""
+"""Highest multiple of a bearing part's order at which its lines are expected."""
 
 OF_SOME_SIZE = 0.1
 """Velocity of the largest such line over that of the largest multiple of the shaft, below which it is no suspicion."""
 
 UNSTEADY = 0.1
-"""Relative range of a speed from which lines pass resonances, which make peaks of their own."""
+"""Relative range of speed above which lines pass resonances, which cause peaks of their own."""
 
 
 @dataclass(frozen=True)
 class _Between:
-    """Lines between a shaft's multiples in one channel, their size beside the largest multiple, and their chance."""
+    """Lines between a shaft's multiples in one channel, their size relative to the largest multiple, and p-value."""
 
     channel: str
     kind: str
@@ -57,7 +57,7 @@ class _Between:
 
 
 def detect_between_orders(signals: AnalysisSignals) -> Iterator[Finding]:
-    """Yield what stands at halves or thirds of a shaft's order, or a little below one half, of machines without gears.
+    """Yield findings on halves or thirds of a shaft's order, or on a line just below one half, without gears.
 
     Healthy rotors have neither. A gear train has shafts at all ratios, and a run-up's lines pass resonances.
     """
@@ -78,7 +78,7 @@ def _may_be_examined(signals: AnalysisSignals) -> bool:
 
 
 def _largest_fractions(signals: AnalysisSignals) -> Iterator[tuple[str, _Between]]:
-    """Yield each shaft at whose halves or thirds lines stand, with the largest of all channels."""
+    """Yield each shaft with lines at halves or thirds of its order, with the largest of all channels."""
     for shaft, order in signals.known_shaft_orders.items():
         seen = [_at_fractions(signals, channel, order, of) for of in FRACTIONS for channel in signals.order_excess]
         fractions = max((one for one in seen if one is not None), key=lambda one: one.size, default=None)
@@ -87,18 +87,18 @@ def _largest_fractions(signals: AnalysisSignals) -> Iterator[tuple[str, _Between
 
 
 def possible_half_speed_text(signals: AnalysisSignals) -> str:
-    """Say of which shaft a line at a half of its order exceeds all its multiples, and what does it; empty if of none.
+    """Return a clause on a shaft whose half order exceeds all its multiples, with the cause; empty without one.
 
-    Not a sentence yet.
+    It is not a sentence yet.
     """
     seen = _largest_fractions(signals) if _may_be_examined(signals) else ()
     return next((_half_speed_text(shaft) for shaft, one in seen if _may_be_of_half_speed(signals, one)), "")
 
 
 def _may_be_of_half_speed(signals: AnalysisSignals, fractions: _Between) -> bool:
-    """Whether a shaft may turn half as fast as stated: the largest line of most rotors is once a turn.
+    """Whether a shaft may turn half as fast as stated, since the largest line of most rotors is at once per turn.
 
-    Not where its speed is measured. Rubs, too, may make the largest line at a half.
+    Not if its speed is measured. A rub, too, may have its largest line at one half.
     """
     is_stated = signals.angle is not None and signals.angle.method == "constant"
     return is_stated and fractions.kind == FRACTIONS[2] and fractions.size >= 1.0
@@ -112,7 +112,7 @@ def _half_speed_text(shaft: str) -> str:
 
 
 def shafts_of_whirl(signals: AnalysisSignals) -> dict[str, float]:
-    """Return name and order of the shafts that may run in plain bearings: described ones without a rolling bearing."""
+    """Return name and order of the shafts that may run in plain bearings: those described without a rolling bearing."""
     rolling = {bearing.shaft for bearing in signals.rig.bearings}
     described = () if signals.rig.pairs else signals.rig.shaft_names
     orders = signals.known_shaft_orders
@@ -120,11 +120,11 @@ def shafts_of_whirl(signals: AnalysisSignals) -> dict[str, float]:
 
 
 def _at_fractions(signals: AnalysisSignals, channel: str, order: float, of: int) -> _Between | None:
-    """Return the halves or thirds that stand out of a channel's spectrum, if neither chance nor a train explains them.
+    """Return the halves or thirds that stand out in a channel's spectrum, unless chance or a train explains them.
 
-    By chance a place meets one of the spectrum's lines with the share of the axis that lines take; so many of the
-    places do with a binomial probability. A slower train has lines midway between these places as well, or at both
-    halves and thirds.
+    The probability that a place meets one of the spectrum's lines by chance is the share of the axis covered by lines;
+    that for this many places is binomial. A slower train also has lines midway between these places, or at both halves
+    and thirds.
     """
     from scipy.stats import binom
 
@@ -149,7 +149,7 @@ def _at_fractions(signals: AnalysisSignals, channel: str, order: float, of: int)
 
 
 def _whirl(signals: AnalysisSignals, channel: str, order: float) -> _Between | None:
-    """Return the line a little below half the order; None where its multiples stand out as well, as a belt's do."""
+    """Return the line just below half the order; None if its multiples stand out as well, as a belt's do."""
     excess = signals.order_excess[channel]
     low, high = (edge * order for edge in WHIRL_ORDERS)
     place = excess.spectrum.largest_near((low + high) / 2, (high - low) / 2)[0]
@@ -161,13 +161,13 @@ def _whirl(signals: AnalysisSignals, channel: str, order: float) -> _Between | N
 
 
 def _clear(excess: LinesOverFloor, place: float) -> PlacedLine | None:
-    """Return the line at a place where it stands out of noise, and is the highest about it."""
+    """Return the line at a place if it stands out from noise and is the highest nearby."""
     line = line_at(excess, place)
     return line if line is not None and line.is_highest and line.ratio_db >= CLEAR_DB else None
 
 
 def _is_free(signals: AnalysisSignals, excess: LinesOverFloor, place: float) -> bool:
-    """Whether neither a supply nor a described rolling bearing puts a line at an order."""
+    """Whether neither a supply nor a described rolling bearing causes a line at an order."""
     hertz, width_hz = (x * signals.frequency_per_order_hz for x in (place, 2 * excess.spectrum.resolution))
     supply_hz = [mains_hz * max(1, round(hertz / mains_hz)) for mains_hz in MAINS_HZ]
     if any(abs(hertz - line_hz) <= max(MAINS_TOLERANCE * line_hz, width_hz) for line_hz in supply_hz):
@@ -183,7 +183,7 @@ def _is_free(signals: AnalysisSignals, excess: LinesOverFloor, place: float) -> 
 
 
 def _share_of_lines(excess: LinesOverFloor, highest: float) -> float:
-    """Return the share of an axis on which a place is within 1.5 lines of a peak that stands out."""
+    """Return the share of an axis that is within 1.5 lines of a peak that stands out."""
     n = excess.spectrum.index_of(highest)
     values = excess.spectrum.values[: n + 2]
     is_peak = (values[1:-1] >= values[:-2]) & (values[1:-1] > values[2:])
@@ -192,7 +192,7 @@ def _share_of_lines(excess: LinesOverFloor, highest: float) -> float:
 
 
 def _largest_multiple(signals: AnalysisSignals, channel: str, order: float) -> float:
-    """Return the largest of a shaft's first multiples, as velocity."""
+    """Return the largest amplitude of a shaft's first multiples, as velocity."""
     excess = signals.order_excess[channel]
     lines = ((k * order, line_at(excess, k * order)) for k in range(1, N_FRACTIONS + 1))
     sizes = [_as_velocity(signals, channel, place, line.amplitude) for place, line in lines if line is not None]
@@ -200,12 +200,12 @@ def _largest_multiple(signals: AnalysisSignals, channel: str, order: float) -> f
 
 
 def _as_velocity(signals: AnalysisSignals, channel: str, order: float, amplitude: float) -> float:
-    """Return a line's amplitude as of velocity, up to a factor that is one for all lines of a channel."""
+    """Return a line's amplitude as velocity, up to a factor common to all lines of a channel."""
     return max(amplitude, 1e-300) / order ** derivatives_of_velocity(signals, channel)
 
 
 def derivatives_of_velocity(signals: AnalysisSignals, channel: str) -> int:
-    """Return how many times velocity is differentiated to what a channel measures; of unknown ones as acceleration."""
+    """Return how often velocity is differentiated to give a channel's quantity; unknown ones count as acceleration."""
     quantity = signals.recording.channels[signals.recording.index(channel)].quantity
     return {"velocity": 0, "displacement": -1, "transmission_error": -1}.get(quantity, 1)
 

@@ -1,4 +1,4 @@
-"""The signals and spectra of an analysis: what the detectors look at."""
+"""The signals and spectra of an analysis, which the detectors examine."""
 
 from __future__ import annotations
 
@@ -31,20 +31,20 @@ from gearsig.spectra import BandCandidate, Kurtogram, Spectrum
 
 @dataclass(frozen=True)
 class ShaftSignals:
-    """What belongs to one shaft.
+    """The signals of one shaft.
 
     Parameters
     ----------
     shaft : str
     teeth : tuple of int
-        Of the gears on it, as far as they are known.
+        Of the gears on it, as far as known.
     angle : ShaftAngle
     averages : mapping
         Channel → synchronous average.
     separated : mapping
         Channel → its parts; empty where no teeth are known or the mesh is beyond the sampling rate.
     halves : mapping
-        Channel → difference signals, (2, n_angles), of the odd and of the even revolutions by themselves.
+        Channel → difference signals, (2, n_angles), of the odd and of the even revolutions separately.
     signal : AngleSignal
         The channels over this shaft's angle.
     """
@@ -60,14 +60,14 @@ class ShaftSignals:
 
 @dataclass(frozen=True)
 class AnalysisSignals:
-    """Everything that is computed once and looked at by several detectors.
+    """Everything that is computed once and examined by several detectors.
 
     Parameters
     ----------
     prepared : PreparedRecording
-        What they were computed of.
+        The recording they were computed from.
     recording : Recording
-        Only the channels that are analysed.
+        With only the channels that are analysed.
     rig : Rig
         An empty one if nothing is known.
     angle : ShaftAngle or None
@@ -82,11 +82,11 @@ class AnalysisSignals:
     order_maps : mapping
         Channel → map along speed, where the speed varies.
     has_reference : bool
-        Whether a recording of the healthy machine was given: then none is asked for.
+        Whether a recording of the healthy machine was given, so that none is asked for.
     over_angle : AngleSignal or None
         The channels over the reference shaft's angle; None where `order_excess` is empty.
     without_tones : dict
-        Channel and band → lines of its envelope without steady tones, once they were asked for, see `is_of_tones`.
+        Channel and band → lines of its envelope without steady tones, once requested, see `is_of_tones`.
     """
 
     prepared: PreparedRecording
@@ -106,7 +106,7 @@ class AnalysisSignals:
 
     @property
     def known_shaft_orders(self) -> dict[str, float]:
-        """Order of each shaft whose order is known; the reference shaft alone if there is no gear train."""
+        """Order of each shaft whose order is known; only the reference shaft if there is no gear train."""
         if self.angle is None:
             return {}
         ratios = {name: self.rig.ratio(name) for name in self.rig.shaft_names}
@@ -121,30 +121,30 @@ class AnalysisSignals:
 
     @property
     def frequency_per_order_hz(self) -> float:
-        """Mean rotational frequency of the reference shaft."""
+        """Mean rotational frequency of the reference shaft, in Hz."""
         if self.angle is None:
             raise RefusalError("the speed is not known")
         return self.angle.mean_speed_rpm / 60
 
     @cached_property
     def offset_comb(self) -> OffsetComb | None:
-        """At which multiple of the mean speed the gears' comb lies, if anywhere else; sought once, it takes long."""
+        """The gears' comb at another multiple of the mean speed, if any; sought only once, as it takes long."""
         return find_offset_comb(self.recording, self.rig, 60.0 * self.frequency_per_order_hz)
 
     @property
     def speed_varies(self) -> bool:
-        """Whether the speed changes by more than 1 %: a spectrum over frequency smears, a map along speed is made."""
+        """Whether the speed changes by more than 1 %: spectra over frequency smear, and a map along speed is made."""
         return self.angle is not None and not self.angle.is_steady()
 
     def hertz_text(self, order: float, digits: int = 5) -> str:
-        """Return the frequency of an order in words, the range of it where the speed varies."""
+        """Return the frequency of an order as text, or its range if the speed varies."""
         if self.angle is None or not self.speed_varies:
             return f"{order * self.frequency_per_order_hz:.{digits}g} Hz"
         low, high = (order * rpm / 60 for rpm in self.angle.speed_range_rpm)
         return f"{low:.4g} to {high:.4g} Hz"
 
     def where(self, order: float, channel: str = "", *, shaft: str = "", gear: str = "", bearing: str = "") -> Where:
-        """Return the place of what is at an order of the reference shaft, at a steady speed with its frequency."""
+        """Return the location of an order of the reference shaft; at a steady speed with its frequency."""
         hertz = order * self.frequency_per_order_hz if self.angle is not None and not self.speed_varies else None
         channels = (channel,) if channel else ()
         return Where(channels, shaft, gear, bearing, order, self.rig.reference_shaft, hertz)
@@ -152,16 +152,16 @@ class AnalysisSignals:
 
 @dataclass(frozen=True)
 class PlacedLine:
-    """The largest line about a place of a spectrum.
+    """The largest line near a place in a spectrum.
 
     Parameters
     ----------
     position, amplitude : float
     floor : float
-        Of the noise there.
+        Noise floor there.
     unit : str
     is_highest : bool
-        Whether nothing around the place is higher: then it is that place's own line, and no foot of another.
+        Whether nothing nearby is higher: then the line belongs to that place and is not the foot of another.
     """
 
     position: float
@@ -178,7 +178,7 @@ class PlacedLine:
 
     @property
     def level_db(self) -> float:
-        """20 lg(amplitude), of a vanishing one too."""
+        """20 lg(amplitude), also for an amplitude of zero."""
         return 20 * log10(max(self.amplitude, 1e-300))
 
     @property
@@ -187,7 +187,7 @@ class PlacedLine:
         return over_floor_db(self.amplitude, self.floor)
 
     def strength(self, floor_is: str) -> Strength:
-        """Return the line's amplitude against its floor."""
+        """Return the line's amplitude relative to its floor."""
         return Strength(self.amplitude, self.unit, self.floor, floor_is, self.ratio_db)
 
 
@@ -214,7 +214,7 @@ def compute_signals(
     *,
     has_reference: bool,
 ) -> AnalysisSignals:
-    """Compute what the detectors need of the named channels, as far as the speed and the rig allow."""
+    """Compute what the detectors need from the named channels, as far as speed and rig allow."""
     spectra = {name: prepared.spectrum(name) for name in names}
     excess: dict[str, LinesOverFloor] = {}
     shafts: tuple[ShaftSignals, ...] = ()
@@ -229,7 +229,7 @@ def compute_signals(
                 for shaft, ratio in ratios.items()
                 if ratio is not None and angle.n_revolutions * ratio >= settings.minimum_revolutions
             )
-        except RefusalError:  # too few samples per revolution or too short: the detectors say that nothing is known
+        except RefusalError:  # too few samples per revolution or too short: the detectors report it
             excess, shafts, over_angle = {}, (), None
     recording = prepared.fast_part.select(names)
     signals = AnalysisSignals(
@@ -251,13 +251,13 @@ def _one_shaft(prepared: PreparedRecording, shaft: str, names: Sequence[str]) ->
             try:
                 separated[name] = separate(average, visible)
             except (RefusalError, InputError):
-                continue  # nothing is left beside the mesh lines: there is no residual to look at
+                continue  # nothing is left beside the mesh lines: there is no residual to examine
             halves[name] = np.stack([separate(h, visible).difference.values for h in _halves(signal, average)])
     return ShaftSignals(shaft, teeth, prepared.angle_of(shaft), averages, separated, halves, signal)
 
 
 def _halves(signal: AngleSignal, average: SynchronousAverage) -> tuple[SynchronousAverage, SynchronousAverage]:
-    """Average the odd and the even revolutions by themselves: what the machine does is in both."""
+    """Average the odd and the even revolutions separately; what the machine does is in both."""
     revolutions = whole_revolutions(signal, average.channel)
     odd, even = (
         replace(average, values=revolutions[start::2].mean(axis=0), n_revolutions=len(revolutions[start::2]))
@@ -277,7 +277,7 @@ class BandEnvelope:
     excess : LinesOverFloor
         Over order where the speed is known, else over frequency.
     mean : float
-        Mean of the envelope: lines over it are modulation depths.
+        Mean of the envelope: lines divided by it are modulation depths.
     over_angle : AngleSignal or None
         The envelopes of this band, all channels; None where the speed is not known.
     """
@@ -305,7 +305,7 @@ def envelopes_in(
 ) -> Iterator[BandEnvelope]:
     """Yield the envelope spectra of a recording's channels in one band; none if it is too narrow or too short.
 
-    Over order where the speed is known: then a speed that varies does not smear them.
+    Over order where the speed is known, so that a varying speed does not smear them.
     """
     from gearsig.angle import resample_to_angle
     from gearsig.orders import order_spectrum
@@ -345,9 +345,9 @@ def in_common_bands(
     reference_envelopes: Sequence[BandEnvelope],
     healthy: PreparedRecording,
 ) -> tuple[list[BandEnvelope], list[BandEnvelope]]:
-    """Return the envelopes of two recordings in the same bands: those of the one that is sampled more slowly.
+    """Return the envelopes of two recordings in the same bands: those of the recording with the lower sampling rate.
 
-    The prepared reference keeps its own, as it is compared with recordings of one rate again and again.
+    The prepared reference keeps its envelopes, as it is compared with many recordings of the same rate.
     """
     now, then = list(envelopes), list(reference_envelopes)
     if signals.recording.sampling_rate_hz > reference.recording.sampling_rate_hz:
@@ -367,14 +367,14 @@ def _bands(envelopes: Sequence[BandEnvelope]) -> tuple[tuple[float, float], ...]
 
 @dataclass(frozen=True)
 class KurtogramBand:
-    """A channel's kurtogram, the band it chooses, and the envelope there.
+    """A channel's kurtogram, the band it selects, and the envelope there.
 
     Parameters
     ----------
     kurtogram : Kurtogram
         Of the channel without its steady tones.
     band : BandCandidate
-        The most impulsive one that is wide enough.
+        The most impulsive band that is wide enough.
     envelope : BandEnvelope
     """
 
@@ -384,7 +384,7 @@ class KurtogramBand:
 
 
 def kurtogram_bands(signals: AnalysisSignals) -> tuple[KurtogramBand, ...]:
-    """Return each channel's own band; none where no bearing's speed is known or no band is wide enough."""
+    """Return each channel's kurtogram band; none if no bearing's speed is known or no band is wide enough."""
     races = [
         ratio * order
         for bearing in signals.rig.bearings
@@ -400,14 +400,14 @@ def kurtogram_bands(signals: AnalysisSignals) -> tuple[KurtogramBand, ...]:
 
 
 MINIMUM_LINES = 3
-"""Lines of a family over 6 dB that must be there: two may coincide by chance with the harmonics of something else."""
+"""Lines over 6 dB that a family must have: two may coincide with harmonics of something else by chance."""
 
 SEEN_THERE = 0.01
-"""Chance of a family in one envelope up to which that of another envelope is seen there as well."""
+"""p-value of a family in another envelope below which it counts as seen there as well."""
 
 
 def witness(band: KurtogramBand, order: float) -> Comb | None:
-    """Return the family at an order found elsewhere, if the own band shows it too."""
+    """Return the family at an order found elsewhere, if the kurtogram's band shows it too."""
     return seen_in(band.envelope.excess, order)
 
 
@@ -421,7 +421,7 @@ def seen_in(excess: LinesOverFloor, order: float) -> Comb | None:
 def witness_text(
     bands: Sequence[KurtogramBand], channel: str, band_hz: tuple[float, float], order: float
 ) -> tuple[str, ...]:
-    """Say what a channel's own band shows of a family found at `order` in the band `band_hz`."""
+    """Return what a channel's kurtogram band shows of a family found at `order` in the band `band_hz`."""
     band = next((b for b in bands if b.envelope.channel == channel), None)
     if band is None:
         return ()
@@ -456,7 +456,7 @@ def _kurtogram_band(signals: AnalysisSignals, channel: str, narrowest_hz: float)
 
 
 def _without_tones(signals: AnalysisSignals, channel: str) -> Recording | None:
-    """Return a channel without its steady tones; None where they are all there is."""
+    """Return a channel without its steady tones; None if there is nothing else."""
     return signals.prepared.keep(("diagnosis", "without tones", channel), lambda: _tones_removed(signals, channel))
 
 
@@ -468,23 +468,23 @@ def _tones_removed(signals: AnalysisSignals, channel: str) -> Recording | None:
     recorded = signals.recording.values(channel)
     lines = prepared_lines(signals.prepared.transform(channel), "tones removed")
     if np.linalg.norm(lines) < 1e-9 * np.linalg.norm(signals.prepared.transform(channel)[1:]):
-        return None  # of a model: what is left are the rounding errors of the tones' removal
+        return None  # simulated: only rounding errors of removing the tones are left
     x = np.asarray(irfft(lines, len(recorded), overwrite_x=True))
     return replace(signals.recording.select([channel]), samples=x[None, :])
 
 
 def is_of_tones(signals: AnalysisSignals, envelope: BandEnvelope, order: float) -> bool:
-    """Whether a family of an envelope is gone once the steady tones are: their beats modulate as impacts do.
+    """Whether a family of an envelope vanishes with the steady tones, whose beats modulate as impacts do.
 
-    Tones of a supply and of slots are that steady. Impacts of a bearing that slips ring in tones no longer than some
-    turns of its cage, or shake all of a band, so that removing single lines leaves them.
+    Tones of a supply and of slots are steady enough. The impacts of a slipping bearing ring in tones for no longer than
+    some turns of its cage, or excite a whole band, so that they remain when single lines are removed.
     """
     excess = lines_without_tones(signals, envelope)
     return excess is not None and seen_in(excess, order) is None
 
 
 def lines_without_tones(signals: AnalysisSignals, envelope: BandEnvelope) -> LinesOverFloor | None:
-    """Return the lines of an envelope without the steady tones; None where tones are all there is, or no envelope."""
+    """Return the lines of an envelope without the steady tones; None if nothing else or no envelope is left."""
     key = envelope.channel, envelope.band_hz
     if key not in signals.without_tones:
         signals.without_tones[key] = _lines_without_tones(signals, *key)
@@ -492,7 +492,7 @@ def lines_without_tones(signals: AnalysisSignals, envelope: BandEnvelope) -> Lin
 
 
 def _lines_without_tones(signals: AnalysisSignals, channel: str, band_hz: tuple[float, float]) -> LinesOverFloor | None:
-    """Return the lines of a band's envelope beside shafts' without the steady tones; None where nothing is left."""
+    """Return the lines of a band's envelope, except shafts', without the steady tones; None if nothing is left."""
     recording = _without_tones(signals, channel)
     if recording is None:
         return None
@@ -501,7 +501,7 @@ def _lines_without_tones(signals: AnalysisSignals, channel: str, band_hz: tuple[
 
 
 def without_shafts(signals: AnalysisSignals, excess: LinesOverFloor) -> LinesOverFloor:
-    """Return lines without multiples of the shafts' orders, which are gears' and shafts', not bearings'."""
+    """Return lines without multiples of the shafts' orders, which belong to gears and shafts, not to bearings."""
     for order in signals.known_shaft_orders.values():
         excess = excess.without_multiples(order)
     return excess
@@ -516,11 +516,11 @@ def channel_analysis(
     findings: Sequence[Finding],
     changes: Mapping[tuple[str, str], SynchronousAverage],
 ) -> ChannelAnalysis:
-    """Return the signals and spectra of one channel: those that were looked at, and the bands that told most.
+    """Return the signals and spectra of one channel: those examined, and the most informative bands.
 
-    The envelope shown is the one in which the surest family of impacts was found, else the one whose lines stand out
-    most; the channel's own band is shown where it bears out a damage that is claimed of a bearing. `changes` are
-    differences from a reference's averages, by shaft and channel: those of shafts with a damaged tooth are shown.
+    The envelope shown is the one with the most certain family of impacts, else the one whose lines stand out most. The
+    kurtogram's band is shown if it confirms damage claimed of a bearing. `changes` are differences from a reference's
+    averages, by shaft and channel; those of shafts with a damaged tooth are shown.
     """
     kurtogram_band = next((band for band in kurtogram_bands if band.envelope.channel == name), None)
     candidates = [e for e in (*envelopes, *([kurtogram_band.envelope] if kurtogram_band else [])) if e.channel == name]

@@ -1,4 +1,4 @@
-"""Recordings of machines that start, stop and reverse: recognised, and examined without pretending a steady speed."""
+"""Recordings of machines that start, stop and reverse: recognised, and examined without assuming a steady speed."""
 
 from __future__ import annotations
 
@@ -25,17 +25,18 @@ Settings = Mapping[str, str | float | int | None]
 def start_stop_analysis(
     recording: Recording, rig: Rig, problems: list[Finding], settings: Settings, reference: Recording | None = None
 ) -> Analysis | None:
-    """Return the analysis of a start–stop recording, or None where the motion is not one or is not known.
+    """Return the analysis of a start–stop recording, or None if the motion is of another kind or unknown.
 
-    Only an encoder or a speed channel tells: both see standstill and direction. With a reference, the backlash is
-    compared with its backlash instead of the rig file's, and suspicions say whether it shows them as well.
+    Only an encoder or a speed channel can decide, as both show standstill and direction. With a reference, the backlash
+    is compared with the reference's instead of the rig file's, and suspicions say whether the reference shows them as
+    well.
 
     Raises
     ------
     InputError
-        If the encoder's angle starts again after each revolution and the rig does not say so.
+        If the encoder's angle restarts after each revolution and the rig does not say so.
     RefusalError
-        If a machine whose contact the rig describes only stands.
+        If a machine whose contact the rig describes is always at rest.
     """
     angle_rad = _angle_rad(recording, rig)
     try:
@@ -48,9 +49,9 @@ def start_stop_analysis(
     if not motions.is_start_stop(segments):
         return None
     source = recording.speed_source or rig.speed
-    if isinstance(source, EncoderChannel):  # what seems to turn back may be an encoder that wraps
+    if isinstance(source, EncoderChannel):  # an apparent reversal may be an encoder that wraps
         motions.check_wrap(angle_rad, recording.sampling_rate_hz, source.channel, recording.provenance.source)
-    # What a machine at rest does to good sensors is no problem: teeth in their play carry nothing, again and again.
+    # What healthy sensors do on a machine at rest is no problem: teeth within their backlash carry nothing repeatedly.
     forces = {c.name for c in recording.channels if c.quantity in ("force", "torque")}
     findings = [p for p in problems if p.code != "channel-stuck" or not set(p.where.channels) <= forces]
     findings.append(_motion_finding(segments))
@@ -81,7 +82,7 @@ def start_stop_analysis(
 
 
 def _angle_rad(recording: Recording, rig: Rig) -> FloatArray | None:
-    """Return the shaft's angle from an encoder or a speed channel; None without one."""
+    """Return the shaft's angle in rad from an encoder or a speed channel; None without one."""
     source = recording.speed_source or rig.speed
     if not isinstance(source, (EncoderChannel, SpeedChannel)) or source.channel not in recording.channel_names:
         return None
@@ -96,18 +97,18 @@ def _angle_rad(recording: Recording, rig: Rig) -> FloatArray | None:
 
 
 def _check_standing(angle_rad: FloatArray, recording: Recording, rig: Rig) -> None:
-    """Refuse a machine that only stands, where its contact says how far its teeth are apart."""
+    """Refuse a machine that is always at rest, if its contact gives the distance between its teeth."""
     if rig.contact is None:
         return
     try:
         path = path_of_contact(rig)
-    except RefusalError:  # without geometry the rest is examined all the same
+    except RefusalError:  # without geometry the rest can still be examined
         return
     motions.check_driver_turns(angle_rad, path, rig.contact, recording.sampling_rate_hz, recording.provenance.source)
 
 
 def _motion_finding(segments: MotionSegments) -> Finding:
-    """Say how often the machine starts and stops, and when it moves."""
+    """Return the finding on how often the machine starts and stops, and when it moves."""
     top_rpm = segments.top_speed_rpm
     return Finding(
         "start-stop",
@@ -123,7 +124,7 @@ def _motion_finding(segments: MotionSegments) -> Finding:
 
 
 def _left_out(segments: MotionSegments, examined: StartStop | None) -> Finding:
-    """Name what wants a steady speed and is not examined."""
+    """Return the finding on what requires a steady speed and is not examined."""
     without_teeth = examined is None or examined.teeth is None
     what = "Cracks, bearings, shafts and meshing" if without_teeth else "Bearings, shafts and meshing"
     back = f", and it turns back by {segments.backwards_rad:.3g} rad" if segments.backwards_rad > 0.0 else ""
@@ -136,7 +137,7 @@ def _left_out(segments: MotionSegments, examined: StartStop | None) -> Finding:
 
 
 def _examined_teeth(recording: Recording, rig: Rig, then: Analysis | None) -> tuple[StartStop | None, list[Finding]]:
-    """Examine the teeth, where the rig says how they touch and the recording allows it."""
+    """Examine the teeth, if the rig describes their contact and the recording allows it."""
     if rig.contact is None:
         finding = cannot_tell(
             "contact-not-described",
@@ -158,10 +159,10 @@ def _examined_teeth(recording: Recording, rig: Rig, then: Analysis | None) -> tu
 
 
 def _backlash(examined: StartStop, rig: Rig, then: Analysis | None) -> Iterator[Finding]:
-    """Give the backlash beside the reference's, else beside the rig file's.
+    """Yield the backlash compared with the reference's, else with the rig file's.
 
-    It has grown where it exceeds that by 5 % (15 % over the rig file: temperature and load move it less than drawings
-    are off), and by four standard deviations.
+    It has grown if it exceeds that by 5 % and by four standard deviations; over the rig file's value by 15 %, because
+    temperature and load change it less than drawings are off.
     """
     backlash = examined.backlash
     if backlash is None or rig.contact is None:
@@ -198,7 +199,7 @@ def _backlash(examined: StartStop, rig: Rig, then: Analysis | None) -> Iterator[
 
 
 def _weak_teeth(examined: StartStop, rig: Rig) -> Iterator[Finding]:
-    """Name teeth of the driver that yield more than the others, as a cracked one does; or from which loss one would."""
+    """Yield driver teeth more compliant than the others, as if cracked; or the loss of stiffness that would show."""
     teeth, contact = examined.teeth, rig.contact
     if teeth is None or contact is None:
         return
@@ -235,7 +236,7 @@ def _weak_teeth(examined: StartStop, rig: Rig) -> Iterator[Finding]:
 
 
 def _impacts(examined: StartStop) -> Iterator[Finding]:
-    """Count the impacts and name the hardest."""
+    """Yield the finding on the number of impacts and the hardest."""
     if not examined.impacts:
         return
     hardest = max(examined.impacts, key=lambda impact: impact.speed_mps)
@@ -256,7 +257,7 @@ def _impacts(examined: StartStop) -> Iterator[Finding]:
 
 
 def _bursts(recording: Recording, problems: list[Finding]) -> dict[str, tuple[Burst, ...]]:
-    """Return the blows of every acceleration that is sampled fast enough and not dead."""
+    """Return the impacts in every acceleration channel that is sampled fast enough and not dead."""
     dead = {name for finding in problems if finding.code == "channel-dead" for name in finding.where.channels}
     bursts = {}
     for channel in recording.channels:
@@ -264,7 +265,7 @@ def _bursts(recording: Recording, problems: list[Finding]) -> dict[str, tuple[Bu
             values = np.asarray(recording.values(channel.name), dtype=np.float64)
             try:
                 bursts[channel.name] = motions.find_bursts(values, recording.sampling_rate_hz)
-            except InputError:  # too slow or too short for blows
+            except InputError:  # sampled too slowly or too short for impacts
                 continue
     return bursts
 
@@ -272,7 +273,7 @@ def _bursts(recording: Recording, problems: list[Finding]) -> dict[str, tuple[Bu
 def _burst_finding(
     name: str, blows: tuple[Burst, ...], angle_rad: FloatArray, recording: Recording, rig: Rig
 ) -> Finding:
-    """Count the blows in a vibration and place the hardest."""
+    """Return the finding on the number of impacts in a vibration, and the time of the hardest."""
     hardest = max(blows, key=lambda blow: blow.peak)
     unit = recording.channels[recording.index(name)].unit
     angle = float(angle_rad[round(hardest.time_s * recording.sampling_rate_hz)])

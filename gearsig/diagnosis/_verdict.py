@@ -1,4 +1,4 @@
-"""Lower what rests on doubtful input, order the findings, and put the most important into one sentence."""
+"""Lower findings based on unreliable input, order the findings, and put the most important into one sentence."""
 
 from __future__ import annotations
 
@@ -32,21 +32,21 @@ from gearsig.recording import ChannelProblem
 from gearsig.rig import Rig
 
 DEPTH_UNKNOWN = "crack-depth-unknown"
-"""Code of the finding that a given reference did not tell the depth of a crack."""
+"""Code of the finding that a crack's depth cannot be told although a reference was given."""
 
 NOT_ALONE = "{} and misalignment would only show against an earlier recording."
-"""What one recording alone does not tell: its lines are those of healthy machines, only higher."""
+"""What one recording alone cannot show: its lines are those of healthy machines, only higher."""
 
 NO_FAULT, CANNOT_TELL = "No fault shows.", "Cannot tell."
 
 SURER_WITH, WHAT_WOULD_HELP = "Surer with: ", "What would help: "
-"""Open the last sentence of a verdict that cannot tell."""
+"""Start of the last sentence of a verdict that cannot tell."""
 
 _RANK = {kind: i for i, kind in enumerate(Kind)}
 
 
 def ranked(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Return the findings, most important first: what has changed, then by kind, by confidence, by strength."""
+    """Return the findings, most important first: by change, then by kind, confidence and strength."""
 
     def key(finding: Finding) -> tuple[bool, int, float, float]:
         ratio = finding.strength.ratio_db if finding.strength is not None else None
@@ -56,9 +56,9 @@ def ranked(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 
 
 def verdict_of(findings: tuple[Finding, ...], *, has_reference: bool = False) -> str:
-    """Return the sentences a hurried reader takes away: a doubtful rate, what has changed, what it comes to.
+    """Return the sentences for a reader in a hurry: an uncertain rate, what has changed, and the outcome.
 
-    Why a given reference did not help, or that it shows a fault itself, is always part of it.
+    They always include why a given reference did not help, or that it shows a fault itself.
     """
     doubt = said_first(findings, claims=outcome_of(findings) in (Outcome.FAULT, Outcome.SUSPICION))
     unfit = next((f.title for f in findings if f.code in (REFERENCE_UNFIT, REFERENCE_NOT_HEALTHY)), "")
@@ -68,13 +68,13 @@ def verdict_of(findings: tuple[Finding, ...], *, has_reference: bool = False) ->
     changed, unchanged = (next((f.title for f in findings if f.code == code), "") for code in (CHANGED, UNCHANGED))
     others = tuple(f for f in findings if f.code not in (CHANGED, UNCHANGED, VIBRATION_ZONE))
     claims = [f for f in others if f.is_claim]
-    # A change that no pattern explains is a suspicion by itself, and said already.
+    # A change that no pattern explains is a suspicion in itself, and has been reported already.
     if not claims and any(f.code == CHANGED and f.is_claim for f in findings):
         return " ".join(filter(None, (doubt, changed, zone, unfit)))
     examined_text = _said(others, has_reference=has_reference)
     if (
         loud is not None and loud.code == VIBRATION_ZONE and not claims
-    ):  # nothing shows the cause, but the machine is not well
+    ):  # nothing shows the cause, but the machine is not healthy
         causes = (text for text in loud.evidence if text.endswith(CAN_DO_THAT))
         why = next(causes, "What is wrong does not show.")
         examined_text = f"{zone} {why}{examined_text.removeprefix(NO_FAULT).removeprefix(CANNOT_TELL)}"
@@ -97,7 +97,7 @@ def _said(findings: tuple[Finding, ...], *, has_reference: bool) -> str:
     titles = [f.title for f in findings if f.code in EXAMINED]
     if outcome is Outcome.NO_FAULT:
         has_teeth = any(f.code == "no-tooth-local-damage" for f in findings)
-        is_steady = has_teeth or bool(titles)  # a drive that starts and stops has no lines to look at
+        is_steady = has_teeth or bool(titles)  # a drive that starts and stops has no lines to examine
         open_ones = NOT_ALONE.format("Damage of many teeth, unbalance" if has_teeth else "Unbalance")
         depth = [f.title for f in findings if f.code == DEPTH_UNKNOWN and f.kind is Kind.NOTICE]
         return " ".join([NO_FAULT, *titles, *([open_ones] if is_steady and not has_reference else depth)])
@@ -113,7 +113,7 @@ def _said(findings: tuple[Finding, ...], *, has_reference: bool) -> str:
 
 
 def _remedy(gaps: list[Finding]) -> list[str]:
-    """Return what would settle the most important of the open questions, in one sentence."""
+    """Return in one sentence what would settle the most important of the open questions."""
     first = next((finding for finding in gaps if finding.surer), None)
     if first is None:
         return []
@@ -124,7 +124,7 @@ def _remedy(gaps: list[Finding]) -> list[str]:
 
 
 def _problem_title(problem: ChannelProblem) -> str:
-    """State a problem; of a line at an even multiple of the mains, that a magnetic field moves metal so as well."""
+    """Return a problem as a title; for a line at an even multiple of the mains, with magnetism as another cause."""
     pull = magnetic_pull_near(problem.frequency_hz) if problem.kind == "hum" and problem.frequency_hz else None
     if pull is not None:
         line = f"One line, {pull[1]:g} Hz, rules channel {problem.channel}"
@@ -133,7 +133,7 @@ def _problem_title(problem: ChannelProblem) -> str:
 
 
 def detect_data_problems(prepared: PreparedRecording) -> tuple[list[Finding], frozenset[str]]:
-    """Return findings about the data, and the names of dead channels, which are not analysed further."""
+    """Return findings on the data, and the names of dead channels, which are not analysed further."""
     findings = [
         Finding(
             f"channel-{p.kind}",
@@ -155,7 +155,7 @@ def detect_data_problems(prepared: PreparedRecording) -> tuple[list[Finding], fr
 
 
 # --------------------
-# What is wrong with the input lowers what rests on it: one place, for every problem and every finding.
+# Problems of the input lower the findings based on it: one place, for every problem and every finding.
 # --------------------
 
 
@@ -175,27 +175,27 @@ TRUST = {
     "channel-reversed": 0.5,
     "channel-hum": 0.75,
 }
-"""Problem → what a confidence is multiplied by: a judgement, and no probability. 0.5 where places or frequencies are
-probably wrong, 0.7 and 0.75 where they stand but sizes are not to be trusted, 0 where nothing is left."""
+"""Problem → factor on the confidence: a judgement, not a probability. 0.5 where places or frequencies are probably
+wrong, 0.7 and 0.75 where places are right but sizes unreliable, 0 where nothing is usable."""
 
 TRUST_OF_SHARED_LINE = 0.5
-"""The same of what rests on a line that the mains make as well: nothing tells which of the two does."""
+"""The same for a finding based on a line that the mains may cause as well: nothing tells which of the two does."""
 
 SAME_LINE = 2e-3
-"""Relative distance: the line is within a thousandth of the supply's multiple, the speed is known as well at best."""
+"""Relative distance: the line is within a thousandth of the supply's multiple, and the speed is known no better."""
 
 SURE = 0.7
-"""Below it, what was a fault is a suspicion."""
+"""Below this confidence a fault becomes a suspicion."""
 
 FASTEST_RPM = 5e5
-"""Dental drills and the smallest turbines come near it."""
+"""Dental drills and the smallest turbines come close to it."""
 
 NEAR_ZERO_SHARE = 0.1
-"""Of the highest speed: a tachometer does not tell whether a shaft that slows down so far turns on or back."""
+"""Share of the highest speed: a tachometer does not show whether a shaft that slows down this far reverses."""
 
 
 def speed_warnings(angle: ShaftAngle | CannotTell, rig: Rig) -> list[Finding]:
-    """Compare the speed with the rig's nominal speed and tolerance, and see whether it comes near standstill."""
+    """Compare the speed with the rig's nominal speed and tolerance, and check whether it comes near standstill."""
     if not isinstance(angle, ShaftAngle):
         return []
     doubts = []
@@ -231,7 +231,7 @@ def speed_warnings(angle: ShaftAngle | CannotTell, rig: Rig) -> list[Finding]:
 
 
 def without_synchronous_hum(findings: Iterable[Finding], angle: ShaftAngle | CannotTell, rig: Rig) -> list[Finding]:
-    """Call hum a notice where one to four times a shaft's speed is the same frequency: it may be the shaft."""
+    """Make hum a notice where one to four times a shaft's speed is the same frequency: it may be the shaft."""
     turns_hz = []
     if isinstance(angle, ShaftAngle):
         ratios = {name: rig.ratio(name) for name in rig.shaft_names} or {angle.shaft: 1.0}
@@ -253,8 +253,8 @@ def _perhaps_the_shafts(hum: Finding, turns_hz: Sequence[tuple[str, float]]) -> 
 def lowered(findings: Iterable[Finding], channels: Sequence[str]) -> list[Finding]:
     """Return the findings with faults and suspicions lowered, or withheld, by the problems among them.
 
-    A problem of a channel touches what was seen in it; one of speed or sampling rate touches everything; a line that
-    may be the mains' what is said of that line, but not that it has changed.
+    A problem of a channel affects what was seen in it; one of speed or sampling rate affects everything. A line that
+    may be the mains' affects what is said of that line, except that it has changed.
     """
     findings = list(findings)
     problems = [f for f in findings if f.code in TRUST or f.code == MAINS_OR_SHAFT]
@@ -281,7 +281,7 @@ def _lowered(finding: Finding, problems: Sequence[Finding], channels: Sequence[s
 
 
 def _rests_on(finding: Finding, line: Finding) -> bool:
-    """Whether a finding is one of a line, and no mere change of it."""
+    """Whether a finding is based on a line, and not only on its change."""
     own_hz, line_hz = finding.where.frequency_hz, line.where.frequency_hz
     return bool(finding.code != CHANGED and own_hz and line_hz and abs(own_hz / line_hz - 1) < SAME_LINE)
 
@@ -292,7 +292,7 @@ def _of_channels(problem: Finding) -> set[str]:
 
 
 def spoiled(findings: Iterable[Finding], channels: Sequence[str]) -> frozenset[str]:
-    """Return the channels from which no depth of a crack is to be read."""
+    """Return the channels from which no crack depth must be estimated."""
     spoiled_channels: set[str] = set()
     for finding in findings:
         if finding.code in TRUST:
@@ -301,7 +301,7 @@ def spoiled(findings: Iterable[Finding], channels: Sequence[str]) -> frozenset[s
 
 
 def withheld_crack(findings: Iterable[Finding], *, is_asked: bool) -> CannotTell | None:
-    """Return why the depth of a crack is withheld where every channel is spoiled; None where nobody asked."""
+    """Return why a crack's depth is withheld if every channel is unusable; None if nobody asked for it."""
     if not is_asked:
         return None
     reason = " ".join(f.title for f in findings if f.code in TRUST).rstrip(".")  # it ends a sentence
@@ -309,9 +309,9 @@ def withheld_crack(findings: Iterable[Finding], *, is_asked: bool) -> CannotTell
 
 
 def said_first(findings: Sequence[Finding], *, claims: bool) -> str:
-    """Return the problems that open the verdict: rate or speed always, those of channels where something is claimed."""
+    """Return the problems that open the verdict: rate or speed always, those of channels if something is claimed."""
     titles = {f.code: f.title for f in findings if f.code in TRUST and f.kind is Kind.DATA_PROBLEM}
     if SAMPLING_RATE in titles:
-        titles.pop(OFF_NOMINAL, None)  # the same, seen from the other side
+        titles.pop(OFF_NOMINAL, None)  # the same problem, seen from the other side
     first = [title for code, title in titles.items() if not code.startswith("channel-") and code != NEAR_ZERO]
     return " ".join([*first, *(t for t in titles.values() if claims and t not in first)])

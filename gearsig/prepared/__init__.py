@@ -1,4 +1,4 @@
-"""One prepared record per recording: angle, resampled channels, averages and lines, each computed once, on demand.
+"""Prepared recordings: angle, resampled channels, averages and lines, each computed once per recording, on demand.
 
 >>> from gearsig.prepared import PreparedRecording
 >>> from gearsig import analyze, estimate_crack, read_recording  # doctest: +SKIP

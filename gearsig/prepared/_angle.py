@@ -1,4 +1,4 @@
-"""The angle of the reference shaft, refined by what the vibration itself shows of the speed."""
+"""The angle of the reference shaft, with the speed refined from the vibration itself."""
 
 from __future__ import annotations
 
@@ -29,42 +29,42 @@ from gearsig.recording import MAINS_HZ, Recording
 from gearsig.rig import STATED_SPEED_TOLERANCE_PERCENT, ConstantSpeed, Rig, SpeedChannel
 
 STATED_SPEED_TOLERANCE = 0.03
-"""How far the true speed may be from a stated one: the slip of an induction motor from no load to full load."""
+"""Relative tolerance of a stated speed: the slip of an induction motor from no load to full load."""
 
 ROTOR_SPEED_TOLERANCE = STATED_SPEED_TOLERANCE_PERCENT / 100
-"""The same without gears, whose sidebands would be taken for mesh lines so far away, and where two channels show the
-shaft."""
+"""The same without gears, whose sidebands would be mistaken for mesh lines over so wide a range, if two channels show
+the shaft."""
 
 LARGEST_DRIFT_REV = 0.01
-"""Drift of the angle over the record that averages bear: a third of a tooth's pitch of thirty teeth."""
+"""Drift of the angle over the record that averages tolerate: a third of a tooth's pitch for thirty teeth."""
 
 STEADY = 0.01
 """Relative range of a speed channel below which the mesh lines are sought at one speed."""
 
 N_SHAFT_HARMONICS = 8
 N_PHASE_HARMONICS = 3
-"""Of the mesh, whose phase an angle may follow."""
+"""Mesh harmonics whose phase an angle may follow."""
 
 RULES_DB = 20.0
-"""By which a rotor's own line stands above the floor, or above all others within the tolerance of a stated speed."""
+"""Height of a rotor's own line above the floor, and above all others within the tolerance of a stated speed."""
 
 MAINS_TOLERANCE = 0.002
-"""How far a supply's frequency wanders at most; its harmonics, and those of motors, lie within a motor's slip.
+"""Largest relative drift of a supply's frequency; its harmonics, and those of motors, lie within a motor's slip.
 
-Twice what the quality of a recording allows a hum: these lines are only left out, or said to confirm nothing."""
+Twice the limit for hum in a recording's quality: these lines are only left out, or treated as confirming nothing."""
 
 
 def refined_angle(recording: Recording, rig: Rig) -> ShaftAngle:
-    """Return the angle of the reference shaft, a stated speed refined where the signal shows the true one near it.
+    """Return the angle of the reference shaft, refining a stated speed if the signal shows the true one near it.
 
-    Synchronous averages need the speed to a small part of a revolution over the whole record, and nameplates are not
-    as good as that.
+    Synchronous averages need the speed to a small fraction of a revolution over the whole record, and nameplates are
+    not that accurate.
 
     Parameters
     ----------
     recording : Recording
     rig : Rig
-        Its speed source is used where the recording has none.
+        Its speed source is used if the recording has none.
 
     Raises
     ------
@@ -88,17 +88,17 @@ def refined_angle(recording: Recording, rig: Rig) -> ShaftAngle:
 
 
 def phase_followed_angle(recording: Recording, rig: Rig, estimated: ShaftAngle) -> ShaftAngle:
-    """Let an angle that was estimated from the vibration follow the phase of the mesh harmonics.
+    """Return an angle estimated from the vibration, made to follow the phase of the mesh harmonics.
 
-    The estimate may hold the speed constant where it wanders by some 10⁻⁴. Over hundreds of revolutions that is half
-    a tooth, and takes decibels from the averages' mesh harmonics.
+    The estimate may hold the speed constant although it varies by some 10⁻⁴. Over hundreds of revolutions that is half
+    a tooth, and costs the averages' mesh harmonics decibels.
 
     Parameters
     ----------
     recording : Recording
     rig : Rig
     estimated : ShaftAngle
-        Of the reference shaft; one that was not estimated from the vibration is returned as it is.
+        Of the reference shaft; an angle not estimated from the vibration is returned unchanged.
     """
     if estimated.method != "tachless":
         return estimated
@@ -120,7 +120,7 @@ def _refined(recording: Recording, rig: Rig, stated: ShaftAngle) -> ShaftAngle:
     Raises
     ------
     RefusalError
-        If the strongest line near it wanders, so that there is no one speed.
+        If the strongest line near it varies, so that there is no single speed.
     """
     by_lines = _from_meshes(recording, rig, stated) if rig.pairs else _from_shaft_harmonics(recording, stated)
     if by_lines is None:
@@ -136,20 +136,20 @@ def _refined(recording: Recording, rig: Rig, stated: ShaftAngle) -> ShaftAngle:
 
 
 BLOCK_REV, MIN_BLOCKS, MAX_BLOCKS = 32, 8, 64
-"""Revolutions of a block in which a rotor's own line is sought, and how many blocks, at half overlap or wider apart."""
+"""Revolutions of a block in which a rotor's own line is sought, and number of blocks, overlapping by half or less."""
 
 NEAR, CLEAR_OF_BLOCK = 0.25, 6.0
-"""How far from the stated speed it is sought, relatively, and its height over the median there: of noise the largest of
-so many lines reaches twice that."""
+"""Relative range around the stated speed in which it is sought, and its height over the median there: in noise the
+largest of so many lines reaches twice the median."""
 
 WANDERS = 0.02
-"""Relative range over the record from which a line has no one frequency; a motor's load moves it by less."""
+"""Relative range over the record above which a line has no single frequency; a motor's load shifts it by less."""
 
 
 def _refuse_a_wandering_speed(recording: Recording, stated: ShaftAngle) -> None:
-    """Refuse a constant speed where a rotor's own line runs through a range of speeds, from block to block steadily.
+    """Refuse a constant speed if a rotor's own line runs steadily through a range of speeds from block to block.
 
-    Lines over the angle of a constant speed would be smeared, and what does not show in them would be called healthy.
+    Lines over the angle of a constant speed would be smeared, and damage hidden by this would be reported as healthy.
     """
     from scipy.fft import rfft
 
@@ -176,9 +176,9 @@ def _refuse_a_wandering_speed(recording: Recording, stated: ShaftAngle) -> None:
 
 
 def _rescaled(recording: Recording, rig: Rig, measured: ShaftAngle) -> ShaftAngle:
-    """Return a steady speed channel's angle at the scale the mesh lines show, if they show another.
+    """Return a steady speed channel's angle, rescaled if the mesh lines show another speed.
 
-    Speed channels are right to a part in a hundred or a thousand, which is revolutions in a long record.
+    Speed channels are accurate to a part in a hundred or a thousand, which is revolutions in a long record.
     """
     if not rig.pairs or not measured.is_steady(STEADY):
         return measured
@@ -200,18 +200,18 @@ def _from_meshes(recording: Recording, rig: Rig, stated: ShaftAngle) -> ShaftAng
         by_lines = estimate_shaft_angle(recording, rig, speed_range_rpm=limits, explained=False)
     except RefusalError:
         return None
-    # A profile that is followed may leave the range: to where the mesh of wrong teeth is.
+    # An estimate that follows a profile may leave the range, for the mesh of wrong tooth counts.
     return by_lines if limits[0] <= by_lines.mean_speed_rpm <= limits[1] else None
 
 
 def _from_shaft_harmonics(recording: Recording, stated: ShaftAngle) -> ShaftAngle | None:
     """Find the shaft's harmonics in all channels and the envelopes of all bands together.
 
-    Each shows lines of its own, a bearing's above all; those of the shaft are common to them. A speed other than the
-    stated one must show its first harmonic, and that clearer than a channel's own spectrum has one at the stated speed.
-    A family on multiples of the mains says nothing, and is left out: a hum's would be taken for the shaft of any motor
-    of little slip. Speeds further away are sought where none is near. Cut as they are, common lines tell the
-    fundamental to a fraction of their width only, and a line of the mains beside a harmonic pulls it: the peaks in the
+    Each shows lines of its own, above all a bearing's; the shaft's are common to them. A speed other than the stated
+    one must show its first harmonic, and more clearly than any channel's own spectrum shows one at the stated speed. A
+    family on multiples of the mains is inconclusive and left out: hum would be taken for the shaft of any motor with
+    little slip. Speeds further away are sought only if none is near. Because common lines are clipped, they give the
+    fundamental only to a fraction of their width, and a line of the mains beside a harmonic biases it: the peaks in the
     channels' own spectra decide, see `_by_peaks`.
     """
     spectra = list(_spectra_of_shaft(recording))
@@ -232,7 +232,7 @@ def _from_shaft_harmonics(recording: Recording, stated: ShaftAngle) -> ShaftAngl
 def _comb_of_shaft(
     channels: list[LinesOverFloor], lines: LinesOverFloor, stated: ShaftAngle, tolerance: float
 ) -> tuple[Comb, int] | None:
-    """Return the harmonics of a shaft among the common lines, and of how many; None where chance explains them."""
+    """Return a shaft's harmonics among the common lines, and the number examined; None if chance explains them."""
     hertz = stated.mean_speed_rpm / 60
     low, high = hertz * (1 - tolerance), hertz * (1 + tolerance)
     harmonics = np.arange(1, N_SHAFT_HARMONICS + 1)
@@ -251,7 +251,7 @@ def _comb_of_shaft(
 def _by_comb(
     channels: list[LinesOverFloor], lines: LinesOverFloor, stated: ShaftAngle, comb: Comb, n_harmonics: int
 ) -> ShaftAngle | None:
-    """Return the angle at the speed of a shaft's harmonics; None where another speed's first one is not the clearer."""
+    """Return the angle at the speed of a shaft's harmonics; None if another speed's first harmonic is not clearer."""
     hertz, resolution = stated.mean_speed_rpm / 60, lines.spectrum.resolution
     fundamental_hz = _by_peaks(channels, comb.fundamental)
     if abs(fundamental_hz - hertz) > resolution:
@@ -262,7 +262,7 @@ def _by_comb(
 
 
 def magnetic_pull_near(hertz: float) -> tuple[float, float] | None:
-    """Return a supply's frequency and the multiple of twice it, its magnetic pull, that is at a frequency, in Hz."""
+    """Return a supply's frequency and its magnetic pull, the multiple of twice it at a given frequency, in Hz."""
     for mains_hz in MAINS_HZ:
         pull_hz = 2 * mains_hz * round(hertz / (2 * mains_hz))
         if pull_hz > 0 and abs(hertz / pull_hz - 1) <= MAINS_TOLERANCE:
@@ -271,10 +271,10 @@ def magnetic_pull_near(hertz: float) -> tuple[float, float] | None:
 
 
 def _by_peaks(channels: list[LinesOverFloor], fundamental_hz: float) -> float:
-    """Return the fundamental by the peaks of its harmonics that are far over the floor, each where it is clearest.
+    """Return the fundamental from the peaks of its harmonics far above the floor, each where it is clearest.
 
-    The median of peak over number, each weighing as much as its number, for so much preciser it is; what lies on the
-    magnetic pull of a supply is left out. Without such peaks it is returned as it is.
+    It is the median of peak over number, weighted by number because precision grows with it; peaks at the magnetic pull
+    of a supply are left out. Without such peaks the fundamental is returned unchanged.
     """
     fundamentals, numbers = [], []
     for k in range(1, N_SHAFT_HARMONICS + 1):
@@ -293,14 +293,14 @@ def _by_peaks(channels: list[LinesOverFloor], fundamental_hz: float) -> float:
 
 
 def _distinguishing_harmonic(channels: list[LinesOverFloor], fundamental_hz: float, stated_hz: float) -> int | None:
-    """Return the lowest harmonic that tells two speeds apart if it is clearly at the stated one, else None.
+    """Return the lowest harmonic that separates two speeds if it is clearly at the stated one, else None.
 
-    Higher harmonics of a speed that is off by a line or two may be a race's lines, with the shaft's sidebands about.
+    Higher harmonics of a speed that is off by a line or two may be a race's lines, flanked by the shaft's sidebands.
     """
     apart = max(abs(fundamental_hz - stated_hz), 1e-12)
     h = 1 + int(2 * channels[0].spectrum.resolution / apart)
     if not 1 < h <= N_SHAFT_HARMONICS:
-        return None  # the first harmonic is asked anyway, or they are one speed
+        return None  # the first harmonic is tested anyway, or the speeds are the same
     fundamental_db, stated_db = (
         max(_line_db(excess, h * hz) for excess in channels) for hz in (fundamental_hz, stated_hz)
     )
@@ -319,9 +319,9 @@ def _at(stated: ShaftAngle, hertz: float, uncertainty_hz: float, quality: float)
 
 
 def _from_first_harmonic(channels: list[LinesOverFloor], stated: ShaftAngle) -> ShaftAngle | None:
-    """Take the one line near the stated speed that rules a channel's spectrum there: that of a rotor without harmonics.
+    """Use the line near the stated speed that dominates a channel's spectrum there, of a rotor without harmonics.
 
-    A line where a supply's may be leaves the speed unconfirmed.
+    A line at a supply's frequency leaves the speed unconfirmed.
     """
     hertz = stated.mean_speed_rpm / 60
     for excess in channels:
@@ -345,9 +345,9 @@ def _from_first_harmonic(channels: list[LinesOverFloor], stated: ShaftAngle) -> 
 def _common_lines(spectra: list[LinesOverFloor], n_first: int) -> LinesOverFloor:
     """Return the lines over frequency that all channels and the envelopes of their bands have in common.
 
-    The mean over the spectra of the logarithm of power over floor, each cut so that no single one decides. The
-    `n_first` spectra of the channels themselves, which come first, count half of all: unbalance and bow are lines
-    there, and hardly modulate.
+    They are the mean over the spectra of ln(power/floor), each clipped so that no single one decides. The `n_first`
+    spectra of the channels themselves, which come first, count half of all: unbalance and bow are lines there, and
+    hardly modulate.
     """
     weights = np.full(len(spectra), 0.5 / max(len(spectra) - n_first, 1))
     weights[:n_first] = 0.5 / n_first
@@ -385,17 +385,17 @@ def _spectra_of_shaft(recording: Recording) -> Iterator[LinesOverFloor]:
 
 
 DIVISIONS = (1, 2, 6)
-"""The spectrum is taken whole, in halves and in sixths: wide bands gather weak impacts, narrow ones leave out gears."""
+"""The spectrum as a whole, in halves and in sixths: wide bands gather weak impacts, narrow ones exclude gears."""
 
 LOWEST_BAND_HZ = 300.0
-"""Below it shaft and first mesh harmonics rule; impacts of a bearing ring at structural resonances above."""
+"""Below it shaft and first mesh harmonics dominate; impacts of a bearing ring at structural resonances above."""
 
 
 def envelope_bands(sampling_rate_hz: float) -> tuple[tuple[float, float], ...]:
     """Return bands of equal relative width, coarse and fine, that cover the spectrum up to 0.45 of the sampling rate.
 
-    Several bands are searched instead of one chosen by its kurtosis: the kurtosis of a gearbox is as often that of the
-    gears, and the family of lines itself says which band carries it.
+    Several bands are searched instead of one selected by its kurtosis: in a gearbox the kurtosis is as often due to the
+    gears, and the family of lines itself shows which band carries it.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""Families of equally spaced lines in a spectrum, and whether noise could have made them; what averages share.
+"""Families of equally spaced lines in a spectrum, and whether noise could have caused them; shared tools for averages.
 
-The score of a fundamental is the sum, over its harmonics, of the logarithm of line power over local floor, each cut at
-a limit so that one huge line cannot make a family. Its null distribution is not assumed: the terms are drawn from the
+The score of a fundamental is the sum, over its harmonics, of the logarithm of line power over local floor, each clipped
+so that one huge line cannot make a family. Its null distribution is not assumed: the terms are drawn from the
 spectrum's own lines, and the distribution of their sum is their convolution.
 """
 
@@ -26,13 +26,13 @@ LOG_RATIO_LIMIT = 6.0
 """Natural log of power over floor at which a harmonic counts in full: 26 dB, far above what noise reaches."""
 
 CLEAR_LINE_DB = 6.0
-"""A line that counts as seen: noise exceeds it in 2 % of the lines, so that only several together say anything."""
+"""A line counts as seen above this; noise exceeds it in 2 % of the lines, so that only several together matter."""
 
 FOOT_LINES = 3
-"""Lines that one tone reaches to either side: two by the Hann window, and one by the widening of the log ratios."""
+"""Lines that one tone reaches on either side: two by the Hann window, and one by the widening of the log ratios."""
 
 N_FITS = 4
-"""Passes of fitting the fundamental to the peaks and looking for the peaks again."""
+"""Passes of fitting the fundamental to the peaks and searching for the peaks again."""
 
 CHUNK = 1 << 17
 """Fundamentals tried at a time: long records with wide ranges have millions of them."""
@@ -43,7 +43,7 @@ _STEP = 0.05
 
 @dataclass(frozen=True)
 class LinesOverFloor:
-    """How far each line of a spectrum stands above its floor.
+    """The height of each line of a spectrum above its floor.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class LinesOverFloor:
     log_ratio : array, (n_lines,)
         ln(power/floor power) of the largest of the line and its two neighbours, 0 to `LOG_RATIO_LIMIT`.
     masked : array of bool, (n_lines,)
-        Lines that are explained already; their `log_ratio` counts as 0.
+        Lines that are already explained; their `log_ratio` counts as 0.
     """
 
     spectrum: Spectrum
@@ -67,9 +67,9 @@ class LinesOverFloor:
     ) -> LinesOverFloor:
         """Return the same with the lines around start ± k·fundamental masked.
 
-        At least a line's own foot is masked; `half_width` makes it more, in the axis' unit, and `skirt` in proportion
-        to the position, for lines that smear as the speed wanders.
-        Where the multiples lie so close that most lines would go, nothing is masked: then they cannot be told apart.
+        At least a line's own foot is masked; `half_width` widens this, in the axis' unit, and `skirt` in proportion to
+        the position, for lines that smear with a varying speed. If the multiples are so close that most lines would be
+        masked, nothing is: they cannot be resolved.
         """
         reach = max(half_width, FOOT_LINES * self.spectrum.resolution)
         if fundamental < 4 * reach:
@@ -90,12 +90,12 @@ class LinesOverFloor:
         return index[(index >= 0) & (index < len(self.log_ratio))]
 
     def free_lines_at(self, places: FloatArray) -> NDArray[np.int64]:
-        """Return the numbers of the lines at some places that are not explained already."""
+        """Return the numbers of the lines at some places that are not explained yet."""
         index = self.lines_at(places)
         return index[~self.masked[index]]
 
     def over_floor_db(self, lines: NDArray[np.int64]) -> FloatArray:
-        """Return the height of the largest of each line and its two neighbours over the floor, not cut at any limit."""
+        """Return the unclipped height over the floor of the largest of each line and its two neighbours, in dB."""
         values, last = self.spectrum.values, len(self.spectrum.values) - 1
         near = np.clip(lines[:, None] + np.arange(-1, 2), 0, last)
         ratio = values[near].max(axis=1) / np.maximum(self.floor[np.clip(lines, 0, last)], 1e-300)
@@ -114,7 +114,7 @@ class LinesOverFloor:
 
     @cached_property
     def _densities(self) -> list[FloatArray]:
-        """Distributions of sums of 1, 2, … draws: searches over many ranges ask for the same ones."""
+        """Distributions of sums of 1, 2, … draws, kept because searches over many ranges need the same ones."""
         n_cells = int(np.ceil(LOG_RATIO_LIMIT / _STEP)) + 1
         cells = np.bincount((self.log_ratio[~self.masked] / _STEP).astype(np.intp), minlength=n_cells)
         return [(cells + 1e-9) / (cells.sum() + 1e-9 * n_cells)]
@@ -136,7 +136,7 @@ class Comb:
         In the axis' unit of the spectrum.
     score : float
     p_value : float
-        Probability that the best of all fundamentals tried scores as high where there is no family.
+        Probability that the best of all fundamentals tried scores as high if there is no family.
     positions : tuple of float
         Harmonics whose line stands at least 6 dB above the floor.
     ratios_db : tuple of float
@@ -155,12 +155,12 @@ class Comb:
 
 
 def over_floor_db(amplitude: float, floor: float) -> float:
-    """Return 20 lg(amplitude/floor) in dB, of vanishing amplitudes and floors too.
+    """Return 20 lg(amplitude/floor) in dB, also for amplitudes and floors of zero.
 
     Parameters
     ----------
     amplitude, floor : float
-        In one unit; below 1e-300 they count as that.
+        In the same unit; values below 1e-300 count as 1e-300.
     """
     return 20 * float(np.log10(max(amplitude, 1e-300) / max(floor, 1e-300)))
 
@@ -168,7 +168,7 @@ def over_floor_db(amplitude: float, floor: float) -> float:
 def lines_over_floor(spectrum: Spectrum, floor: FloatArray) -> LinesOverFloor:
     """Return how far each line of an amplitude spectrum stands above its floor, ln(P/P₀) = 2 ln(A/A₀).
 
-    Of a line and its two neighbours the largest counts, as a tone between two lines is lower in each.
+    The largest of a line and its two neighbours counts, as a tone between two lines is lower in each.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def lines_over_floor(spectrum: Spectrum, floor: FloatArray) -> LinesOverFloor:
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         log_ratio = spectrum.values / floor
-        np.fmax(log_ratio, 1.0, out=log_ratio)  # nothing over nothing counts as 1
+        np.fmax(log_ratio, 1.0, out=log_ratio)  # zero over zero counts as 1
         log_ratio = np.minimum(2.0 * np.log(log_ratio, out=log_ratio), LOG_RATIO_LIMIT, out=log_ratio)
     widened = log_ratio.copy()
     np.maximum(widened[1:], log_ratio[:-1], out=widened[1:])
@@ -200,7 +200,7 @@ def lines_over_noise_floor(spectrum: Spectrum, highest: float | None = None) -> 
     spectrum : Spectrum
         Amplitudes.
     highest : float or None
-        Position up to which lines are looked at, in the axis' unit; None: all.
+        Position up to which lines are examined, in the axis' unit; None: all.
 
     Returns
     -------
@@ -233,7 +233,7 @@ def best_comb(
     Returns
     -------
     Comb or None
-        None where the range holds no fundamental that the spectrum can resolve.
+        None if the range contains no fundamental that the spectrum can resolve.
     """
     multiples = np.arange(1, 7) if offsets is None else np.asarray(offsets)
     starts = np.zeros(1) if centres is None else np.asarray(centres, dtype=np.float64)
@@ -276,7 +276,7 @@ def comb_at(excess: LinesOverFloor, fundamental: float, multiples: NDArray[np.in
         In the axis' unit; it is refined on the lines.
     multiples : array of int, (n,)
     p_value : float
-        Of the means by which it was found.
+        Of the method that found it.
 
     Returns
     -------
@@ -294,7 +294,7 @@ def independent_trials(n_candidates: int) -> int:
 
 
 def chance_of_any(p_value: float, n_trials: float) -> float:
-    """Return the chance that any of n independent trials gives so small a p-value: 1 − (1 − p)ⁿ.
+    """Return the probability that any of n independent trials gives so small a p-value: 1 − (1 − p)ⁿ.
 
     Z. Šidák, "Rectangular confidence regions for the means of multivariate normal distributions", 1967.
     """
@@ -302,7 +302,7 @@ def chance_of_any(p_value: float, n_trials: float) -> float:
 
 
 def score_needed(excess: LinesOverFloor, n_terms: int, low: float, high: float, probability: float) -> float:
-    """Return the score that the best family between `low` and `high` reaches by chance with `probability` only.
+    """Return the score that the best family between `low` and `high` reaches by chance only with `probability`.
 
     Parameters
     ----------
@@ -312,12 +312,12 @@ def score_needed(excess: LinesOverFloor, n_terms: int, low: float, high: float, 
     low, high : float
         Range of fundamentals, in the axis' unit.
     probability : float
-        Of one such score or a higher one among all fundamentals.
+        Of such a score or a higher one among all fundamentals.
 
     Returns
     -------
     float
-        Sum of log ratios; infinite if even lines that all count in full would be likelier than that.
+        Sum of log ratios; infinite if even lines that all count in full would be more probable than that.
     """
     n_candidates = int((high - low) * 3 * n_terms / excess.spectrum.resolution) + 2
     tail = np.cumsum(excess.sum_density(n_terms)[::-1])[::-1]
@@ -327,7 +327,7 @@ def score_needed(excess: LinesOverFloor, n_terms: int, low: float, high: float, 
 
 
 def _widest(spectrum: Spectrum, starts: FloatArray, multiples: NDArray[np.int_]) -> float:
-    """Return the largest fundamental that has any of its multiples within the axis."""
+    """Return the largest fundamental with at least one multiple on the axis."""
     room = np.where(multiples > 0, spectrum.positions[-1] - starts[:, None], starts[:, None])
     return float(np.max(room / np.abs(multiples)))
 
@@ -335,9 +335,9 @@ def _widest(spectrum: Spectrum, starts: FloatArray, multiples: NDArray[np.int_])
 def _highest(
     excess: LinesOverFloor, origins: FloatArray, factors: NDArray[np.int_], low: float, step: float, n_candidates: int
 ) -> tuple[FloatArray, FloatArray, int]:
-    """Return the fundamentals whose score is as good as the highest, their scores, and the lines that were summed.
+    """Return the fundamentals with practically the highest score, their scores, and the number of lines summed.
 
-    Scores are cut and widened by a line, so that strong families score the same over several candidates.
+    Scores are clipped and widened by a line, so that strong families score the same over several candidates.
     """
     scores, resolution = excess.scores(), excess.spectrum.resolution
     inside_once = np.zeros(len(factors), dtype=np.bool_)
@@ -380,7 +380,7 @@ def _mask_multiples(
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _comb_totals(scores, candidates, origins, factors, first, resolution, inside_once):  # type: ignore[no-untyped-def]
-    """Sum the scores nearest to origin + factor · candidate; note which terms met the spectrum at all."""
+    """Sum the scores nearest to origin + factor · candidate, and note which terms were on the spectrum at all."""
     total = np.zeros(len(candidates))
     for i in range(len(factors)):
         for j in range(len(candidates)):
@@ -393,14 +393,14 @@ def _comb_totals(scores, candidates, origins, factors, first, resolution, inside
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _sharpest(values, floor, masked, candidates, origins, factors, first, resolution):  # type: ignore[no-untyped-def]
-    """Return the candidate whose harmonics meet the peaks best: ln(A/A₀) of each by itself, not cut at any limit."""
+    """Return the candidate whose harmonics fit the peaks best: the sum of ln(A/A₀), each unclipped."""
     sums = np.zeros(len(candidates))
     for i in range(len(factors)):
         for j in range(len(candidates)):
             line = int(np.rint((origins[i] + factors[i] * candidates[j] - first) / resolution))
             line = min(max(line, 0), len(values) - 1)
             if values[line] > 0.0 and not masked[line]:
-                # Cut where the floor is next to nothing.
+                # Clipped where the floor is almost zero.
                 sums[j] += min(log(values[line] / floor[line]), 40.0) if floor[line] > 0.0 else 40.0
     return np.argmax(sums)
 
@@ -416,7 +416,7 @@ def tail_probability(excess: LinesOverFloor, n_terms: int, score: float) -> floa
     score : float
         Sum of their log ratios.
     """
-    # Draws were floored to their cell, so the sum may lie half a cell per term higher than its cell says.
+    # Draws were rounded down to their cell, so the sum may be half a cell per term higher than its cell says.
     threshold = int(np.floor((score - n_terms * _STEP / 2) / _STEP))
     return min(max(float(excess.sum_density(n_terms)[max(threshold, 0) :].sum()), 0.0), 1.0)
 
@@ -429,7 +429,7 @@ def _described(
     score: float,
     p_value: float,
 ) -> Comb:
-    """Fit the fundamental to the peaks, and gather the family's lines."""
+    """Fit the fundamental to the peaks, and collect the family's lines."""
     spectrum = excess.spectrum
     fitted, peaks, positions, ratios_db = _fit_to_peaks(
         spectrum.values,
@@ -461,8 +461,8 @@ _over_floor_db = njit(cache=True, nogil=True)(over_floor_db)
 def _fit_to_peaks(values, at, resolution, floor, masked, origins, multiples, fundamental):  # type: ignore[no-untyped-def]
     """Return the fitted fundamental, and number, position and height of its lines that stand clearly above the floor.
 
-    Least squares of position - origin = multiple · fundamental; the clearer a line, the less its position varies, by
-    its power over the floor, which is cut at 30 dB.
+    Least squares of position - origin = multiple · fundamental. Clearer lines have less scatter in position, so they
+    are weighted by power over floor, clipped at 30 dB.
     """
     last, n = len(values) - 1, 0
     peaks, positions, ratios_db = np.empty(len(multiples), np.int64), np.empty(len(multiples)), np.empty(len(multiples))
@@ -472,7 +472,7 @@ def _fit_to_peaks(values, at, resolution, floor, masked, origins, multiples, fun
             place = origins[k] + multiples[k] * fundamental
             if not 0.0 < place <= at[last]:
                 continue
-            # Two lines off is still the same peak.
+            # Two lines away is still the same peak.
             nearest = int(np.rint((place - at[0]) / resolution))
             low, high = max(nearest - 2, 0), min(nearest + 2, last)
             i = low + int(np.argmax(values[low : high + 1]))
@@ -505,31 +505,31 @@ def peak_position(spectrum: Spectrum, i: int) -> float:
     ----------
     spectrum : Spectrum
     i : int
-        Number of the line. The first and the last have one neighbour only, and stay where they are.
+        Number of the line. The first and the last have only one neighbour, and keep their positions.
     """
     return float(parabola_peak(spectrum.values, spectrum.positions, spectrum.resolution, i))
 
 
 # --------------------
-# Whether a line stands out of what lies right beside it: the foot of a strong line is above the floor, and no line.
+# Whether a line stands out from its neighbours: the foot of a strong line is above the floor, but is not a line.
 # --------------------
 
 
 INNER_LINES = 3
-"""Nearer lines belong to the line itself: two by the Hann window, one because it may lie between two."""
+"""Closer lines belong to the line itself: two by the Hann window, one because it may lie between two."""
 
 OUTER_LINES = 12
 MIN_LINES = 6
-"""Of fewer lines the median says too little."""
+"""The median of fewer lines says too little."""
 
 RUN_UP_FOOT_ORDERS = 0.1
 """Width of a line's foot over a run-up, where its level changes from resonance to resonance."""
 
 
 def neighbour_level(spectrum: Spectrum, position: float, outer_lines: float = OUTER_LINES) -> float | None:
-    """Return the amplitude (root of the mean power) of what lies beside a line, None if that is too few lines.
+    """Return the amplitude (root of the mean power) of the lines beside a line, None if these are too few.
 
-    The mean is taken from the median, P = median/ln 2 for lines of noise: then a neighbouring line does not raise it.
+    The mean is derived from the median, P = median/ln 2 for lines of noise, so that a neighbouring line has no effect.
 
     Parameters
     ----------
@@ -537,7 +537,7 @@ def neighbour_level(spectrum: Spectrum, position: float, outer_lines: float = OU
         Amplitudes.
     position : float
     outer_lines : float
-        How far the surroundings reach, in lines.
+        Extent of the neighbourhood, in lines.
     """
     i, n = spectrum.index_of(position), len(spectrum.values)
     reach = int(min(outer_lines, OUTER_LINES))
@@ -557,7 +557,7 @@ def neighbour_levels(spectrum: Spectrum, *, of_both_sides: bool = False) -> Floa
     spectrum : Spectrum
         Amplitudes.
     of_both_sides : bool
-        Take the higher of the levels of either side, where the skirt of a line may fall steeply.
+        Use the higher of the levels on the two sides, where the skirt of a line may fall steeply.
 
     Returns
     -------
@@ -573,7 +573,7 @@ def neighbour_levels(spectrum: Spectrum, *, of_both_sides: bool = False) -> Floa
         medians = np.maximum(running[:n], running[OUTER_LINES + INNER_LINES :][:n])
     else:
         beside = np.abs(np.arange(-OUTER_LINES, OUTER_LINES + 1)) >= INNER_LINES
-        # As a single row: in one dimension SciPy's filter takes the whole width, the hole in its middle included.
+        # As a single row: in one dimension SciPy's filter uses the whole width, including the hole in its middle.
         medians = median_filter(power[None, :], footprint=beside[None, :], mode="reflect")[0]
     return np.asarray(np.sqrt(medians / log(2)))
 
@@ -585,13 +585,12 @@ def neighbour_levels(spectrum: Spectrum, *, of_both_sides: bool = False) -> Floa
 
 # Two searches for the tooth that stands out use the windows, and differ for a reason. `analyze` adds the energy of the
 # whole difference signal, because its test against surrogates (same spectrum, random phases) needs a statistic of the
-# signal as it is. `estimate_crack` divides each band about a mesh harmonic by its own median first, because its
-# calibration was made so: what a resonance multiplies, it multiplies at all teeth.
+# signal as it is. `estimate_crack` first divides each band about a mesh harmonic by its own median, as its calibration
+# did: a resonance multiplies all teeth alike.
 #
-# Two alignments use the scores, and differ as well. `estimate_crack` and the gap diagnosis compare the same gears:
-# they try whole teeth, or none, where marks say so, and a part of a tooth about them; slow orders do not count, in
-# which unbalance differs from day to day. `compare` turns a simulation of any gears onto a recording, by any angle and
-# all orders.
+# Two alignments use the scores, and differ as well. `estimate_crack` and the gap diagnosis compare the same gears: they
+# try whole teeth, or none if marks say so, and a fraction of a tooth about them; slow orders do not count, as unbalance
+# differs from day to day. `compare` turns a simulation of any gears onto a recording, by any angle and with all orders.
 
 
 def sliding_mean(values: FloatArray, width: int) -> FloatArray:
@@ -602,7 +601,7 @@ def sliding_mean(values: FloatArray, width: int) -> FloatArray:
     values : array, (…, n)
         One period.
     width : int
-        Of the window, in samples; n at most.
+        Of the window, in samples; at most n.
 
     Examples
     --------
@@ -615,7 +614,7 @@ def sliding_mean(values: FloatArray, width: int) -> FloatArray:
 
 
 def strongest_window(energies: FloatArray) -> tuple[int, float]:
-    """Return where the window with the most energy starts, and its energy over the median window's.
+    """Return where the window with the most energy starts, and the ratio of its energy to the median window's.
 
     Parameters
     ----------
@@ -634,7 +633,7 @@ def turned_lines(lines: ComplexArray, shift_rev: float) -> ComplexArray:
     lines : array, (..., n_orders)
         x, complex; order 0 first on the last axis.
     shift_rev : float
-        s, revolutions by which the average comes later.
+        s, delay of the average in revolutions.
     """
     turned: ComplexArray = lines * np.exp(-2j * np.pi * np.arange(lines.shape[-1]) * shift_rev)
     return turned
@@ -654,14 +653,14 @@ def shift_scores(cross: ComplexArray, shifts_rev: FloatArray) -> FloatArray:
 
 
 def best_shift(cross: ComplexArray, is_possible: Callable[[FloatArray], NDArray[np.bool_]] | None = None) -> float:
-    """Return the shift of the largest score, −0.5 to 0.5 revolutions; 0 where nothing is there to compare.
+    """Return the shift of the largest score, −0.5 to 0.5 revolutions; 0 if there is nothing to compare.
 
     Parameters
     ----------
     cross : complex array, (n_orders,)
-        As of `shift_scores`.
+        As in `shift_scores`.
     is_possible : callable, optional
-        Which of many shifts, in revolutions, may be the best; any unless given.
+        Returns which of many shifts, in revolutions, are allowed; default: all.
     """
     if not np.any(cross):
         return 0.0
@@ -681,7 +680,7 @@ def best_shift(cross: ComplexArray, is_possible: Callable[[FloatArray], NDArray[
 
 
 def circular_correlation(x: FloatArray, y: FloatArray) -> FloatArray:
-    """Return Σ_i x[i + s] y[i] for each shift s in samples: where it is largest, `np.roll(y, s)` meets x.
+    """Return Σ_i x[i + s] y[i] for each shift s in samples; at its maximum, `np.roll(y, s)` is aligned with x.
 
     Parameters
     ----------

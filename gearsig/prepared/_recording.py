@@ -1,4 +1,4 @@
-"""One recording with all that several methods compute of it, each once and on demand."""
+"""One recording with the results that several methods share, each computed once and on demand."""
 
 from __future__ import annotations
 
@@ -32,32 +32,32 @@ from gearsig.spectra import Spectrum, amplitude_spectrum, ends_meet, fast_length
 T = TypeVar("T")
 
 LONG_SAMPLES = 1 << 18
-"""From there on a few at the end are left out for fast transforms."""
+"""From this length on, a few samples at the end are left out for fast transforms."""
 
 MEMORY_LIMIT_MB = 1024.0
-"""What a prepared recording keeps at most: ten minutes of four channels at 25.6 kHz over two shafts are 980 MB."""
+"""Most that a prepared recording keeps: ten minutes of four channels at 25.6 kHz over two shafts are 980 MB."""
 
 
 class PreparedRecording:
     """A recording whose shaft angle, resampled channels, averages and spectra are computed once and then kept.
 
-    `analyze`, `estimate_crack` and `compare` take one in place of a recording, so that calls on the same recording
-    share what they have in common.
+    `analyze`, `estimate_crack` and `compare` accept one in place of a recording, so that calls on the same recording
+    share common results.
 
     Parameters
     ----------
     recording : Recording
         Never changed.
     rig : Rig or None
-        Used where the recording carries none; its sensors' quantities, units and scales are applied.
+        Used if the recording carries none; its sensors' quantities, units and scales are applied.
     memory_limit_mb : float
-        In MB (10⁶ bytes), for all that is kept beside the recording. What was used longest ago is forgotten first, and
-        computed again when it is asked for; the latest result is always kept.
+        In MB (10⁶ bytes), for everything kept besides the recording. The least recently used results are dropped first,
+        and computed again on demand; the latest result is always kept.
 
     Notes
     -----
-    Results are shared: their arrays are read-only. A refusal is kept as well, and raised again. Not for several
-    threads at a time.
+    Results are shared, so their arrays are read-only. A refusal is kept as well, and raised again. Not for use by
+    several threads at a time.
 
     Examples
     --------
@@ -95,18 +95,18 @@ class PreparedRecording:
 
     @property
     def kept_bytes(self) -> int:
-        """Size of all arrays that are kept, in bytes."""
+        """Size of all arrays kept, in bytes."""
         return sum(n_bytes for _, n_bytes in self._kept.values())
 
     def keep(self, key: Hashable, compute: Callable[[], T]) -> T:
-        """Return what `compute` returned, or raise what it raised, when this key was first asked for.
+        """Return what `compute` returned, or raise what it raised, when this key was first requested.
 
         Parameters
         ----------
         key : hashable
-            Names the result and every setting it depends on; beginning with the name of the method's room.
+            Identifies the result and every setting it depends on; begins with the name of the method's room.
         compute : callable
-            Without arguments. An `InputError` or `RefusalError` of it is kept as well.
+            Without arguments. An `InputError` or `RefusalError` that it raises is kept as well.
         """
         if key in self._kept:
             self._kept.move_to_end(key)
@@ -125,17 +125,17 @@ class PreparedRecording:
 
     @property
     def problems(self) -> tuple[ChannelProblem, ...]:
-        """What is wrong with the samples of vibration channels, see `gearsig.recording.find_problems`."""
+        """Problems of the samples of vibration channels, see `gearsig.recording.find_problems`."""
         return self.keep("problems", lambda: find_problems(self.recording))
 
     def grave_problems(self, channels: Collection[str]) -> list[ChannelProblem]:
         """Return the problems of some channels for which levels and lines may be wrong."""
         return [problem for problem in self.problems if problem.channel in channels and problem.is_grave]
 
-    # Angles: small, and asked for by everything.
+    # Angles: small, and needed by everything.
 
     def keep_angle(self, find: Callable[[], ShaftAngle]) -> None:
-        """Keep an angle that is known from elsewhere as `shaft_angle`; or why it is not, for whoever asks for it.
+        """Keep an angle known from elsewhere as `shaft_angle`, or the reason why there is none.
 
         Parameters
         ----------
@@ -147,7 +147,7 @@ class PreparedRecording:
 
     @property
     def shaft_angle(self) -> ShaftAngle:
-        """Angle of the reference shaft within the record's own time, a stated speed refined by the vibration.
+        """Angle of the reference shaft over the record's duration, with a stated speed refined by the vibration.
 
         Raises
         ------
@@ -162,9 +162,9 @@ class PreparedRecording:
 
     @property
     def followed_angle(self) -> ShaftAngle:
-        """`shaft_angle`; where it was estimated from the vibration, its phase follows the mesh harmonics.
+        """`shaft_angle`; if it was estimated from the vibration, made to follow the phase of the mesh harmonics.
 
-        Averages of two records compare only with it; `analyze` does without.
+        Averages of two records compare only with it; `analyze` does not need it.
         """
         return self.keep("followed angle", lambda: phase_followed_angle(self.recording, self.rig, self.shaft_angle))
 
@@ -174,7 +174,7 @@ class PreparedRecording:
         Raises
         ------
         RefusalError
-            If the teeth on the way to it are not known.
+            If the teeth between the two are not known.
         """
         return known_ratio(self.rig, shaft) if shaft and self.rig.shafts else 1.0
 
@@ -188,17 +188,17 @@ class PreparedRecording:
         followed : bool
             Whether to start from `followed_angle`.
         ratio : float or None
-            Revolutions per revolution of the reference shaft, where the rig does not tell it.
+            Revolutions per revolution of the reference shaft, if the rig does not give it.
         """
         angle = self.followed_angle if followed else self.shaft_angle
         turns = self.ratio(shaft) if ratio is None else ratio
         return angle if turns == 1.0 else angle.of_shaft(shaft, turns)
 
     def has_mark(self, shaft: str) -> bool:
-        """Whether angle 0 of a shaft is a mark on that very shaft: one pulse per revolution."""
+        """Whether angle 0 of a shaft is a mark on that shaft: one pulse per revolution."""
         return has_mark(self.recording, self.rig, shaft)
 
-    # Channels over angle, and what is made of them.
+    # Channels over angle, and results from them.
 
     def over_angle(
         self,
@@ -215,20 +215,20 @@ class PreparedRecording:
         shaft : str
             Default: the reference shaft.
         channels : sequence of str or None
-            Default: all vibration channels. A part of channels that were asked for together before is taken from them.
+            Default: all vibration channels. A subset of channels requested together before is taken from that result.
         followed, ratio
             See `angle_of`.
 
         Returns
         -------
         AngleSignal
-            In the channels' units, with the whole bandwidth on most revolutions.
+            In the channels' units, with the full bandwidth on most revolutions.
         """
         names = listed(channels, "channels", str) if channels is not None else self.recording.vibration_names()
         turns = self.ratio(shaft) if ratio is None else ratio
         angle = self.angle_of(shaft, followed=followed, ratio=turns)
-        # A shaft that turns with the reference shaft shares its signal, and the followed angle that of the other one
-        # where there is nothing to follow.
+        # A shaft that turns with the reference shaft shares its signal; without anything to follow, the followed angle
+        # shares that of the other one.
         place = ("over angle", angle.shaft, turns, self._is_followed(followed))
         together = (key[-1] for key in self._kept if isinstance(key, tuple) and key[:-1] == place)
         held = next((group for group in together if set(names) <= set(group)), names)
@@ -257,7 +257,7 @@ class PreparedRecording:
 
     @property
     def fast_part(self) -> Recording:
-        """The recording; of a long one as many samples as transform fast: some 0.01 % at its end are left out."""
+        """The recording; if long, shortened by some 0.01 % to a number of samples that transforms fast."""
         n = self.recording.n_samples
         fast = fast_length(n) if n >= LONG_SAMPLES else n
         return self.recording if fast == n else replace(self.recording, samples=self.recording.samples[:, :fast])
@@ -265,16 +265,16 @@ class PreparedRecording:
     def transform(self, channel: str) -> NDArray[np.complexfloating]:
         """Return the channel's `rfft` over `fast_part`, (n_samples // 2 + 1,), in the samples' precision.
 
-        Single precision adds noise 2e-7 of the signal's rms, a few times what its samples were rounded by.
+        Single precision adds noise of 2e-7 of the signal's rms, a few times the rounding error of its samples.
         """
         from scipy.fft import rfft
 
         return self.keep(("transform", channel), lambda: read_only(rfft(self.fast_part.values(channel))))
 
     def joined_transform(self, channel: str) -> NDArray[np.complexfloating]:
-        """Return the `rfft` of the channel with its ends joined, from which bands are cut, see `with_continuous_ends`.
+        """Return the `rfft` of the channel with its ends joined, for cutting out bands; see `with_continuous_ends`.
 
-        All vibration channels are continued where one must be, so that their envelopes are of one length.
+        If one vibration channel must be continued, all are, so that their envelopes have the same length.
         """
         from scipy.fft import rfft
 
@@ -309,7 +309,7 @@ class PreparedRecording:
         return self.keep(("order map", channel), lambda: order_map(self.over_angle("", [channel]), channel))
 
     def with_rig(self, rig: Rig) -> PreparedRecording:
-        """Return the same with another rig, see `Recording.with_rig`; this very object where it is its own rig."""
+        """Return the same with another rig, see `Recording.with_rig`; this very object if that is its rig already."""
         if rig is self.recording.rig or (not isinstance(rig.speed, PulseTimes) and rig == self.recording.rig):
             return self
         return PreparedRecording(self.recording.with_rig(rig), memory_limit_mb=self.memory_limit_mb)
@@ -318,15 +318,15 @@ class PreparedRecording:
 def prepare(
     recording: Recording | PreparedRecording, rig: Rig | None = None, *, name: str = "recording"
 ) -> PreparedRecording:
-    """Return a recording prepared; one that is prepared already, as it is, unless it lacks the rig.
+    """Return a recording prepared; one that is already prepared is returned as it is, unless it lacks the rig.
 
     Parameters
     ----------
     recording : Recording or PreparedRecording
     rig : Rig or None
-        Used where the recording carries none.
+        Used if the recording carries none.
     name : str
-        Of the caller's parameter, for the errors.
+        Of the caller's parameter, for error messages.
     """
     check_recording(recording, name, Recording | PreparedRecording)
     check_rig(rig)
@@ -336,7 +336,7 @@ def prepare(
 
 
 def has_mark(recording: Recording, rig: Rig, shaft: str) -> bool:
-    """Whether angle 0 of a shaft is a mark on that very shaft: one pulse per revolution."""
+    """Whether angle 0 of a shaft is a mark on that shaft: one pulse per revolution."""
     source = recording.speed_source
     if not isinstance(source, PulseTimes | TachometerChannel) or source.pulses_per_revolution != 1:
         return False
@@ -344,7 +344,7 @@ def has_mark(recording: Recording, rig: Rig, shaft: str) -> bool:
 
 
 def _rows(signal: AngleSignal, names: Sequence[str]) -> AngleSignal:
-    """Return some of a signal's channels, without a copy where they follow each other."""
+    """Return some of a signal's channels, without a copy if they are contiguous."""
     rows = [signal.channel_names.index(name) for name in names]
     neighbours = rows == list(range(rows[0], rows[0] + len(rows)))
     return replace(
