@@ -441,14 +441,14 @@ def _speed_texts(simulated_side: ComparedSide, recorded_side: ComparedSide) -> l
     if abs(off) > OTHER_SPEED:
         text = (
             f"The simulation turns at {simulated:.5g} rpm, the recording at {recorded:.5g} rpm "
-            f"({signed(100 * off, 0)} %): orders are compared all the same, but each meets other resonances, "
+            f"({signed(100 * off, 0)} %): orders are compared nevertheless, but each meets other resonances, "
             "and forces change with the speed."
         )
         return [text]
     if abs(off) > SAME_SPEED:
         text = (
             f"The simulation turns {abs(100 * off):.1f} % {'faster' if off > 0 else 'slower'} than the recording: "
-            "compared by order; levels near resonances differ for that alone."
+            "compared by order; levels near resonances differ for this reason alone."
         )
         return [text]
     return []

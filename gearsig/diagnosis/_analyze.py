@@ -262,10 +262,10 @@ def _of_machine(
 ) -> Iterator[Finding]:
     """Yield the findings on gears, bearings, shafts and single lines."""
     if not (signals.rig.pairs or signals.rig.bearings):
-        title = "No gears and no bearings are described, so that none can be examined."
+        title = "No gears or bearings are described, so none can be examined."
         surer = "A rig file with teeth and bearings; `gearsig rig example` prints one to start from."
         if any(signals.rig.shaft_names):  # the rig of a rotor in plain bearings is complete
-            surer = "Rolling bearings in the rig file, where there are any."
+            surer = "Rolling bearings in the rig file, if there are any."
             if not signals.has_reference:
                 surer = "A recording of the rotor when it was healthy, given with --reference, or its rolling bearings."
         yield cannot_tell("machine-not-described", title, surer=surer)

@@ -188,12 +188,12 @@ def _named_finding(signals: AnalysisSignals, candidate: Candidate, n_parts: int)
         title = f"May be {place}, or the sampling rate or the stated speed is wrong by a factor."
     evidence = list(_named_evidence(signals, candidate, times, is_weak=is_weak, is_smooth=is_smooth))
     if is_hunting:
-        evidence.append("A multiple of a hunting-tooth order is there too: teeth that differ from each other do it.")
+        evidence.append("A multiple of a hunting-tooth order is there too: teeth that differ from each other cause it.")
     if n_parts > MAX_PARTS:
-        evidence.append(f"{n_parts} parts show at once, which a single other source of impacts explains as well.")
+        evidence.append(f"{n_parts} parts show at once, which a single other source of impacts would explain as well.")
     surer = "Another sensor nearer to it."
     if not signals.has_reference:
-        surer = "A recording of the same bearing when it was good, or another sensor nearer to it."
+        surer = "A recording of the same bearing when it was healthy, or another sensor nearer to it."
     return Finding(
         "bearing-" + part.replace(" ", "-"),
         Kind.FAULT if clear else suspected,
@@ -201,8 +201,8 @@ def _named_finding(signals: AnalysisSignals, candidate: Candidate, n_parts: int)
         _where(signals, candidate),
         _strength(candidate),
         confidence,
-        f"at most {percent(confidence)}: chance that lines fall on the order so well {p_text(candidate.p_value)} "
-        "(all parts, bands, channels tried); never above 95 %, as one recording is looked at",
+        f"at most {percent(confidence)}: chance that lines fit the order this well {p_text(candidate.p_value)} "
+        "(all parts, bands, channels tried); never above 95 %, as only one recording is used",
         tuple(evidence),
         surer,
     )
@@ -222,13 +222,13 @@ def _named_evidence(
     if times > 1:
         yield sentence(_other_speed_text(times))
     elif speed_is_only_stated(signals):
-        yield "The speed is a stated one that no line of a shaft or mesh confirms."
+        yield "The speed is stated, and no line of a shaft or mesh confirms it."
     if candidate.name == "FTF":
         yield "Belts and other machines at the same rate look the same: lines at the cage's order alone."
     elif candidate.in_train:
         yield "The rate is that of a train of lines: another machine's or a belt's would look the same."
     if is_smooth:
-        yield "Play, waviness and elements that pass the load modulate so; impacts rise at once and ring down."
+        yield "Play, waviness and elements that pass the load modulate in this way; impacts rise at once and ring down."
 
 
 def _other_speed_text(times: int) -> str:
@@ -345,24 +345,24 @@ def _unnamed_finding(signals: AnalysisSignals, candidate: Candidate) -> Finding:
     # A shaft may well turn at this rate; an impact every other turn is no more likely than an unknown part.
     is_shafts = (multiple > 0 and multiple.is_integer()) or bool(near and not speed_is_confirmed(signals))
     strong = candidate.modulation >= CLEAR_MODULATION and not (is_shafts or mains or hunting)
-    causes = ["A rolling bearing that is not in the rig file is the usual cause; other machines and belts do it too."]
+    causes = ["The usual cause is a rolling bearing that is not in the rig file; belts and other machines are possible, too."]
     if mains:
         causes = [f"It is the rate of {mains}, or of what that supply feeds."]
     elif hunting:
         causes = [f"It is {hunting}: teeth that differ from each other, or one that is damaged, meet at that rate."]
     elif candidate.in_train:
-        causes = ["The rate is low for a race: another machine, a belt or a shaft that is not in the rig file does it."]
+        causes = ["The rate is low for a race: another machine, a belt or a shaft not in the rig file causes it."]
         beside = [
             part_text(name, bearing.name)
             for bearing, name, part in expected_parts(signals)
             if abs(part / order - round(part / order)) * order <= slip_of(signals) * part and part > order
         ]
         if beside:
-            by_density = "by their density: that is no damage there"
+            by_density = "only because they are dense: that is no damage there"
             causes.append(f"Multiples fall near the order of the {', '.join(beside)} {by_density}.")
     if (times := possible_speed_factor(signals)) > 1:
         causes.append(sentence(_other_speed_text(times)))
-    surer = "Give the bearings in the rig file: then the part is named, or they are ruled out."
+    surer = "Give the bearings in the rig file: then the part is identified, or they are ruled out."
     explained = _unexplained_by(signals.rig)
     if shaft and not multiple.is_integer():
         causes.append("Loose or rubbing parts strike every other turn.")
@@ -392,8 +392,8 @@ def _race_beyond_slip(signals: AnalysisSignals, candidate: Candidate) -> Iterato
     if slip_of(signals) < abs(order / part - 1) <= OTHER_MAKE:
         further = signed(100 * (part / order - 1), 1)
         yield (
-            f"The {part_text(name, bearing)} would strike at order {part:.4f}, {further} %: more than slip, but a "
-            "bearing of another make or contact angle may differ so much."
+            f"The {part_text(name, bearing)} would have impacts at order {part:.4f}, {further} %: more than slip, but "
+            "a bearing of another make or contact angle may differ by as much."
         )
 
 
@@ -435,7 +435,7 @@ def _over_frequency(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> 
     yield Finding(
         "periodic-impacts",
         Kind.NOTICE,
-        f"The signal is modulated periodically at {hertz:.5g} Hz; by what, cannot be told.",
+        f"The signal is modulated periodically at {hertz:.5g} Hz; the cause cannot be told.",
         replace(_where(signals, best), order=None, frequency_hz=hertz),
         _strength(best),
         confidence,
@@ -460,7 +460,7 @@ def _strength(candidate: Candidate) -> Strength:
 
 def _family_basis(candidate: Candidate, confidence: float) -> str:
     chance = p_text(candidate.p_value)
-    return f"at most {percent(confidence)}, that the family exists: chance of it in noise {chance}"
+    return f"at most {percent(confidence)}, that the family exists: its chance in noise {chance}"
 
 
 def _family_text(candidate: Candidate) -> str:
@@ -521,7 +521,7 @@ def _none_shows(
         evidence=(
             f"No family at their orders in {len(envelopes)} envelope spectra (channels × bands).",
             f"Six equal harmonics of {limit} would have shown in half of the bands.",
-            f"The most is needed at the {BEARING_PARTS[name][0]} of {bearing}.",
+            f"The largest is needed at the {BEARING_PARTS[name][0]} of {bearing}.",
         ),
         surer=surer,
     )
@@ -541,7 +541,7 @@ def _reasons_to_leave_open(
 
     longer = "A longer recording, or another sensor."
     if not speed_is_confirmed(signals):
-        why = "no line of a mesh or shaft stands where the speed puts it, so that bearing orders may be elsewhere"
+        why = "no line of a mesh or shaft stands where the speed puts it, so bearing orders may be elsewhere"
         if (times := possible_speed_factor(signals)) > 1:
             why = _other_speed_text(times)
         yield why, f"A tachometer, or a sensor nearer to the {'gears' if signals.rig.pairs else 'bearings'}."
@@ -569,15 +569,15 @@ def _reasons_to_leave_open(
         yield f"lines stand at the order of the {races}, and {chance}", longer
     for channel, race, comb in races_in_vibration(signals, envelopes):
         lines = f"{len(comb.positions)} multiples of the order of the {race} stand in {channel} itself"
-        why = f"{lines}, whose first ones a shaft's hide from the envelopes"
-        yield why, "A recording at another load: slip parts a bearing from the shaft."
+        why = f"{lines}, but the lines of a shaft hide the first ones from the envelopes"
+        yield why, "A recording at another load: slip separates a bearing from the shaft."
     for race, (k, shaft) in races_beside_shaft(signals, envelopes).items():
-        beside = f"lines stand beside {k} times a turn of {named('shaft', shaft)}, all to one side"
+        beside = f"lines stand beside {k} times per turn of {named('shaft', shaft)}, all on one side"
         yield f"{beside}, as those of the {race} may", longer
     for (k, shaft), on_shaft in parts_on_shaft(signals, envelopes).items():
         races = f"the order of the {' or '.join(on_shaft)} within its slip"
-        why = f"impacts come {k} times a turn of {named('shaft', shaft)}, which is {races}"
-        yield why, "A recording at another load: slip parts a bearing from the shaft."
+        why = f"impacts come {k} times per turn of {named('shaft', shaft)}, which is {races}"
+        yield why, "A recording at another load: slip separates a bearing from the shaft."
 
 
 def _examined(signals: AnalysisSignals, depths: Mapping[tuple[str, str], float]) -> list[str]:
@@ -601,14 +601,14 @@ def _not_examined(signals: AnalysisSignals, depths: Mapping[tuple[str, str], flo
             "multiples of a shaft within the resolution, or the floor there is too high for a modulation of "
             f"{percent(CLEAR_MODULATION)} to show.",
             where,
-            surer="A longer recording: orders that are close need many revolutions to be told apart.",
+            surer="A longer recording: orders that are close need many revolutions to be resolved.",
         )
         # A cage seldom breaks before the other parts are damaged: it alone does not leave the bearing undecided.
         only_cages = all(name == "FTF" for _, name in hidden)
         yield replace(finding, kind=Kind.INFORMATION) if only_cages else finding
     unknown = [b.name for b in signals.rig.bearings if b.name not in {owner for owner, _ in depths}]
     if unknown:
-        why = f"of {', '.join(unknown)} the geometry or the speed of the shaft is not known"
+        why = f"the geometry or the shaft speed of {', '.join(unknown)} is not known"
         yield _undecided(why, "Geometry or orders of the bearing, and the teeth that drive its shaft.", where)
 
 

@@ -740,9 +740,9 @@ def _with_rivals(signals: AnalysisSignals, candidate: Candidate) -> Candidate:
         differ = _elements_differ(signals, candidate)
         others += weight * max(shallow, float(differ))  # at the same order, with the same slip
         if differ:
-            rivals.append("a damaged element or cage, whose lines a cage's turn apart are there as strong,")
+            rivals.append("a damaged element or cage, whose lines at the cage's spacing are as strong there,")
         elif shallow > 0.5:
-            rivals.append("elements that differ, passing the load of a healthy race,")
+            rivals.append("unequal elements passing the load of a healthy race")
     if candidate.of_tones and _rings_in_multiples(signals, candidate):
         others += weight
         rivals.append("steady tones of that rate, without which nothing shows there,")
@@ -972,7 +972,7 @@ def nearest_bearing(signals: AnalysisSignals, channel: str) -> Bearing | None:
 
 
 def _known_multiple(signals: AnalysisSignals, candidate: Candidate) -> Candidate | None:
-    """Return the candidate named, if its fundamental is a low harmonic of a known part, whose first paths may hide.
+    """Return the candidate as a known part if its fundamental is a low harmonic of that part; paths may hide the first.
 
     It may equally be something that causes impacts two or three times as often.
     """

@@ -631,9 +631,9 @@ def change_findings(
         if signals.angle is None or reference.angle is None:
             why = "the speed of one of the two is not known"
         elif abs(_speed_off(signals, reference)) > OTHER_SPEED:
-            why = "the two run through other speeds, or one is too short"
-        title = f"What has changed since the reference cannot be told by order: {why}."
-        surer = "Two recordings with known speed, alike in both, of 16 revolutions or more."
+            why = "the two run through different speeds, or one is too short"
+        title = f"Changes since the reference cannot be told by order: {why}."
+        surer = "Two recordings of at least 16 revolutions at the same known speed."
         unknown = [cannot_tell("change-not-examined", title, surer=surer)]
         if not any(c.is_change for c in changes):
             return unknown
@@ -654,14 +654,14 @@ def change_findings(
         if not beyond_speed:
             return [*findings, replace(headline, kind=Kind.NOTICE), *([_left_open(apart)] if risen else [])]
         risen = beyond_speed
-        text = f"Speeds up to {100 * apart:.1f} % apart make no more than {beyond_db - MIN_CHANGE_DB:.0f} dB of it."
+        text = f"Speeds up to {100 * apart:.1f} % apart explain no more than {beyond_db - MIN_CHANGE_DB:.0f} dB of it."
         headline = replace(headline, evidence=(*headline.evidence, text))
     claimed = {f.where.bearing for f in named if f.is_claim}
     meanings = _meanings(risen, rest, signals, claimed)
     if not meanings and risen:
-        more = "It has no pattern of a known fault: load, temperature or a sensor moved would do it as well."
+        more = "It has no pattern of a known fault: load, temperature or a moved sensor would have the same effect."
         if any(c.kind == "bearing" and c.where.bearing in claimed for c in risen):
-            more = "Damage of the bearing that is named explains it: its shocks raise the noise as well."
+            more = "Damage to the bearing named explains it: its impacts raise the noise as well."
         headline = replace(headline, evidence=(*headline.evidence, more))
     is_speed_known = signals.angle is not None and reference.angle is not None
     is_reason = risen and is_speed_known  # a different speed changes every level
@@ -671,7 +671,7 @@ def change_findings(
 def _left_open(apart: float) -> Finding:
     title = (
         f"What the change means cannot be told: the speeds are up to {100 * apart:.1f} % apart, and a resonance that "
-        f"one of them meets may make {_by_speed_alone_db(apart):.0f} dB."
+        f"one of them meets may explain {_by_speed_alone_db(apart):.0f} dB."
     )
     return cannot_tell("change-at-another-speed", title, surer="A recording at the reference's speed.")
 
@@ -720,8 +720,8 @@ def _gains(changes: Sequence[LevelChange]) -> tuple[list[Finding], list[LevelCha
             Finding(
                 "levels-scaled",
                 Kind.DATA_PROBLEM,
-                f"Every level of channel {channel} is {signed(gain)} dB against the reference alike, noise included: "
-                "another gain, unit or sensor rather than another machine.",
+                f"Every level of channel {channel} has changed alike by {signed(gain)} dB since the reference, "
+                "noise included: the gain, unit or sensor differs rather than the machine.",
                 Where((channel,)),
                 confidence=0.9,
                 confidence_basis=f"{len(lines)} levels within {spread:.2g} dB of each other",
@@ -895,7 +895,7 @@ def _of_shaft(
     whole = sum(weights.values()) + OTHER_CAUSES
     place = max(of_shaft, key=lambda c: added[c.harmonic]).where
     name = f" of {place.shaft}" if place.shaft else ""
-    text = "Of what has been added in velocity, " + ", ".join(
+    text = "Of the vibration added, as velocity, " + ", ".join(
         f"{percent(power / total)} is at {c.label}" for c in of_shaft if (power := added[c.harmonic]) >= 0.01 * total
     )
     evidence = (f"{text}.", *_mains_at(max(of_shaft, key=lambda c: added[c.harmonic]), signals))
@@ -977,7 +977,7 @@ def _of_noise(risen: Sequence[LevelChange], *, has_bearings: bool) -> Finding:
     causes = "poor lubrication, a rub, turbulence or cavitation"
     if has_bearings:  # a rolling element that turns out of its track, and wear all around, repeat at no steady rate
         causes = "a worn bearing or a damaged rolling element, " + causes
-    title = f"Perhaps {causes}: noise has risen, and no line."
+    title = f"Perhaps {causes}: noise has risen, but no line."
     return Finding("noise-risen", Kind.SUSPICION, title, risen[0].where, None, 0.4, _FIT, _told(risen), confirm)
 
 

@@ -119,7 +119,7 @@ def with_crack(findings: Sequence[Finding], answer: Answer | None, rig: Rig) -> 
         confidence = 0.5 * crack_finding.confidence
         kind = Kind.SUSPICION if confidence >= 0.35 else Kind.NOTICE
         cause = "Impacts of the damaged bearing" if impacts else "What has changed all teeth of the gear"
-        evidence = (*crack_finding.evidence, f"{cause} may have made the change as well.")
+        evidence = (*crack_finding.evidence, f"{cause} may have caused this change as well.")
         crack_finding = replace(crack_finding, kind=kind, confidence=confidence, evidence=evidence)
     if not answer.with_reference and crack_finding.confidence < CLEAR:
         return list(findings)

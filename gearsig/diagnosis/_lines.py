@@ -53,14 +53,14 @@ SPEED_UNKNOWN = "speed-unknown"
 NEAR_ZERO = "speed-near-zero"
 """Code of the finding that the shaft comes near standstill within the record."""
 
-SURER_BEYOND_ZERO = "An encoder, which tells the direction; or analyse the parts before and after by themselves."
+SURER_BEYOND_ZERO = "An encoder, which shows the direction; or analyse the parts before and after separately."
 
 
 def speed_finding(angle: ShaftAngle | CannotTell) -> Finding:
     """Return the finding on the speed and how it was found, or that it is not known."""
     if isinstance(angle, CannotTell):
         why = "The machine is at rest" if "at rest" in angle.reason else "The speed is not known"
-        title = f"{why}: orders, synchronous averages and everything that rests on them are left out."
+        title = f"{why}: orders, synchronous averages and everything based on them are left out."
         surer = f"{angle.remedy[:1].upper()}{angle.remedy[1:].rstrip('.')}." if angle.remedy else ""
         return cannot_tell(SPEED_UNKNOWN, title, evidence=(angle.reason,), surer=surer)
     uncertainty = angle.relative_speed_uncertainty
@@ -78,7 +78,7 @@ def speed_finding(angle: ShaftAngle | CannotTell) -> Finding:
         f"{text} ({angle.method}, {angle.n_revolutions:.5g} revolutions).",
         Where(shaft=angle.shaft, time_s=(angle.start_s, angle.end_s)),
         confidence=angle.quality,
-        confidence_basis="quality of the speed as it was found",
+        confidence_basis="quality of the speed as found",
         evidence=angle.notes,
         surer="" if angle.method in ("pulses", "encoder") else "A tachometer: it also fixes the zero of the angle.",
     )
@@ -181,8 +181,8 @@ def detect_standstill(signals: AnalysisSignals) -> list[Finding]:
         return []
     start_s, end_s = (angle.start_s + turns / angle.n_revolutions * (angle.end_s - angle.start_s) for turns in gone)
     title = (
-        f"The lines of shafts and meshes are gone between {start_s:.3g} and {end_s:.3g} s: the machine stands then, "
-        "turns back or turns at another speed."
+        f"The lines of shafts and meshes are gone between {start_s:.3g} and {end_s:.3g} s: the machine is at rest, "
+        "reverses or runs at another speed."
     )
     where = Where(shaft=angle.shaft, time_s=(start_s, end_s))
     return [Finding(NEAR_ZERO, Kind.DATA_PROBLEM, title, where, surer=SURER_BEYOND_ZERO)]
@@ -285,8 +285,8 @@ def _mesh_finding(signals: AnalysisSignals, pair: GearPair) -> Finding | None:
         return Finding("mesh-found", Kind.INFORMATION, title, where, strength, 0.99, _OVER_FLOOR)
     near = f"The best of {N_HARMONICS} harmonics is {line.ratio_db:.1f} dB over the floor."
     if not line.is_highest:
-        near = f"Near harmonic {harmonic} a line stands beside its place: the speed may be off by little, and small "
-        near += "errors smear all averages."
+        near = f"Near harmonic {harmonic} a line is beside its expected place: the speed may be slightly wrong, and "
+        near += "small errors smear all averages."
     # The multiple of the stated speed at which the mesh lines do lie; none if another pair's are at their place.
     others = (clearest_line(signals, order) for p in signals.rig.pairs if (order := signals.rig.mesh_order(p)))
     elsewhere = None if any(other and _is_clear(other[0]) for other in others) else signals.offset_comb
@@ -517,11 +517,11 @@ def _unexplained(signals: AnalysisSignals, trains: Sequence[float], named: Seque
     if not origin and hunting is not None and _is_among_multiples(excess, line.position, hunting[0]):
         origin = hunting[1]
     known = "shaft or mesh" if signals.rig.pairs else "shaft"
-    title = f"The strongest line of no {'single' if origin else 'known'} {known}"
-    evidence = [] if origin or hunting is None else [f"It is near {hunting[1]}, as chance may have it."]
+    title = f"The strongest line that belongs to no {'single' if origin else 'known'} {known}"
+    evidence = [] if origin or hunting is None else [f"It is near {hunting[1]}, perhaps by chance."]
     pull = "" if signals.speed_varies else magnetic_pull_at(line.position * signals.frequency_per_order_hz)
     if signals.rig.bearings:
-        evidence.append(f"The first {BEARING_MULTIPLES} multiples of the bearings' orders are left aside.")
+        evidence.append(f"The first {BEARING_MULTIPLES} multiples of the bearings' orders are left out.")
     title += f" is at order {line.position:.4f} ({signals.hertz_text(line.position)})"
     return Finding(
         "unexplained-line",
@@ -532,7 +532,7 @@ def _unexplained(signals: AnalysisSignals, trains: Sequence[float], named: Seque
         0.95,
         _UNKNOWN_CAUSE,
         evidence=tuple(evidence),
-        surer="A run-up: a line of fixed frequency is a resonance or electrical, one of fixed order a shaft's.",
+        surer="A run-up: a line of fixed frequency is a resonance or electrical, one of fixed order is a shaft's.",
     )
 
 

@@ -153,7 +153,7 @@ class LongAnalysis:
             f"The recording lasts {self.duration_s:.5g} s, longer than memory; shown are {shown.start_s:.5g} to "
             f"{shown.end_s:.5g} s ({shown.reason}), indicators of {usual.start_s:.5g} to {usual.end_s:.5g} s.",
             evidence=tuple(evidence),
-            surer="gearsig analyze says all of each part; with more --memory the recording is looked at whole.",
+            surer="gearsig analyze reports each part in full; with more --memory the recording is analysed whole.",
         )
         return replace(
             shown.analysis,

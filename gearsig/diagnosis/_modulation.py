@@ -262,7 +262,7 @@ def _modulated(
         twins = f"Shafts {pair.driver} and {pair.driven} turn equally fast"
         evidence.append(f"{twins}: which of them it is cannot be told.")
     value, limit = 10 ** (median / 20), 10 ** (NOTABLE_DB / 20)
-    surer = "Compare with a recording of the same gearbox known to be good, or look for it at another load."
+    surer = "Compare with a recording of the same gearbox known to be healthy, or look for it at another load."
     return Finding(
         "mesh-modulated",
         Kind.NOTICE,  # what is usual differs by machine: only one whose reference lacks it is suspected, see `_change`
@@ -302,7 +302,7 @@ def _unknown_family(signals: AnalysisSignals, pair: GearPair, trains: Sequence[f
     teeth = mesh / comb.fundamental
     if None in (pair.driver_teeth, pair.driven_teeth) and abs(teeth - round(teeth)) <= 0.1:
         other_shaft = pair.driven if pair.driven_teeth is None else pair.driver
-        evidence.append(f"A gear with {round(teeth)} teeth on shaft {other_shaft} would modulate the mesh just so.")
+        evidence.append(f"A gear with {round(teeth)} teeth on shaft {other_shaft} would modulate the mesh this way.")
         surer = f"Count the teeth on shaft {other_shaft}; with them in the rig file that gear is examined as well."
     if signals.angle is not None and signals.angle.method == "pulses":
         # Pulses per revolution are wrong by factors up to 4: the marks of a coupling or a four-hole disc.
@@ -357,7 +357,7 @@ MOST_PARTS = 16
 def _is_part_of(spacing: float, orders: Sequence[float], resolution: float) -> bool:
     """Whether a spacing is a fraction m/n of an order: two combs of lines then have common lines.
 
-    A cage turns n times slower than the elements of its bearing pass. The multiple is as exact as the spacing, whose
+    A cage turns n times slower than its n elements pass a race. The multiple is as exact as the spacing, whose
     third multiples give it to a sixth of a line.
     """
     whole = [(m * order, round(m * order / spacing)) for order in orders for m in (1, 2, 3)]

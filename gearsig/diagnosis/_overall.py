@@ -15,7 +15,7 @@ OVERALL_VELOCITY = "overall-velocity"
 
 STANDARD = "ISO 20816-3"
 MEANINGS = {
-    "A": "as of machines newly set to work",
+    "A": "typical of newly commissioned machines",
     "B": "fit for unrestricted long-term operation",
     "C": "not fit for long-term operation: find the cause at the next opportunity",
     "D": "severe enough to damage the machine",
@@ -63,10 +63,10 @@ def detect_vibration_zone(signals: AnalysisSignals, indicators: Iterable[Indicat
     boundaries = f"boundaries A/B, B/C, C/D at {limits[0]:g}, {limits[1]:g}, {limits[2]:g} mm/s rms, {largest.band}"
     evidence = [
         f"Group {group} ({size}) and mounting are from the rig file; {boundaries} ({STANDARD}:2022, annex A).",
-        "It holds at bearing housings, in place and at steady speed; displacement and changes count as well.",
+        "It applies at bearing housings, in situ and at steady speed; displacement and changes count as well.",
     ]
     if signals.rig.pairs:
-        evidence.append("Of the machine that the gears drive or are driven by; gear units themselves: ISO 20816-9.")
+        evidence.append("It applies to the machine that drives the gears or is driven by them; gear units: ISO 20816-9.")
     evidence += _possible(source, causes)
     above = f"; {source}" if source and zone in "CD" else ""
     return [

@@ -261,7 +261,7 @@ def _then(finding: Finding, earlier: ReferenceFinding | None) -> str:
     change = earlier.change_db
     if finding.where.angle_deg is not None and not _names_tooth(earlier.finding, finding):
         since = "" if change is None else f", {signed(change)} dB since then"
-        return f"The reference shows such an event on that shaft{since}; whether at the same tooth, no mark tells."
+        return f"The reference shows such an event on that shaft{since}; no mark shows whether at the same tooth."
     since = "." if change is None else f"; since then it has changed by {signed(change)} dB."
     return f"The reference shows it as well{since}"
 

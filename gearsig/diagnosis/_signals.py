@@ -431,7 +431,7 @@ def witness_text(
     comb = witness(band, order)
     if comb is None:
         return (f"{text}does not show it.",)
-    shows = "shows it clearest of all bands" if band.envelope.band_hz == band_hz else "shows the same family"
+    shows = "shows it most clearly of all bands" if band.envelope.band_hz == band_hz else "shows the same family"
     return (f"{text}{shows}, {max(comb.ratios_db):.0f} dB over its floor.",)
 
 

@@ -130,7 +130,7 @@ def _left_out(segments: MotionSegments, examined: StartStop | None) -> Finding:
     back = f", and it turns back by {segments.backwards_rad:.3g} rad" if segments.backwards_rad > 0.0 else ""
     return cannot_tell(
         "stationary-methods-left-out",
-        f"{what} are not examined: spectra, orders and averages want a speed that lasts.",
+        f"{what} are not examined: spectra, orders and averages need a steady speed.",
         evidence=(f"the speed falls to zero {counted(len(segments.stops_s), 'time')}{back}",),
         surer="A recording in continuous rotation, some tens of revolutions at a steady speed.",
     )
@@ -251,7 +251,7 @@ def _impacts(examined: StartStop) -> Iterator[Finding]:
         f"with {hardest.speed_mps:.3g} m/s on the {side} flank of tooth {tooth}.",
         Where(tooth=tooth, angle_deg=hardest.driver_angle_deg, time_s=at),
         evidence=(
-            f"energy {hardest.energy_j:.3g} J in the hardest, {lost_j:.3g} J lost in all of which a rebound was seen",
+            f"energy {hardest.energy_j:.3g} J in the hardest, {lost_j:.3g} J lost in all with a visible rebound",
         ),
     )
 

@@ -630,7 +630,7 @@ def _finding(examined: _Examined) -> Finding | None:
             examined.strength,
             confidence=0.9,
             confidence_basis="equal distances and similar energy",
-            evidence=("Couplings, pumps, presses, pistons and faster shafts of a whole ratio do this.",),
+            evidence=("Couplings, pumps, presses, pistons and faster shafts with a whole-number ratio do this.",),
             surer="A recording at another load, or one with a sensor nearer to the suspected cause.",
         )
     if not examined.reaches(WORTH_SAYING) or event.rms < SMALLEST_SHARE * event.average_rms:
@@ -646,7 +646,7 @@ def _finding(examined: _Examined) -> Finding | None:
             examined.strength,
             confidence=0.95,
             confidence_basis="more than half of what the average shows comes from that revolution",
-            surer="Another recording: what the machine does comes back.",
+            surer="Another recording: what the machine does recurs.",
         )
     if event.share_of_revolutions < 0.75:  # then it belongs to a slower shaft
         ratio = signals.rig.ratio(name) or 1.0
@@ -716,20 +716,20 @@ def _evidence(examined: _Examined) -> Iterator[str]:
         "together."
     )
     yield f"{shaft.averages[event.channel].n_revolutions} revolutions were averaged."
-    yield f"It comes back: odd and even revolutions correlate there by {event.place.repeatability:.2f}."
+    yield f"It repeats: odd and even revolutions correlate there by {event.place.repeatability:.2f}."
     yield f"Its rms is {percent(event.rms / event.average_rms)} of the whole average's."
     if len(event.peaks_rev) > 1:
         yield f"It is the largest of {len(event.peaks_rev)} local events: several teeth, or another cause."
     if examined.since_reference:
-        yield "The averages were turned so that the same teeth meet: what teeth are made with cancels."
+        yield "The averages were turned so that the same teeth coincide: manufacturing differences cancel."
     elif event.place.ratio_db < UNEQUAL_DB:
-        yield "It stands out of teeth that are alike: a gear made with one odd tooth shows as much."
+        yield "It stands out from teeth that are alike: a gear made with one odd tooth shows as much."
     if examined.is_at_mark:
         yield "It is at the tachometer's mark: cross-talk from its cable would look the same."
     if not examined.has_mark:
         yield "No once-per-revolution mark is on this shaft: the angle holds for this record's average only."
     elif len(shaft.teeth) == 1:
-        yield "Teeth count from 1 at the mark, as they engage; the place is good to about one tooth."
+        yield "Teeth count from 1 at the mark in order of engagement; the place is good to about one tooth."
     if len(shaft.teeth) > 1:
         teeth = ", ".join(map(str, shaft.teeth))
         yield f"The shaft carries {len(shaft.teeth)} gears ({teeth} teeth); it may be on either."
@@ -738,7 +738,7 @@ def _evidence(examined: _Examined) -> Iterator[str]:
 def _surer(signals: AnalysisSignals) -> str:
     if signals.rig.assumed:
         return "Confirm what is assumed of the rig: " + ", ".join(signals.rig.assumed) + "."
-    good = "" if signals.has_reference else ", or of the same gearbox when it was good"
+    good = "" if signals.has_reference else ", or of the same gearbox when it was healthy"
     if signals.angle is not None and signals.angle.method in ("tachless", "constant", "speed channel"):
         return f"A recording with a tachometer, or at another load{good}."
     return f"A recording at another load or speed (damage stays at its tooth){good}."
@@ -810,8 +810,8 @@ def _undecided(examined: list[_Examined], reason: str) -> list[Finding]:
         return []
     more = "ore revolutions, a sensor nearer to the gears, a higher load"
     more += "; machine data that are not assumed." if examined[0].signals.rig.assumed else "."
-    healthy = "A recording of the same gears when they were healthy, given with --reference: what teeth are made with"
-    surer = f"M{more}" if examined[0].signals.has_reference else f"{healthy} cancels. Or m{more}"
+    healthy = "A recording of the same gears when they were healthy, given with --reference: manufacturing differences"
+    surer = f"M{more}" if examined[0].signals.has_reference else f"{healthy} cancel. Or m{more}"
     title = f"Nothing shows at the teeth of {_shafts_text(_names(examined))}, but {reason}."
     where, evidence = Where(tuple(examined[0].shaft.separated)), tuple(_visible_text(e) for e in examined)
     return [cannot_tell("tooth-damage-undecided", title, where, evidence=evidence, surer=surer)]
@@ -856,7 +856,7 @@ def _not_examined(signals: AnalysisSignals, examined: set[str]) -> list[Finding]
     for shaft in dict.fromkeys(s for pair in signals.rig.pairs for s in (pair.driver, pair.driven)):
         if shaft not in examined:
             reasons.setdefault(_reason(signals, shaft), []).append(shaft)
-    surer = "A longer recording with a tachometer, the right teeth of all gears, a higher sampling rate."
+    surer = "A longer recording with a tachometer, the correct teeth of all gears, a higher sampling rate."
     titles = [f"Teeth on {_shafts_text(shafts)} cannot be examined: {reason}." for reason, shafts in reasons.items()]
     return [cannot_tell("tooth-not-examined", title, surer=surer) for title in titles]
 

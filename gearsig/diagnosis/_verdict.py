@@ -105,9 +105,9 @@ def _said(findings: tuple[Finding, ...], *, has_reference: bool) -> str:
     gaps = [*unused, *others]
     nothing = "Nothing was examined that would show a fault."
     if any(f.code == SAMPLING_RATE for f in findings):
-        nothing = "Nothing is said of parts before it is right: all orders would be wrong."
+        nothing = "Parts are not judged until it is right: all orders would be wrong."
     elif has_reference:
-        nothing = "What shows, the reference shows as well."
+        nothing = "What shows is in the reference as well."
     why = " ".join(f.title for f in gaps[:2]) or nothing
     return " ".join([CANNOT_TELL, why, *titles, *_remedy(gaps)])
 
@@ -224,7 +224,7 @@ def speed_warnings(angle: ShaftAngle | CannotTell, rig: Rig) -> list[Finding]:
         surer = "Check sampling rate and pulses per revolution."
         doubts.append(Finding(OFF_NOMINAL, Kind.DATA_PROBLEM, title, Where(shaft=angle.shaft), surer=surer))
     if low < NEAR_ZERO_SHARE * high:
-        title = f"The speed falls to {low:.3g} rpm, near standstill: whether the shaft turns on or back is not told."
+        title = f"The speed falls to {low:.3g} rpm, near standstill: whether the shaft then reverses is not known."
         where = Where(shaft=angle.shaft)
         doubts.append(Finding(NEAR_ZERO, Kind.DATA_PROBLEM, title, where, surer=SURER_BEYOND_ZERO))
     return doubts

@@ -276,7 +276,7 @@ def acceleration_channels(recording: Recording, chosen: tuple[str, ...], whose: 
     unknown = [name for name in chosen if name not in accelerations]
     if unknown:
         allowed = ", ".join(accelerations)
-        raise InputError(f"{unknown[0]!r} is no acceleration channel", where="channels", allowed=allowed)
+        raise InputError(f"{unknown[0]!r} is not an acceleration channel", where="channels", allowed=allowed)
     if not accelerations:
         raise RefusalError(
             "there is no acceleration channel, and the calibration is for accelerations alone",
@@ -597,9 +597,9 @@ def judge(
     if strange and weakest is not None:
         raise RefusalError(
             f"the teeth's own pattern on shaft {weakest!r} agrees with that of the reference by "
-            f"{agreements[weakest]:.2f} only",
+            f"only {agreements[weakest]:.2f}",
             remedy="take a reference of the same gears, same sensors, same speed and load; or leave it out. Teeth that "
-            "hardly differ have no pattern to agree by: then a longer recording may help",
+            "hardly differ have no pattern to compare: then a longer recording may help",
             looked_at=searched,
         )
     limits = []
@@ -677,10 +677,10 @@ def _crack_estimate(
     place = (best.event.centre_rev - calibration.lag_pitches / teeth) % 1.0
     further_prominences = [e.event.prominence for e in gears if e is not best]
     if best.shaft.has_mark:
-        reasons.append("Teeth count from 1 at the mark, as they engage; the place is good to about one tooth.")
+        reasons.append("Teeth count from 1 at the mark in order of engagement; the place is good to about one tooth.")
     else:
         reasons.append("There is no mark on this shaft: the angle holds for this record only, and names no tooth.")
-    reasons.append("The depth supposes a crack through the whole face width.")
+    reasons.append("The depth assumes a crack through the whole face width.")
     way = ALONE if best.agreement is None else WITH_REFERENCE
     return CrackEstimate(
         shaft=shaft,
@@ -707,10 +707,10 @@ def _crack_estimate(
 
 def _reference_text(evidence: GearEvidence) -> str:
     if evidence.agreement is None:
-        return "Without a reference of the healthy gears, what every tooth differs by hides all but deep cracks."
+        return "Without a reference of the healthy gears, differences between teeth hide all but deep cracks."
     if evidence.agreement < SMALLEST_AGREEMENT:
         return (
-            f"Be careful with the reference: the teeth's own pattern agrees by {evidence.agreement:.2f} only. It may "
+            f"Be careful with the reference: the teeth's own pattern agrees by only {evidence.agreement:.2f}. It may "
             "be of other gears or another load, or the teeth hardly differ."
         )
     return f"Compared with a reference; the teeth's own pattern agrees by {evidence.agreement:.2f}."

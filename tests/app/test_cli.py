@@ -371,7 +371,7 @@ def test_crack_leaves_a_dead_channel_out(capsys: pytest.CaptureFixture[str], tmp
 def test_crack_names_the_channels_there_are(capsys: pytest.CaptureFixture[str]) -> None:
     code, out, err = run(capsys, "crack", sample("root_crack_3mm"), "--channel", "a1", "--channel", "a 7")
     assert (code, out) == (2, "")
-    assert "'a 7' is no acceleration channel" in err
+    assert "'a 7' is not an acceleration channel" in err
     assert "allowed: a1" in err
 
 

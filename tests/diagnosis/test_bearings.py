@@ -571,7 +571,7 @@ def test_a_race_whose_only_lines_are_beside_those_of_its_shaft_is_not_called_sou
     samples = recording.samples + 0.6 * ringing * np.clip(np.cos(2 * np.pi * turns), 0.0, None)
     assert recording.rig is not None
     analysis = analyze(with_bearings(replace(recording, samples=samples), recording.rig.bearings[1]))
-    why = "lines stand beside 5 times a turn of shaft motor, all to one side"
+    why = "lines stand beside 5 times per turn of shaft motor, all on one side"
     assert any(why in f.title for f in analysis.findings) is is_race
 
 

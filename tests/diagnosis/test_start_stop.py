@@ -28,7 +28,7 @@ def test_a_start_stop_recording_is_examined_as_one() -> None:
     assert "2 starts and 2 stops" in found["start-stop"].title
     assert found["flank-impacts"].where.tooth is not None
     assert {i.name for i in result.indicators} >= {"backlash", "restitution", "standing part"}
-    assert "want a speed that lasts" in " ".join(analysis_text(result).split())
+    assert "need a steady speed" in " ".join(analysis_text(result).split())
     assert '"start-stop"' in analysis_to_json(result)
 
 
