@@ -345,7 +345,7 @@ def _unnamed_finding(signals: AnalysisSignals, candidate: Candidate) -> Finding:
     # A shaft may well turn at this rate; an impact every other turn is no more likely than an unknown part.
     is_shafts = (multiple > 0 and multiple.is_integer()) or bool(near and not speed_is_confirmed(signals))
     strong = candidate.modulation >= CLEAR_MODULATION and not (is_shafts or mains or hunting)
-    causes = ["The usual cause is a rolling bearing that is not in the rig file; belts and other machines are possible, too."]
+    causes = ["The usual cause is a rolling bearing that is not in the rig file; or it is a belt or another machine."]
     if mains:
         causes = [f"It is the rate of {mains}, or of what that supply feeds."]
     elif hunting:

@@ -66,7 +66,7 @@ def detect_vibration_zone(signals: AnalysisSignals, indicators: Iterable[Indicat
         "It applies at bearing housings, in situ and at steady speed; displacement and changes count as well.",
     ]
     if signals.rig.pairs:
-        evidence.append("It applies to the machine that drives the gears or is driven by them; gear units: ISO 20816-9.")
+        evidence.append("It is for the machine that drives the gears or is driven by them; gear units: ISO 20816-9.")
     evidence += _possible(source, causes)
     above = f"; {source}" if source and zone in "CD" else ""
     return [
