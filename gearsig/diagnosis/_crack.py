@@ -43,7 +43,7 @@ def crack_depth(
 ) -> Answer | None:
     """Return a crack's depth, that none is seen, or why it cannot be told; None if nobody asked and none is seen.
 
-    For a machine described without gears, nobody is taken to ask for a crack.
+    For a machine described without gears, a crack counts as not asked for.
 
     Parameters
     ----------

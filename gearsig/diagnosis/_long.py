@@ -411,7 +411,7 @@ USUAL = "the usual level"
 def _chosen(
     record: RecordBlocks, overview: LongOverview, memory_bytes: float, reasons: tuple[str, ...] = ()
 ) -> list[tuple[slice, str]]:
-    """Return the parts to look at closely, in the order of time, and why; of these reasons, if any."""
+    """Return the parts to analyse, in order of time, with the reason; only for these reasons, if any."""
     n_part = max(1, int(min(PART_SAMPLES, memory_bytes / _needed_bytes(record.head, 1))))
     level = np.log(np.maximum(overview.rms, 1e-300)).mean(axis=0)
     impulsive = overview.kurtosis.max(axis=0)

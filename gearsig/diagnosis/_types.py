@@ -1,4 +1,4 @@
-"""What an analysis says: findings with place, strength, floor and confidence, or why it cannot tell."""
+"""Results of an analysis: findings with location, strength, floor and confidence, or why it cannot tell."""
 
 from __future__ import annotations
 
