@@ -381,7 +381,7 @@ def _of_gears(
 def _mesh_band(parts: SeparatedAverage, teeth: int) -> SynchronousAverage | None:
     try:
         return band_passed_mesh(parts.average, teeth)
-    except RefusalError:  # the band reaches beyond the sampling rate
+    except RefusalError:  # the band reaches beyond half the sampling rate
         return None
 
 

@@ -42,7 +42,7 @@ class ShaftSignals:
     averages : mapping
         Channel → synchronous average.
     separated : mapping
-        Channel → its parts; empty where no teeth are known or the mesh is beyond the sampling rate.
+        Channel → its parts; empty where no teeth are known or the mesh is beyond half the sampling rate.
     halves : mapping
         Channel → difference signals, (2, n_angles), of the odd and of the even revolutions separately.
     signal : AngleSignal
