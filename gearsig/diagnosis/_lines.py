@@ -418,7 +418,7 @@ def _mains(signals: AnalysisSignals) -> Finding | None:
         Where((name,), frequency_hz=mains),
         line.strength("noise floor of the spectrum"),
         confidence=confidence,
-        confidence_basis=f"two of the first three multiples within {100 * MAINS_WANDER:g} %, as far as supplies wander",
+        confidence_basis=f"two of the first three multiples within {100 * MAINS_WANDER:g} %",
         surer=surer,
     )
 
