@@ -231,7 +231,7 @@ def denoise(
     signal : Recording or array, (n_samples,)
         Finite, not constant, at least as long as the wavelet's filter. Any length.
     channel_or_rate_hz : str or float
-        The channel of a recording; of an array its sampling rate in Hz.
+        A recording's channel, or an array's sampling rate in Hz.
     settings : DenoiseSettings or None
         None: universal threshold, soft, "sym8", eight shifts.
     unit, source : str

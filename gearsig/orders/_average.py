@@ -272,7 +272,7 @@ def synchronous_average(
     signal : AngleSignal, Recording or array, (n_samples,)
         An AngleSignal is averaged over the shaft that it was resampled on.
     channel : str or float
-        The channel's name; of an array its sampling rate in Hz.
+        The channel's name, or an array's sampling rate in Hz.
     shaft : str
         Of a recording: the shaft to average over; default: that of the angle.
     shaft_angle : ShaftAngle or None

@@ -98,7 +98,7 @@ def order_spectrum(
     signal : AngleSignal, Recording or array, (n_samples,)
         Partial revolutions at either end are left out.
     channel : str or float
-        The channel's name; of an array its sampling rate in Hz.
+        The channel's name, or an array's sampling rate in Hz.
     shaft, shaft_angle, speed_rpm
         Of a recording or an array, as in `synchronous_average`.
     window : str

@@ -112,7 +112,7 @@ def delay_embedding(
     ----------
     signal : Recording or array, (n_samples,)
     channel_or_rate_hz : str or float
-        The channel of a recording; of an array its sampling rate in Hz.
+        A recording's channel, or an array's sampling rate in Hz.
     delay_samples : int or None
         None: the first minimum of the average mutual information.
     dimension : int or None

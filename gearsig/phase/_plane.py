@@ -267,7 +267,7 @@ def phase_plane(
     ----------
     signal : Recording or array, (n_samples,)
     channel_or_rate_hz : str or float
-        The channel of a recording; of an array its sampling rate in Hz.
+        A recording's channel, or an array's sampling rate in Hz.
     low_cut_hz : float or None
         Lowest frequency kept in full; a quarter of it and less is gone. Needed for acceleration and velocity:
         integration magnifies whatever is slow. None for a displacement keeps everything slow, the mean included.

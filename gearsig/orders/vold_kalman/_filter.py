@@ -62,7 +62,7 @@ def track_vold_kalman(
     signal : Recording, AngleSignal or array, (n_samples,)
         Over angle, every order has a constant frequency, and the envelope's smoothness is one per revolution.
     channel : str or float
-        The channel's name; of an array its sampling rate in Hz.
+        The channel's name, or an array's sampling rate in Hz.
     orders : sequence
         Each a number (cycles per revolution of the angle's shaft), a pair (shaft, number), a `FrequencyTrack`, or its
         frequency in Hz at each sample.
