@@ -133,7 +133,7 @@ def test_a_recording_too_short_to_settle_is_noted():
     n = 2000
     found = track_vold_kalman(np.ones(n), RATE_HZ, [np.full(n, 200.0)], bandwidth_hz=1.5, n_poles=3)
     assert not found.orders[0].settled.any()
-    assert any("too short for some orders to settle, widen the band: 'component 1'" in note for note in found.notes)
+    assert any("too short for some orders to settle; widen the band: 'component 1'" in note for note in found.notes)
 
 
 def test_bandwidth_in_orders_of_a_frequency_track():
