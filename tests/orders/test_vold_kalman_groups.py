@@ -217,7 +217,7 @@ def test_bandwidth_in_hz_over_angle(over_angle):
         ({"channel": "b"}, "no channel 'b'"),
         ({"shaft_angle": run_up(10.0, 20.0, 60.0)}, "over the angle of shaft"),
         ({"bandwidth_orders": 7.0}, "order zero"),
-        ({"bandwidth_orders": 0.001}, "400 revolutions only"),
+        ({"bandwidth_orders": 0.001}, "only 400 revolutions"),
     ],
 )
 def test_wrong_input_over_angle(over_angle, changes, message):
