@@ -391,8 +391,8 @@ def find_lines(
     Returns
     -------
     tuple of Line
-        Positions and values are interpolated from the ratio of the two highest lines and the window's transform; they
-        are exact for a single steady tone without noise.
+        Positions and values are interpolated from the ratio of the two highest lines and the window's transform;
+        positions are exact for a single steady tone without noise.
 
     Raises
     ------

@@ -76,7 +76,7 @@ def ridge_scores(power: FloatArray, n_reach: int) -> FloatArray:
 _N_FIT = 24
 _MIN_FIT = 4
 _OF_MEETING = 8
-"""A slope is fitted over at least this fraction (one over it) of the length of the meeting."""
+"""A slope beside a meeting is fitted over at least the meeting's length divided by this."""
 _MEETING_GAPS = (3.0, 2.2, 1.6, 1.2, 1.0)
 """Gaps at which a meeting is examined; farther apart, the paths are known more accurately."""
 _VALLEY = 0.8

@@ -388,7 +388,7 @@ def valid_parts(tracks: Tracks, bandwidth: FloatArray, sampling_rate: float, gen
             continue
         reach = f"runs from {f[k].min():.4g} to {f[k].max():.4g} {tracks.unit}"
         if f[k].max() == 0.0:
-            raise RefusalError(f"order {name!r} stands still all the time", remedy="record while the machine turns")
+            raise RefusalError(f"order {name!r} stands still throughout", remedy="record while the machine turns")
         if f[k].min() >= sampling_rate / 2:
             raise RefusalError(
                 f"order {name!r} {reach}, at or above half the sampling rate of {sampling_rate:g} {tracks.unit}",
