@@ -1,4 +1,4 @@
-"""The comb of orders that a gear train puts into a spectrum: mesh harmonics, sidebands, shaft harmonics."""
+"""The comb of orders that a gear train causes in a spectrum: mesh harmonics, sidebands, shaft harmonics."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ IntArray = NDArray[np.integer[Any]]
 BoolArray = NDArray[np.bool_]
 Stages = tuple[tuple[float, tuple[float, ...]], ...]
 
-# Odds that a line of the comb is there at all. They tell a speed from its half: low harmonics and near sidebands are
-# likelier.
+# Probabilities that a line of the comb is present. They distinguish a speed from half of it: low harmonics and near
+# sidebands are more likely.
 PRESENCE = (0.8, 0.6, 0.4, 0.25)
 _MESH_CLASSES = (0, 1, 2, 2, 3)
 _SIDEBAND_CLASSES = (1, 3)
@@ -38,15 +38,15 @@ _SAME = 0.02  # orders closer than this are one line
 
 @dataclass(frozen=True)
 class CombLines:
-    """Orders of the reference shaft at which a gear train speaks.
+    """Orders of the reference shaft at which a gear train causes lines.
 
     Parameters
     ----------
     orders : array, (n_lines,)
     presence : array of int, (n_lines,)
-        How likely each line is there, index into `PRESENCE`.
+        Index into `PRESENCE`, the probability that each line is present.
     is_mesh : array of bool, (n_lines,)
-        Mesh harmonics; the others are sidebands and shaft harmonics, which tell the scale of the speed.
+        True for mesh harmonics; the others are sidebands and shaft harmonics, which determine the scale of the speed.
     stages : tuple of (float, tuple of float)
         Mesh order and orders of the shafts in mesh, per stage.
     """
@@ -63,19 +63,19 @@ class CombLines:
 
     @property
     def mesh_harmonics(self) -> tuple[float, ...]:
-        """The first three harmonics of each mesh."""
+        """First three harmonics of each mesh order."""
         return tuple(k * m for m in self.meshes for k in (1, 2, 3))
 
     @property
     def highest(self) -> float:
-        """Highest order of all."""
+        """Highest order of the comb."""
         return float(self.orders.max())
 
 
 def comb_of_rig(rig: Rig) -> CombLines | None:
-    """Return the comb of a rig, None if no mesh order is known.
+    """Return the comb of a rig; None if no mesh order is known.
 
-    Each mesh that can be related to the reference shaft takes part, with sidebands of the shafts whose ratio is known.
+    It includes each mesh that can be related to the reference shaft, with sidebands of the shafts whose ratio is known.
     """
     ratios = shaft_ratios(rig)
     known = [(p, m) for p in rig.pairs if (m := rig.mesh_order(p)) is not None]
@@ -87,7 +87,7 @@ def comb_of_rig(rig: Rig) -> CombLines | None:
 
 @lru_cache(maxsize=64)
 def comb_of_stages(stages: Stages) -> CombLines:
-    """Return the comb of (mesh order, shaft orders) per stage."""
+    """Return the comb of stages, given as (mesh order, shaft orders) each."""
     turning = {round(s, 9) for _, shafts in stages for s in shafts}
     lines = [(k * m, _MESH_CLASSES[k - 1]) for m, _ in stages for k in range(1, N_MESH_HARMONICS + 1)]
     n_mesh = len(lines)
@@ -103,7 +103,7 @@ def comb_of_stages(stages: Stages) -> CombLines:
     orders: list[float] = []
     classes: list[int] = []
     is_mesh: list[bool] = []
-    # Where two lines fall together, the likelier one counts: mesh before the rest, then by class.
+    # If two lines coincide, the more likely one counts: mesh harmonics first, then by class.
     ranked = sorted(enumerate(lines), key=lambda item: (item[0] >= n_mesh, item[1][1], item[1][0]))
     taken: list[float] = []  # sorted
     for place, (order, presence) in ranked:
@@ -117,9 +117,9 @@ def comb_of_stages(stages: Stages) -> CombLines:
 
 
 def with_other_teeth(comb: CombLines) -> list[CombLines]:
-    """Return the combs of the same shafts with one to four teeth more or less on each stage's first gear.
+    """Return the combs of the same shafts with one to four teeth more or fewer on each stage's first gear.
 
-    A series of harmonics that has no mesh in it, such as a bearing's, fits them all alike.
+    A harmonic series without a mesh, such as a bearing's, fits all of them equally well.
     """
     combs = []
     for change in (-4, -3, -2, -1, 1, 2, 3, 4):
@@ -129,23 +129,23 @@ def with_other_teeth(comb: CombLines) -> list[CombLines]:
     return combs
 
 
-# How much each frequency looks like a line: height over the local floor, as log likelihood ratio by rank.
+# Evidence for a line at each frequency: height over the local floor, converted by rank to a log likelihood ratio.
 
 
 @dataclass(frozen=True)
 class LineEvidence:
-    """Log likelihood ratio of "a line of the comb is here" for each interval between two bins.
+    """Log likelihood ratio for "a line of the comb is here" in each interval between two bins.
 
     Parameters
     ----------
     ratios : array, (n_classes, n_intervals)
-        For each class of `comb_lines.PRESENCE`; interval i spans i to i + 1 bins.
+        For each class of `PRESENCE`; interval i spans i to i + 1 bins.
     log_ratio : array, (n_bins,)
         ln(power / floor), mean over the channels.
     bin_width : float
-        Hz, or orders.
+        In Hz or orders.
     top : float
-        Upper end of what is looked at.
+        Upper limit of the range considered.
     """
 
     ratios: FloatArray
@@ -157,8 +157,9 @@ class LineEvidence:
 def line_evidence(samples: FloatArray, rate: float, n_segment: int, top: float, reach: float = np.inf) -> LineEvidence:
     """Return the evidence for lines in all channels together.
 
-    Hann windows of `n_segment` samples at half overlap; mean power over them; heights over the floor averaged over
-    channels. Computed in the samples' precision, single at least: its rounding lies below that of the samples.
+    Power is averaged over half-overlapping Hann windows of `n_segment` samples, and log heights over the floor are
+    averaged over the channels. Computed in the samples' precision, at least single: rounding stays below that of the
+    samples.
 
     Parameters
     ----------
@@ -166,11 +167,11 @@ def line_evidence(samples: FloatArray, rate: float, n_segment: int, top: float, 
     rate : float
         Samples per second, or per revolution.
     n_segment : int
-        Shortened a little to a length that transforms fast.
+        Shortened slightly to a fast FFT length.
     top : float
         In the unit of `rate`.
     reach : float
-        Up to where evidence is asked for, in the same unit; a line's rank is among all lines nevertheless.
+        Upper limit of the evidence returned, in the same unit; a line is still ranked among all lines.
     """
     from scipy.fft import prev_fast_len
 
@@ -186,23 +187,23 @@ def line_evidence(samples: FloatArray, rate: float, n_segment: int, top: float, 
     first = np.maximum.accumulate(np.where(np.diff(ascending, prepend=-1.0) > 0.0, np.arange(len(order)), 0))
     rank = np.empty(len(order))
     rank[order] = (len(order) - first) / len(height)
-    # A line that is there stands among the top ranks q: density a·q^(a-1), a = 0.3. ln(1 - p + p·a·q^(a-1)): a line
-    # missing costs little, a line of high rank gives a lot, none decides alone.
+    # A line that is present is among the top ranks q, with density a·q^(a-1), a = 0.3. ln(1 - p + p·a·q^(a-1)): a
+    # missing line costs little, a line of high rank adds much, and none decides alone.
     n_asked = int(min(len(height), reach / rate * n_segment + 2))
     high = high[: np.searchsorted(high, n_asked)]
     density = 0.3 * rank[: len(high)] ** (0.3 - 1.0)
     likelihoods = np.empty((len(PRESENCE), n_asked))
     for row, present in zip(likelihoods, PRESENCE, strict=True):
-        row[:] = np.log(1.0 - present + present * 0.3)  # rank 1: all that is no peak
+        row[:] = np.log(1.0 - present + present * 0.3)  # rank 1: everything that is not a peak
         row[high] = np.log(1.0 - present + present * density)
     return LineEvidence(likelihoods, log_ratio, rate / n_segment, top)
 
 
 def _interval_heights(x: FloatArray) -> FloatArray:
-    """Height of the higher end of each interval between two bins, 0 where neither is a line.
+    """Return the height of the higher end of each interval between two bins; 0 where neither is a line.
 
-    The flanks of a line are not lines: only what is the largest within two bins each way counts. A candidate may so
-    miss a line's middle by half a bin.
+    The skirts of a line are not lines: only the largest bin within two bins on either side counts. A candidate may thus
+    miss a line's centre by half a bin.
     """
     from scipy.ndimage import maximum_filter1d
 
@@ -224,16 +225,16 @@ def _mean_power(x: FloatArray, n_segment: int) -> FloatArray:
     return power
 
 
-@lru_cache(maxsize=1)  # blocks of one length are asked for one after the other
+@lru_cache(maxsize=1)  # blocks of the same length follow each other
 def _hann(n: int, precision: np.dtype[Any]) -> FloatArray:
     window: FloatArray = 0.5 - 0.5 * np.cos(np.arange(n, dtype=precision) * precision.type(2 * np.pi / n))
     return window
 
 
 def _log_ratio(power: FloatArray) -> FloatArray:
-    """ln(power/floor); the floor is the median in blocks of 96 bins, straight lines (in decibels) between the middles.
+    """Return ln(power/floor), with the floor from medians of blocks of 96 bins, interpolated linearly in decibels.
 
-    Cut at 9, 78 dB in power: beyond it a line is no more of a line.
+    Values are clipped at 9, i.e. 39 dB: a higher line is no stronger evidence of a line.
     """
     tiny = max(float(power.max()) * 1e-24, 1e-300)
     log_power = np.log(np.maximum(power, tiny))
@@ -249,8 +250,8 @@ def _log_ratio(power: FloatArray) -> FloatArray:
 
 
 def candidate_speeds(low: float, high: float, comb: CombLines, evidence: LineEvidence) -> FloatArray:
-    """Return speeds in equal ratios, so close that the highest line in sight moves by one bin."""
-    # Lines above the top are not looked at, so the step of the highest line is at most that of the top.
+    """Return speeds at equal ratios, spaced so that the highest line considered moves by one bin per step."""
+    # Lines above the top are ignored, so the highest line moves by at most as much as the top.
     step = evidence.bin_width / min(comb.highest * high, evidence.top)
     n = int(np.clip(np.ceil(np.log(high / low) / step), 2, 4_000_000))
     return np.geomspace(low, high, n + 1)
@@ -268,11 +269,11 @@ def score_speeds(
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _score(ratios, per_bin, top, orders, presence, is_mesh, speeds, out):  # type: ignore[no-untyped-def]
-    """out[i] = Σ over lines below top of the log likelihood ratio where order · speed falls."""
+    """out[i] = Σ of the log likelihood ratios at order · speed, over the lines below top."""
     limit = min(int(top * per_bin), ratios.shape[1] - 1)
     for i in range(speeds.shape[0]):
         total = 0.0
-        # Sidebands closer than four bins to their mesh line cannot be told from it.
+        # Sidebands closer than four bins to their mesh line cannot be resolved.
         resolved = speeds[i] * per_bin >= 4.0
         for j in range(orders.shape[0]):
             k = int(orders[j] * speeds[i] * per_bin)
@@ -281,19 +282,19 @@ def _score(ratios, per_bin, top, orders, presence, is_mesh, speeds, out):  # typ
         out[i] = total
 
 
-# Whether the best comb is the true one: against chance, against other speeds, against other teeth.
+# Whether the best comb is the true one, compared with chance, other speeds and other teeth.
 
 
-# Ranges narrower than this ratio come from a known nominal speed: the scale of the speed is then not in question.
+# Ranges narrower than this ratio come from a known nominal speed, so that the scale of the speed is certain.
 NARROW = 1.35
 
 FARTHEST_MOVED = 0.12
-"""Share by which a line of a comb of chance is moved at most."""
+"""Maximum log shift (about 12 %) of a line in a random comb."""
 
 
 @dataclass(frozen=True)
 class CombDecision:
-    """The best comb and what speaks for and against it.
+    """The best comb, and the evidence for and against it.
 
     Parameters
     ----------
@@ -302,19 +303,19 @@ class CombDecision:
     score : float
         Sum of log likelihood ratios.
     chance_mean, chance_deviation : float
-        Of the best score of wrong combs.
+        Mean and standard deviation of the best score of random combs.
     runner_up_speed, runner_up_score : float
-        Best other speed.
+        Best other speed and its score.
     other_teeth_score : float
         Best score of the same shafts with other teeth.
     side_score : float
-        Part of the score that sidebands and shaft harmonics carry.
+        Part of the score from sidebands and shaft harmonics.
     narrow : bool
-        Whether the search range left the scale of the speed open (False) or not.
+        Whether the search range was narrow enough to fix the scale of the speed.
     bin_width : float
-        Of the spectrum it was found in.
+        Bin width of the spectrum in which it was found.
     coverage : float
-        Share of the recording in which the comb lies where a varying angle says.
+        Share of the recording in which the comb lies where a varying angle predicts it.
     """
 
     speed: float
@@ -336,26 +337,26 @@ class CombDecision:
 
     @property
     def quality(self) -> float:
-        """0 to 1: product of the confidences that it is no chance, no other speed, no other teeth.
+        """0 to 1: product of the confidences against chance, another speed and other teeth.
 
-        The scales were set on simulated and measured recordings, see the tests; they are no probabilities from theory.
+        The scales were set on simulated and measured recordings, see the tests; they are not theoretical probabilities.
         """
         parts = [_sure(self.significance, 4.0, 3.0), _sure(self.score - self.runner_up_score, 2.0, 4.0)]
         parts.append(_sure(self.score - self.other_teeth_score, 2.0, 4.0))
         if not self.narrow:
-            # Mesh lines alone fit any number of teeth at another speed; sidebands tell the scale.
+            # Mesh lines alone fit any number of teeth at another speed; sidebands determine the scale.
             parts.append(_sure(self.side_score, 2.0, 4.0))
-        # Speed that was followed rightly most of the time only is no angle to average over.
+        # An angle that is correct only most of the time is not fit for averaging.
         parts.append(self.coverage**12)
         return float(np.prod(parts))
 
     @property
     def rank(self) -> tuple[bool, float]:
-        """What the better of two has more of: any trustworthy one comes before all others."""
+        """Sort key: any trustworthy decision ranks above all others, then the score counts."""
         return self.quality >= MIN_QUALITY, self.score
 
     def evidence(self, unit: str = "rev/s") -> str:
-        """State the numbers in one sentence."""
+        """Return the scores in one sentence."""
         return (
             f"best comb at {self.speed:.5g} {unit}: score {self.score:.1f}, by chance {self.chance_mean:.1f} ± "
             f"{self.chance_deviation:.1f}, next best speed ({self.runner_up_speed / self.speed:.4g} times) "
@@ -364,17 +365,17 @@ class CombDecision:
 
 
 def decide(evidence: LineEvidence, comb: CombLines, low: float, high: float) -> CombDecision:
-    """Find the best comb between `low` and `high` and weigh it against chance, other speeds, and other teeth.
+    """Find the best comb between `low` and `high` and compare it with chance, other speeds and other teeth.
 
-    By chance: combs each line of which is moved by its own random share of up to ± 12 %, which keeps number and spread
-    of the lines but not their harmony. They are searched over the same range, so that its many trials are accounted
-    for.
+    Chance is represented by random combs: each line is moved by its own random share of up to ± 12 %, which keeps the
+    number and spread of the lines but not their harmonic relation. They are searched over the same range, which
+    accounts for its many trials.
     """
     speeds = candidate_speeds(low, high, comb, evidence)
     scores = score_speeds(evidence, comb, speeds)
     best = int(np.argmax(scores))
     speed = refine_speed(evidence, comb, float(speeds[best]))
-    # Within three bins of the lowest mesh line it is the same comb; of a slow machine these reach down to zero.
+    # Within three bins of the lowest mesh line it is the same comb; for a slow machine these reach down to zero.
     same = min(1.0, 3.0 * evidence.bin_width / (comb.meshes[0] * speed))
     elsewhere = np.where(np.abs(speeds / speed - 1.0) > same, scores, -np.inf)
     runner_up = int(np.argmax(elsewhere))
@@ -401,10 +402,10 @@ def decide(evidence: LineEvidence, comb: CombLines, low: float, high: float) -> 
 
 
 def refine_speed(evidence: LineEvidence, comb: CombLines, speed: float) -> float:
-    """Sharpen a speed by the middles of the lines that are there.
+    """Refine a speed from the centres of the lines that are present.
 
-    Parabolas through the logarithm of each line's three highest bins give its frequency; the speed is the
-    least-squares slope of frequency over order, weighted by the lines' heights, lines off by more than a bin left out.
+    Parabolas through the logarithm of each line's three highest bins give its frequency; the speed is the least-squares
+    slope of frequency over order, weighted by the lines' heights, without lines off by more than 1.5 bins.
     """
     lines = [
         (order, place, height)
@@ -426,7 +427,7 @@ def refine_speed(evidence: LineEvidence, comb: CombLines, speed: float) -> float
 
 
 def _line_at(evidence: LineEvidence, position: float) -> tuple[float, float] | None:
-    """Position and height of the line within a bin or so of `position`, None where nothing stands out."""
+    """Return position and height of the line within about a bin of `position`; None if nothing stands out."""
     x = evidence.log_ratio
     k = int(np.floor(position / evidence.bin_width))
     if k < 2 or k + 3 >= len(x):
@@ -442,17 +443,17 @@ def _sure(value: float, zero: float, scale: float) -> float:
     return 1.0 - float(np.exp(-max(0.0, value - zero) / scale))
 
 
-# What is searched where, when the speed is read from the vibration.
+# Scope of the search when the speed is estimated from the vibration.
 
 
 MIN_QUALITY = 0.5
-"""Below it no speed is claimed: on simulated and measured recordings, hardly a wrong speed lies above."""
+"""Quality below which no speed is reported: on simulated and measured recordings, hardly any wrong speed exceeds it."""
 
 CLEAR = 0.9
-"""Quality of the best so far beyond which no other length of blocks is tried."""
+"""Quality of the best decision so far beyond which no other block length is tried."""
 
 TOP = 0.45
-"""Share of the sampling rate that is looked at; above it lie the anti-aliasing filters of recorders."""
+"""Upper limit of the analysis relative to the sampling rate; above it, the recorder's anti-aliasing filter acts."""
 
 _WIDEST_RPM = (30.0, 30_000.0)
 _MIN_REVOLUTIONS = 20.0
@@ -461,7 +462,7 @@ _DIVISIONS = (1, 4, 16)  # of the recording's length: long segments for steady l
 
 @dataclass(frozen=True)
 class SpeedSearch:
-    """What is searched where."""
+    """Data, comb and speed range (rev/s) of a search for the speed."""
 
     recording: Recording
     channels: tuple[str, ...]
@@ -475,7 +476,7 @@ class SpeedSearch:
 def search_of(
     recording: Recording, rig: Rig, channels: Sequence[str] | None, speed_range_rpm: tuple[float, float] | None
 ) -> SpeedSearch:
-    """Check what the search rests on: teeth, living channels, a range of speeds with enough revolutions."""
+    """Check the basis of the search (teeth, channels with a signal, a speed range with enough revolutions)."""
     check_recording(recording)
     check_rig(rig, needed=True)
     comb = comb_of_rig(rig)
@@ -488,7 +489,7 @@ def search_of(
     rows = [recording.index(name) for name in names]
     alive = [i for i in rows if float(np.ptp(recording.samples[i])) > 0.0]
     if not alive:
-        raise RefusalError("no vibration channel moves", remedy="check sensors and channel quantities")
+        raise RefusalError("all vibration channels are constant", remedy="check sensors and channel quantities")
     low, high = _range(recording, rig, comb, speed_range_rpm)
     return SpeedSearch(
         recording,
@@ -504,7 +505,7 @@ def search_of(
 def _range(
     recording: Recording, rig: Rig, comb: CombLines, speed_range_rpm: tuple[float, float] | None
 ) -> tuple[float, float]:
-    """Range of speeds in rev/s."""
+    """Return the lowest and highest speed of the search in rev/s."""
     nominal = rig.nominal_speed_rpm()
     if speed_range_rpm is not None:
         low, high = (positive(v, "speed_range_rpm", "rpm") / 60.0 for v in speed_range_rpm)
@@ -531,22 +532,22 @@ def _range(
 
 @dataclass(frozen=True)
 class SpeedCandidate:
-    """An angle, and how its comb weighed."""
+    """An angle, and the decision on its comb."""
 
     angle: ShaftAngle
     decision: CombDecision
 
 
 def best_decision(samples: FloatArray, rate: float, comb: CombLines, low: float, high: float) -> CombDecision | None:
-    """Weigh the comb over spectra of several resolutions and return the best, None if the samples are too few.
+    """Return the best decision on the comb over spectra of several resolutions; None if the samples are too few.
 
     `rate` is in samples per second, or per revolution; `low` and `high` accordingly.
     """
     best: CombDecision | None = None
-    # Moved at random, and with other teeth, combs reach farther up.
+    # Random combs and combs with other teeth extend further up.
     reach = high * max(np.exp(FARTHEST_MOVED) * comb.highest, *(c.highest for c in with_other_teeth(comb)), 0.0)
     for n in (samples.shape[1] // d for d in _DIVISIONS):
-        # Sidebands need four bins between them and the mesh line.
+        # Sidebands must be at least four bins from the mesh line.
         if n >= 256 and high * n / rate > 4.0:
             decision = decide(line_evidence(samples, rate, n, TOP * rate, reach), comb, low, high)
             if best is None or decision.rank > best.rank:

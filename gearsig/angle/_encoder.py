@@ -1,4 +1,4 @@
-"""Shaft angle from an encoder, or from a speed channel: local parabolas through noisy, dense samples."""
+"""Shaft angle from an encoder or a speed channel: local parabolas through noisy, dense samples."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from gearsig.errors import InputError, RefusalError
 
 
 def noise_of(x: FloatArray) -> float:
-    """Standard deviation of the noise in a smooth quantity, from its third differences.
+    """Return the standard deviation of the noise in a smooth quantity, from its third differences.
 
     A third difference of independent errors has 1 + 9 + 9 + 1 = 20 times their variance; a smooth profile has almost
     none.
@@ -18,7 +18,7 @@ def noise_of(x: FloatArray) -> float:
     if len(x) < 8:
         return 0.0
     third = np.diff(x, 3)
-    # The root mean square as well: in a staircase most differences are zero, and the median says nothing.
+    # The root mean square as well: in a staircase most differences are zero, so the median is not informative.
     spread = max(float(np.median(np.abs(third))) / 0.6745, float(np.sqrt(np.mean(np.square(third)))))
     return float(spread / np.sqrt(20.0))
 
@@ -29,8 +29,8 @@ def local_parabolas(x: FloatArray, half_width: int) -> tuple[FloatArray, FloatAr
     Returns
     -------
     positions, values, slopes : arrays, (n_knots,)
-        In samples, in x's unit, and in x's unit per sample. The first and the last knot are the first and the last
-        sample, read from the parabola next to them.
+        In samples, in the unit of x, and in the unit of x per sample. The first and last knot are the first and last
+        sample, evaluated from the nearest parabola.
 
     Notes
     -----
@@ -44,7 +44,7 @@ def local_parabolas(x: FloatArray, half_width: int) -> tuple[FloatArray, FloatAr
     # Values relative to the centre: an angle of thousands of revolutions would lose digits otherwise.
     windows = np.lib.stride_tricks.sliding_window_view(x, 2 * m + 1)[centres - m] - x[centres][:, None]
     a, b, c = basis @ windows.T
-    # The parabolas at their own middles, and the outermost ones at the ends too.
+    # Parabolas are evaluated at their middles, the outermost ones also at the ends.
     at = np.concatenate([[0], np.arange(len(centres)), [len(centres) - 1]])
     off = np.concatenate([[-m], np.zeros(len(centres)), [m]])
     a, b, c, middles = a[at], b[at], c[at], x[centres][at]
@@ -57,9 +57,9 @@ def local_parabolas(x: FloatArray, half_width: int) -> tuple[FloatArray, FloatAr
 def encoder_angle(
     values: FloatArray, sampling_rate_hz: float, units_per_revolution: float = 360.0, *, wraps: bool = True
 ) -> ShaftAngle:
-    """Turn an angle channel, wrapping or running on, into shaft angle.
+    """Convert an angle channel, wrapped or continuous, to shaft angle.
 
-    Jumps of a whole revolution are undone; parabolas over a few samples, longer where the angle is noisy or coarse,
+    Jumps of a whole revolution are unwrapped; parabolas over a few samples, or more if the angle is noisy or coarse,
     give angle and speed at knots.
 
     Parameters
@@ -75,14 +75,14 @@ def encoder_angle(
     Returns
     -------
     ShaftAngle
-        Counting up, also for a shaft that turns backwards.
+        Counts up, even if the shaft turns backwards.
 
     Raises
     ------
     InputError
-        On fewer than 8 samples, or values that are not finite.
+        On fewer than 8 samples, or non-finite values.
     RefusalError
-        If the shaft stands still, or turns one way and then the other.
+        If the shaft is at rest or reverses.
     """
     x = frozen_array(values, "encoder channel", ndim=1)
     positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
@@ -119,7 +119,7 @@ def _check_motion(revolutions: FloatArray, noise: float) -> None:
     turned = float(revolutions[-1] - revolutions[0])
     if turned < max(0.01, 10 * noise):
         raise RefusalError(
-            f"the encoder turns by {turned:.3g} revolutions in the whole recording: the machine is at rest",
+            f"the encoder turns by only {turned:.3g} revolutions in the whole recording: the machine is at rest",
             remedy="check the channel and units_per_revolution",
         )
     backwards = float(np.max(np.maximum.accumulate(revolutions) - revolutions))
@@ -131,12 +131,12 @@ def _check_motion(revolutions: FloatArray, noise: float) -> None:
 
 
 def _half_width(revolutions: FloatArray, noise: float) -> tuple[int, tuple[str, ...]]:
-    """Samples on each side of a knot, and a note where the noise asks for more than the shortest parabola."""
+    """Return the samples on each side of a knot, and a note if noise requires more than the shortest parabola."""
     n = len(revolutions)
     per_sample = float(revolutions[-1] - revolutions[0]) / (n - 1)
-    # The slope of a line over 2m + 1 samples has the standard deviation noise·√(3/(2m³)), nearly. Knots carry a speed
-    # error of a thousandth at most where the noise allows, but average over no more than a sixteenth of a revolution,
-    # so that torsional vibration of low order is kept.
+    # The slope of a line over 2m + 1 samples has a standard deviation of nearly noise·√(3/(2m³)). Knots have a speed
+    # error of at most a thousandth if the noise allows, but average over at most a sixteenth of a revolution, so that
+    # torsional vibration of low order is kept.
     m = (1.5 * (noise / (1e-3 * per_sample)) ** 2) ** (1 / 3)
     longest = max(2, int(0.5 / 16.0 / per_sample))
     half_width = int(np.clip(np.ceil(m), 2, min(longest, (n - 1) // 2)))
@@ -153,8 +153,8 @@ def _half_width(revolutions: FloatArray, noise: float) -> tuple[int, tuple[str, 
 def speed_channel_angle(values: FloatArray, sampling_rate_hz: float, rpm_per_unit: float = 1.0) -> ShaftAngle:
     """Integrate a speed channel to shaft angle, zero at the first sample.
 
-    revolutions(t) = ∫ rpm/60 dt, by trapezoids over all samples, knots every 0.05 s; the speed at a knot is a
-    parabola's over ±0.05 s (±2 samples for a slowly sampled channel).
+    revolutions(t) = ∫ rpm/60 dt, by trapezoids over all samples, with knots every 0.05 s; the speed at a knot comes
+    from a parabola over ±0.05 s (±2 samples for a slowly sampled channel).
 
     Parameters
     ----------
@@ -166,15 +166,14 @@ def speed_channel_angle(values: FloatArray, sampling_rate_hz: float, rpm_per_uni
     Returns
     -------
     ShaftAngle
-        Phase between revolutions drifts with any error of the scale, so synchronous averages over many revolutions
-        may smear.
+        Any error of the scale makes the phase drift, so synchronous averages over many revolutions may smear.
 
     Raises
     ------
     InputError
-        On fewer than 8 samples, or values that are not finite.
+        On fewer than 8 samples, or non-finite values.
     RefusalError
-        If the channel says that the machine is at rest, or that it reverses.
+        If the channel shows that the machine is at rest or reverses.
     """
     from scipy.integrate import cumulative_trapezoid
 
@@ -184,7 +183,7 @@ def speed_channel_angle(values: FloatArray, sampling_rate_hz: float, rpm_per_uni
     if len(x) < 8:
         raise InputError(f"the speed channel has {len(x)} samples", allowed="at least 8")
     speed, notes = _forwards(np.asarray(x, dtype=np.float64) * (rpm_per_unit / 60.0))
-    # Noisy or stepped speeds are averaged over ±0.05 s: speed channels seldom follow faster.
+    # Noisy or stepped speeds are averaged over ±0.05 s: speed channels seldom respond faster.
     half_width = max(2, round(0.05 * sampling_rate_hz))
     positions, smooth, _ = local_parabolas(speed, half_width)
     cumulative = cumulative_trapezoid(speed, dx=1.0 / sampling_rate_hz, initial=0)
@@ -205,7 +204,7 @@ def speed_channel_angle(values: FloatArray, sampling_rate_hz: float, rpm_per_uni
 
 
 def _forwards(speed: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
-    """Return the speed counting up, without noise below zero."""
+    """Return the speed made positive, with noise below zero removed, and notes."""
     top = float(np.max(np.abs(speed)))
     if top * 60.0 < 1.0 or float(np.mean(np.abs(speed))) * len(speed) == 0.0:
         raise RefusalError(

@@ -1,4 +1,4 @@
-"""Pulse edges in a tachometer channel: Schmitt trigger with sub-sample edge times."""
+"""Tachometer pulses: edges with sub-sample times, spurious and missed pulses, clock ticks, shaft angle."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ class PulseEdges:
         Time step that the edges are quantised to: the sampling interval if the signal jumps from level to level within
         one sample, 0 if the edges are resolved by interpolation.
     threshold, hysteresis : float
-        As used, in the channel's unit.
+        Values used, in the channel's unit.
     low, high : float
-        Levels of the signal.
+        Low and high level of the signal.
     """
 
     times_s: FloatArray
@@ -48,7 +48,7 @@ def find_pulse_edges(
     hysteresis: float | None = None,
     edge: str = "rising",
 ) -> PulseEdges:
-    """Find the edges of a pulse signal.
+    """Find the edges of a pulse signal with a Schmitt trigger.
 
     The trigger is armed below threshold - hysteresis/2 and fires above threshold + hysteresis/2; the edge lies where
     the straight line between the two samples around the last crossing meets the threshold.
@@ -58,7 +58,7 @@ def find_pulse_edges(
     values : array, (n_samples,)
     sampling_rate_hz : float
     threshold : float, optional
-        Default: half way between the low and the high level, the 0.05 and the 99.95 percentile.
+        Default: halfway between the low and the high level, which are the 0.05 and the 99.95 percentile.
     hysteresis : float, optional
         Full width; default: a quarter of the step from low to high.
     edge : str
@@ -67,25 +67,25 @@ def find_pulse_edges(
     Returns
     -------
     PulseEdges
-        May hold no pulse at all: the pulse train's own check speaks about that.
+        It may be empty: `pulse_train_angle` checks the number of pulses.
 
     Raises
     ------
     InputError
-        On another `edge`, a hysteresis below 0, or values that are not finite.
+        On another `edge`, a negative hysteresis, or non-finite values.
     RefusalError
-        If the levels are to be found and the channel has no two levels: constant, or noise.
+        If no threshold is given and the channel does not have two levels: it is constant, or noise.
 
     Notes
     -----
-    Not for a channel that holds an analogue speed or an angle.
+    Not for a channel with an analogue speed or an angle.
     """
     x = frozen_array(values, "tachometer channel", ndim=1)
     positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
     one_of(edge, "edge", ("rising", "falling"))
-    # 0.05 % of spikes do no harm, and pulses may be as short as 0.1 % of a period.
+    # Up to 0.05 % of spikes do no harm, and pulses may be as short as 0.1 % of a period.
     low, high = (float(v) for v in np.percentile(x, (0.05, 99.95)))
-    if high - low < 0.1 * float(np.ptp(x)):  # pulses so short or few that the percentiles pass them by
+    if high - low < 0.1 * float(np.ptp(x)):  # pulses too short or too few for the percentiles
         low, high = float(x.min()), float(x.max())
     if threshold is None:
         _check_two_levels(x, low, high)
@@ -98,7 +98,7 @@ def find_pulse_edges(
     positions, jumps = _schmitt(x, sign, sign * threshold, hysteresis / 2, 0.1 * (high - low))
     tick_s = 0.0
     if len(jumps) and np.mean(jumps) > 0.8:
-        # A jump within one sample says only between which samples the edge lies; the middle is the best guess.
+        # After a jump within one sample, only the two samples around the edge are known; the middle is the best guess.
         positions = np.where(jumps, np.ceil(positions) - 0.5, positions)
         tick_s = 1.0 / sampling_rate_hz
     return PulseEdges(positions / sampling_rate_hz, tick_s, threshold, hysteresis, low, high)
@@ -122,8 +122,8 @@ def _check_two_levels(x: FloatArray, low: float, high: float) -> None:
 def _schmitt(x, sign, threshold, half_width, near):  # type: ignore[no-untyped-def]
     """Return positions (in samples) of upward edges of sign·x, and whether each is a jump from level to level.
 
-    At a jump the two samples around the edge differ by most of the step between the levels (ten times `near`), and the
-    samples before and after change by less than `near`.
+    At a jump, the two samples around the edge differ by most of the step between the levels (ten times `near`), and the
+    signal before and after changes by less than `near`.
     """
     n = x.shape[0]
     positions = np.empty(n // 2 + 1)
@@ -153,27 +153,27 @@ def _schmitt(x, sign, threshold, half_width, near):  # type: ignore[no-untyped-d
     return positions[:count], jumps[:count]
 
 
-# Spurious and missed pulses in a pulse train, told from real changes of speed.
+# Spurious and missed pulses in a pulse train, distinguished from real changes of speed.
 
 
-# An interval is suspicious when it is shorter or longer than the local trend says by these factors.
+# An interval is suspicious if it is shorter or longer than the local trend by these factors.
 _SHORT, _LONG = 0.6, 1.5
 
 
 @dataclass(frozen=True)
 class PulseCount:
-    """A pulse train whose pulses have been counted.
+    """A pulse train with numbered pulses.
 
     Parameters
     ----------
     times_s : array, (n,)
-        Without the spurious pulses.
+        Pulse times without the spurious pulses.
     counts : array of int, (n,)
         Number of each pulse; it jumps where pulses were missed.
     spurious_s, missed_s, pauses_s : arrays
-        Times of the pulses taken out, and starts of the gaps that pulses were missed in or the machine stopped in.
+        Times of the removed pulses, and starts of the gaps with missed pulses or with a stop of the machine.
     open_gaps_s : array
-        Starts of gaps in which the number of missed pulses cannot be told.
+        Starts of gaps in which the number of missed pulses cannot be determined.
     """
 
     times_s: FloatArray
@@ -185,12 +185,12 @@ class PulseCount:
 
     @property
     def n_missed(self) -> int:
-        """Pulses that were missed."""
+        """Number of missed pulses."""
         return int(self.counts[-1]) + 1 - len(self.counts)
 
 
 def count_pulses(times_s: FloatArray) -> PulseCount:
-    """Number the pulses, leaving out spurious ones and skipping numbers where pulses were missed."""
+    """Number the pulses, omitting spurious ones and skipping numbers where pulses were missed."""
     t, spurious = _without_spurious(times_s)
     d = np.diff(t)
     steps = np.ones(len(d), dtype=np.int64)
@@ -213,11 +213,11 @@ def count_pulses(times_s: FloatArray) -> PulseCount:
 
 
 def local_trend(intervals: FloatArray) -> FloatArray:
-    """Expected length of each interval from its neighbours; infinite where they point to a standstill.
+    """Return the length of each interval predicted from its neighbours; infinite where they indicate a standstill.
 
-    At constant acceleration the squared speed grows linearly with angle, so q = 1/interval² is almost linear in the
+    At constant acceleration, the squared speed grows linearly with angle, so q = 1/interval² is almost linear in the
     pulse number, from a standing start to a stop. Each interval is predicted by symmetric means (q₋ᵢ + q₊ᵢ)/2, at
-    the ends by extrapolations 2q₁ - q₂; the median over them tolerates faulty neighbours.
+    the ends by extrapolations 2q₁ - q₂; the median of the predictions tolerates faulty neighbours.
     """
     n = len(intervals)
     q = 1.0 / np.square(intervals)
@@ -232,7 +232,7 @@ def local_trend(intervals: FloatArray) -> FloatArray:
                 predictions[2 + i, k] = 2 * q[k + i] - q[k + 2 * i]
             if n - 1 - k - 2 * i >= 0:
                 predictions[5 + i, n - 1 - k] = 2 * q[n - 1 - k - i] - q[n - 1 - k - 2 * i]
-    # With four intervals or fewer there may be no prediction: such an interval is taken as it is.
+    # With four intervals or fewer there may be no prediction: such an interval is used unchanged.
     predictions = np.where(np.isnan(predictions).all(axis=0), q, predictions)
     expected_q = np.nanmedian(predictions, axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -241,11 +241,10 @@ def local_trend(intervals: FloatArray) -> FloatArray:
 
 
 def _without_spurious(times_s: FloatArray) -> tuple[FloatArray, list[int]]:
-    """Return the times without spurious pulses, and the indices of those."""
+    """Return the times without spurious pulses, and the indices of the spurious ones."""
     remaining = np.arange(len(times_s))
     removed: list[int] = []
-    # Each round takes out one pulse of every separate group of short intervals; a train worse than that is refused
-    # later.
+    # Each round removes one pulse from each separate group of short intervals; a worse pulse train is refused later.
     for _ in range(20):
         t = times_s[remaining]
         if len(t) < 6:
@@ -262,7 +261,7 @@ def _without_spurious(times_s: FloatArray) -> tuple[FloatArray, list[int]]:
 
 
 def _shortest_of_each_group(ratio: FloatArray) -> list[int]:
-    """Indices of short intervals that are the shortest within three intervals each way."""
+    """Return the indices of short intervals that are the shortest within three intervals on either side."""
     chosen: list[int] = []
     blocked = np.zeros(len(ratio), dtype=bool)
     for k in np.argsort(ratio):
@@ -275,7 +274,7 @@ def _shortest_of_each_group(ratio: FloatArray) -> list[int]:
 
 
 def _spurious_end(t: FloatArray, trend: FloatArray, k: int) -> int | None:
-    """Which end of interval k to take out so that its neighbours fit the trend best; None if neither helps."""
+    """Return the end of interval k whose removal makes its neighbours fit the trend best; None if neither helps."""
     expected = trend[k]
     if not np.isfinite(expected):
         return None
@@ -292,9 +291,9 @@ def _spurious_end(t: FloatArray, trend: FloatArray, k: int) -> int | None:
 
 
 def _of_neighbours(d: FloatArray) -> FloatArray:
-    """Return the median of the three intervals on either side of each.
+    """Return the median of the three intervals on either side of each interval.
 
-    Where speed swings from one revolution to the next a trend at the ends of the train extrapolates the swing.
+    If the speed oscillates from one revolution to the next, a trend at the ends of the train extrapolates the swing.
     """
     if len(d) < 2:
         return d
@@ -305,24 +304,24 @@ def _of_neighbours(d: FloatArray) -> FloatArray:
 
 
 def _slows_down_around(d: FloatArray, k: int) -> bool:
-    """Whether speed falls towards interval k from the left and rises after it so that a standstill in it fits."""
+    """Whether the speed falls before interval k and rises after it, so that a standstill within it is plausible."""
     q = 1.0 / np.square(d)
     left = k < 2 or 2 * q[k - 1] - q[k - 2] < 0.7 * q[k - 1]
     right = k > len(d) - 3 or 2 * q[k + 1] - q[k + 2] < 0.7 * q[k + 1]
     return bool(left and right)
 
 
-# The clock that pulse times were taken with: find its tick, and fit the angle within its quantisation.
+# Clock of the pulse times: find its tick, and fit the angle within its quantisation.
 
 
 IntArray = NDArray[np.integer[Any]]
 
 
 def clock_tick(times_s: FloatArray) -> float:
-    """Find the step that all pulse times are multiples of (plus an offset), 0 if there is none.
+    """Find the step of which all pulse times are multiples (plus an offset); 0 if there is none.
 
-    The smallest difference between two intervals is a first guess of the tick; it is then sharpened over longer and
-    longer spans, and accepted if the times lie on its grid within a tenth (a uniform scatter would give 0.29).
+    The smallest difference between two intervals is the first guess of the tick; it is then refined over longer and
+    longer spans, and accepted if the times lie on its grid within a tenth rms (uniform scatter would give 0.29).
 
     Parameters
     ----------
@@ -332,7 +331,7 @@ def clock_tick(times_s: FloatArray) -> float:
     Returns
     -------
     float
-        In seconds. A tick below a millionth of the shortest interval does no harm and is not looked for.
+        In seconds. A tick below a millionth of the shortest interval is harmless and not searched for.
     """
     if len(times_s) < 16:
         return 0.0
@@ -356,10 +355,10 @@ def clock_tick(times_s: FloatArray) -> float:
 def fit_within_ticks(t: FloatArray, counts: FloatArray, tick_s: float, breaks: IntArray | None = None) -> FloatArray:
     """Smooth angles (in pulses) at times that are quantised to a tick.
 
-    Minimise Σ wₖ(yₖ - kₖ)² + Σ λⱼ (Δ³y)ⱼ² where Δ³ is the third divided difference scaled by the local interval. Start
-    with a large λ; wherever a pulse's residual, divided by the local speed, exceeds half a tick, λ is eased around it,
-    until all residuals lie within. Constant acceleration passes unchanged. A single pulse that lies off its neighbours'
-    profile gets weight wₖ = 0.
+    Minimises Σ wₖ(yₖ - kₖ)² + Σ λⱼ (Δ³y)ⱼ², where Δ³ is the third divided difference scaled by the local interval. λ
+    starts large; wherever a pulse's residual, divided by the local speed, exceeds half a tick, λ is reduced around it,
+    until all residuals lie within half a tick. Constant acceleration passes unchanged. A single pulse that deviates
+    from its neighbours' profile gets weight wₖ = 0.
 
     Parameters
     ----------
@@ -370,7 +369,7 @@ def fit_within_ticks(t: FloatArray, counts: FloatArray, tick_s: float, breaks: I
     tick_s : float
         Above zero.
     breaks : array, optional
-        Indices of intervals that nothing is smoothed across (standstill).
+        Indices of intervals (standstills) across which nothing is smoothed.
 
     Returns
     -------
@@ -381,14 +380,14 @@ def fit_within_ticks(t: FloatArray, counts: FloatArray, tick_s: float, breaks: I
     -----
     Source: the penalised fit with third differences is P. H. C. Eilers, *A perfect smoother*, Anal. Chem. 75 (2003);
     choosing the penalty by the known error is C. H. Reinsch, *Smoothing by spline functions*, Numer. Math. 10 (1967).
-    Easing it locally is an addition.
+    Reducing it locally is an addition.
     """
     n = len(t)
     counts = counts.astype(np.float64)
     if n < 6:
         return counts
     rows = _third_differences(t)
-    # The smoothest fit averages over 60 pulses; slower changes of speed pass whatever the clock.
+    # The smoothest fit averages over 60 pulses; slower changes of speed pass with any clock.
     penalty = np.full(n - 3, (60.0 / (2 * np.pi)) ** 6)
     for k in () if breaks is None else breaks:
         penalty[max(0, int(k) - 2) : int(k) + 1] = 0.0
@@ -396,9 +395,9 @@ def fit_within_ticks(t: FloatArray, counts: FloatArray, tick_s: float, breaks: I
     weights = np.ones(n)
     weights[late_pulses(t, counts, tick_s)] = 0.0
     fitted = counts
-    for _ in range(30):  # each round eases by 4, so that the last ones interpolate
+    for _ in range(30):  # each round reduces λ by 4, so that the last ones interpolate
         fitted = counts + _penalised(rows, penalty, weights, -_apply(rows, counts))
-        # A hundredth of a tick of slack: the times themselves are rounded numbers.
+        # A hundredth of a tick of tolerance, as the times themselves are rounded.
         off = weights * np.abs(fitted - counts) > 0.51 * tick_s * speed
         if not off.any():
             return fitted
@@ -409,10 +408,10 @@ def fit_within_ticks(t: FloatArray, counts: FloatArray, tick_s: float, breaks: I
 
 
 def late_pulses(t: FloatArray, counts: FloatArray, tick_s: float) -> IntArray:
-    """Indices of single pulses that come early or late by more than quantisation explains, seen from two on each side.
+    """Return indices of single pulses that are earlier or later than quantisation explains, given two on each side.
 
-    The cubic through the neighbours carries at most 1.33 ticks of quantisation; a real change of speed shows at the
-    neighbours too.
+    The cubic through the neighbours contains at most 1.33 ticks of quantisation; a real change of speed affects the
+    neighbours, too.
     """
     n = len(t)
     neighbours = np.array([-2, -1, 1, 2])
@@ -424,7 +423,7 @@ def late_pulses(t: FloatArray, counts: FloatArray, tick_s: float) -> IntArray:
     slope = (values[:, 2] - values[:, 1]) / (nodes[:, 2] - nodes[:, 1])
     off = np.zeros(n)
     off[2 : n - 2] = np.abs(counts[at] - (lagrange * values).sum(axis=1)) / slope
-    # A lone late pulse disturbs the prediction of its neighbours by 4/6 at most, one two places away by 1/6.
+    # A single late pulse disturbs the prediction of its neighbours by at most 4/6, two places away by 1/6.
     largest = np.maximum.reduce([np.roll(off, k) for k in (-2, -1, 1, 2)])
     beyond = np.maximum.reduce([np.roll(off, k) for k in (-5, -4, -3, 3, 4, 5)])
     late: IntArray = np.flatnonzero((off > 1.6 * tick_s) & (off > 1.1 * largest) & (beyond < 0.6 * off))
@@ -432,7 +431,7 @@ def late_pulses(t: FloatArray, counts: FloatArray, tick_s: float) -> IntArray:
 
 
 def _third_differences(t: FloatArray) -> FloatArray:
-    """Rows (n - 3, 4) of third divided differences times 6 × the mean interval cubed: [-1 3 -3 1] at equal steps."""
+    """Return third divided differences times 6 × the mean interval cubed, (n - 3, 4): [-1 3 -3 1] at equal steps."""
     nodes = np.stack([t[:-3], t[1:-2], t[2:-1], t[3:]], axis=1)
     gaps = nodes[:, :, None] - nodes[:, None, :] + np.eye(4)
     scale = 6.0 * ((nodes[:, 3] - nodes[:, 0]) / 3.0) ** 3
@@ -447,7 +446,7 @@ def _apply(rows: FloatArray, y: FloatArray) -> FloatArray:
 
 
 def _penalised(rows: FloatArray, penalty: FloatArray, weights: FloatArray, target: FloatArray) -> FloatArray:
-    """Solve (W + DᵀΛD) z = DᵀΛ·target for the correction z; small numbers, so that no digits of the angle are lost."""
+    """Solve (W + DᵀΛD) z = DᵀΛ·target for the correction z, which is small, so that no digits of the angle are lost."""
     from scipy.linalg import solveh_banded
 
     n = len(penalty) + 3
@@ -468,10 +467,10 @@ def _penalised(rows: FloatArray, penalty: FloatArray, weights: FloatArray, targe
 def pulse_train_angle(
     times_s: FloatArray, pulses_per_revolution: int = 1, *, tick_s: float | None = None
 ) -> ShaftAngle:
-    """Turn pulse times into shaft angle.
+    """Convert pulse times to shaft angle.
 
     Pulse k lies at k / pulses_per_revolution revolutions. Spurious pulses are left out and missed ones counted; the
-    notes say how many and where. Times on a clock's grid are smoothed within half a tick, others are taken as exact.
+    notes state how many and where. Times on a clock's grid are smoothed within half a tick; others are taken as exact.
 
     Parameters
     ----------
@@ -484,20 +483,20 @@ def pulse_train_angle(
     Returns
     -------
     ShaftAngle
-        Knots at the pulses; speed exact at constant acceleration. The uncertainty is the timing error of two pulses
-        (tick/√12 each, or the scatter of the intervals) over the duration, and at least the 5e-5 of a clock.
+        Knots at the pulses; the speed is exact at constant acceleration. The uncertainty is the timing error of two
+        pulses (tick/√12 each, or the scatter of the intervals) over the duration, and at least a clock's 5e-5.
 
     Raises
     ------
     InputError
-        No pulses, one pulse, or times that do not increase.
+        If there are fewer than two pulses, or the times do not increase.
     RefusalError
-        If more than a tenth of the pulses are spurious or missed, or a gap leaves their number open.
+        If more than a tenth of the pulses are spurious or missed, or their number in a gap cannot be determined.
 
     Notes
     -----
-    Pulses are taken as equally spaced around the shaft. A machine that stops between two pulses is kept: the angle
-    stands still within that interval.
+    Pulses are assumed to be equally spaced around the shaft. A stop between two pulses is accepted: the angle stays
+    constant within that interval.
     """
     t = frozen_array(times_s, "tachometer pulse times", ndim=1).astype(np.float64)
     n_per_rev = count(pulses_per_revolution, "pulses_per_revolution")
@@ -545,12 +544,12 @@ def _check_faults(train: PulseCount, n_pulses: int) -> None:
     remedy = "check threshold, hysteresis and pulses_per_revolution, or estimate the speed from the vibration"
     if len(train.open_gaps_s):
         raise RefusalError(
-            f"after {train.open_gaps_s[0]:.4g} s pulses are missing and their number cannot be told from the "
+            f"after {train.open_gaps_s[0]:.4g} s pulses are missing, and their number cannot be determined from the "
             f"neighbouring speed ({counted(len(train.open_gaps_s), 'such gap')})",
-            remedy="analyse the parts before and after by themselves; " + remedy,
+            remedy="analyse the parts before and after separately; " + remedy,
         )
     n_faulty = len(train.spurious_s) + train.n_missed
-    # A tenth of the pulses: a 36-1 or 60-2 tooth wheel stays below, and so does an occasional glitch.
+    # A tenth of the pulses: a 36-1 or 60-2 tooth wheel stays below it, and so do occasional glitches.
     if n_faulty > 0.1 * n_pulses + 1:
         raise RefusalError(
             f"{len(train.spurious_s)} spurious and {train.n_missed} missed pulses among {n_pulses} are too many "
@@ -560,9 +559,9 @@ def _check_faults(train: PulseCount, n_pulses: int) -> None:
 
 
 def _uncertainty(t: FloatArray, tick_s: float) -> float:
-    """Error of first and last pulse over the duration; without a tick, from the times' third differences.
+    """Return the error of first and last pulse over the duration; without a tick, from third differences of the times.
 
-    It is never below the error of the clock's own rate, which no pulse can tell: crystals are right to some 50 ppm.
+    It is at least the error of the clock's rate, which no pulse can reveal: crystals are accurate to about 50 ppm.
     """
     if tick_s > 0:
         timing_s = tick_s / np.sqrt(12.0)
@@ -579,9 +578,9 @@ def _notes(train: PulseCount, n_pulses: int, tick_s: float, late_s: FloatArray) 
     places = (
         (f"{len(train.spurious_s)} of {n_pulses} pulses were spurious and left out", train.spurious_s),
         (f"{counted(train.n_missed, 'missed pulse')} counted in", train.missed_s),
-        (f"the machine stands still or nearly so within {counted(len(train.pauses_s), 'interval')}", train.pauses_s),
+        (f"the machine stops or nearly stops within {counted(len(train.pauses_s), 'interval')}", train.pauses_s),
         (clock, np.empty(int(tick_s > 0))),
-        (f"{counted(len(late_s), 'single pulse')} more than that off the neighbours, bridged", late_s),
+        (f"{counted(len(late_s), 'single pulse')} further than that from the neighbours, bridged", late_s),
     )
     return tuple(text if text == clock else f"{text}: {_at(times)}" for text, times in places if len(times))
 

@@ -1,4 +1,4 @@
-"""From equal steps of time to equal steps of shaft angle, with anti-aliasing that follows the speed."""
+"""Resampling from equal steps of time to equal steps of shaft angle, with anti-aliasing that follows the speed."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import counted
 from gearsig.recording import Recording, check_recording
 
-# Bandlimited interpolation at arbitrary times, and with a lower cut-off where the result is sampled more coarsely.
+# Band-limited interpolation at arbitrary times.
 
 
 PASSBAND = 0.4
-"""Upper edge over the lower of both sampling rates; up to it the error stays below 5e-6 of full scale."""
+"""Upper edge relative to the lower of both sampling rates, up to which the error stays below 5e-6 of full scale."""
 
 HALF_BAND = 20  # taps on each side of the doubling filter
 _NEAR = 6  # taps on each side of the fractional delay, at the doubled rate
 
 REACH = HALF_BAND + _NEAR // 2 + 1
-"""Samples on each side of a point that take part in its value."""
+"""Number of samples on each side of a point that contribute to its value."""
 
 _N_PHASES = 512
 _BLOCK = 512
@@ -38,7 +38,7 @@ _KAISER_BETA = 0.1102 * (116.0 - 8.7)
 
 @lru_cache(maxsize=1)
 def doubling_filter() -> FloatArray:
-    """Return one side of the half-band filter that finds the value half way between samples, (HALF_BAND,).
+    """Return one side of the half-band filter that interpolates halfway between samples, (HALF_BAND,).
 
     h(j) = sinc(j + 1/2) · I₀(β√(1 - ((j + 1/2)/H)²)) / I₀(β), scaled to sum one half.
 
@@ -53,10 +53,10 @@ def doubling_filter() -> FloatArray:
 def delay_table() -> FloatArray:
     """Return fractional-delay taps for each sub-sample position at the doubled rate, (n_phases, 4·_NEAR).
 
-    A row holds the taps of a position, then their differences to those of the next position.
+    A row holds the taps of a position, followed by the differences to those of the next position.
 
     Least squares over the band |f| < a/2 with a = 0.42 (in cycles per doubled sample, i.e. 0.42 of the original rate):
-    Σₘ sinc(a(k - m)) hₘ = sinc(a(k - d)) for delay d. Rows sum to one, so that a constant stays that constant.
+    Σₘ sinc(a(k - m)) hₘ = sinc(a(k - d)) for delay d. Rows sum to one, so that constants are preserved.
 
     Source: T. I. Laakso, V. Välimäki, M. Karjalainen, U. K. Laine, *Splitting the unit delay*, IEEE Signal
     Processing Magazine 13 (1996), general least-squares design.
@@ -72,7 +72,7 @@ def delay_table() -> FloatArray:
 
 
 def kaiser_sinc(x: FloatArray, half_width: float) -> FloatArray:
-    """Return sinc(x) under a Kaiser window that ends at `half_width`; for x >= 0."""
+    """Return sinc(x) times a Kaiser window that ends at `half_width`, for x >= 0."""
     inside = np.clip(1.0 - np.square(x / half_width), 0.0, None)
     h = np.sinc(x) * np.i0(_KAISER_BETA * np.sqrt(inside)) / np.i0(_KAISER_BETA)
     return np.where(x < half_width, h, 0.0)
@@ -80,10 +80,10 @@ def kaiser_sinc(x: FloatArray, half_width: float) -> FloatArray:
 
 @njit(cache=True, nogil=True, fastmath=True)  # type: ignore[untyped-decorator,unused-ignore]
 def interpolate(x, positions, side, table, out):  # type: ignore[no-untyped-def]
-    """out[i] = value of x at positions[i] (in samples): the segment needed is doubled, then delayed by a fraction.
+    """out[i] = value of x at positions[i] (in samples): the rate is doubled, then a fractional delay is applied.
 
-    Positions are sorted and lie REACH samples or more inside x. Doubling first costs little, as it runs along the
-    samples, and lets twelve taps do what would take forty.
+    Positions are sorted and lie at least REACH samples inside x. Doubling first costs little, as it runs along the
+    samples, and reduces the taps needed from forty to twelve.
     """
     first = int(positions[0]) - 3
     doubled = _doubled(x, first, int(positions[-1]) - first + 5, side)
@@ -92,9 +92,9 @@ def interpolate(x, positions, side, table, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, fastmath=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _doubled(x, first, n, side):  # type: ignore[no-untyped-def]
-    """Samples first to first + n of x, each followed by the value half way to the next.
+    """Return samples first to first + n of x, each followed by the value halfway to the next, (2n,).
 
-    In blocks that stay in the processor's nearest cache while the taps run over them.
+    It works in blocks that stay in the L1 cache while the taps run over them.
     """
     doubled = np.empty(2 * n)
     middle = np.empty(_BLOCK)
@@ -116,9 +116,9 @@ def _doubled(x, first, n, side):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, fastmath=True)  # type: ignore[untyped-decorator,unused-ignore]
 def delay(y, first, per_sample, positions, table, out):  # type: ignore[no-untyped-def]
-    """Read y, whose value m lies at first + m / per_sample samples, at any positions by fractional delays."""
-    # The number of taps is read from the table: with a constant here, the compiler unrolls the loop into single
-    # multiplications and uses no vector instructions.
+    """Read y, whose value m lies at first + m / per_sample samples, at arbitrary positions by fractional delays."""
+    # The number of taps is read from the table: with a constant, the compiler would unroll the loop into single
+    # multiplications and use no vector instructions.
     n_phases, n_taps = table.shape[0], table.shape[1] // 2
     for i in range(positions.shape[0]):
         place = per_sample * (positions[i] - first)
@@ -126,7 +126,7 @@ def delay(y, first, per_sample, positions, table, out):  # type: ignore[no-untyp
         phase = (place - k) * n_phases
         p = int(phase)
         between = phase - p
-        # Slices, as an index that might be negative keeps the compiler from using vector instructions.
+        # Slices, since an index that might be negative keeps the compiler from using vector instructions.
         segment = y[k - 5 : k - 5 + n_taps]
         taps, rise = table[p, :n_taps], table[p, n_taps:]
         total = 0.0
@@ -135,13 +135,13 @@ def delay(y, first, per_sample, positions, table, out):  # type: ignore[no-untyp
         out[i] = total
 
 
-# Interpolation with a lower cut-off, where angles are sampled more coarsely than the recording was.
+# Interpolation with a lower cut-off, for angle grids coarser than the recording's samples.
 
 
 LOWEST_SCALE = 1.0 / 1024.0
-"""Lowest cut-off over the recording's Nyquist frequency: a standing shaft would ask for an endless filter."""
+"""Lowest cut-off relative to the recording's Nyquist frequency: a shaft at rest would need an infinite filter."""
 
-# Steps of the kernel's table between zero crossings: linear interpolation is then good to 1e-7.
+# Steps of the kernel's table between zero crossings: linear interpolation is then accurate to 1e-7.
 _N_STEPS = 2048
 # The cut-off follows the speed in steps of 1 %; its filter leaves 0.4 to 0.6 of the sampling rate for the transition.
 _STEP = 1.01
@@ -149,18 +149,18 @@ _STEP = 1.01
 
 @lru_cache(maxsize=1)
 def kernel_side() -> FloatArray:
-    """Return one side of the kernel, `_N_STEPS` per zero crossing, with zeros behind its end."""
+    """Return one side of the kernel, `_N_STEPS` per zero crossing, with zeros after its end."""
     return kaiser_sinc(np.arange(HALF_BAND * _N_STEPS + 2) / _N_STEPS, HALF_BAND)
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def interpolate_coarse(x, positions, scale, side, table, out):  # type: ignore[no-untyped-def]
-    """out[i] = x at positions[i] (in samples, sorted) after a low-pass that cuts off at scale[i] · Nyquist, scale <= 1.
+    """out[i] = x at positions[i] (in samples, sorted) after a low-pass with cut-off scale[i] · Nyquist, scale <= 1.
 
     The signal is low-passed on a grid of at least four points per cycle of the cut-off, then read by fractional delays.
 
     Source: R. E. Crochiere, L. R. Rabiner, *Interpolation and decimation of digital signals*, Proc. IEEE 69 (1981), on
-    doing such a change of rate in stages.
+    changing the rate in stages.
     """
     n = positions.shape[0]
     i = 0
@@ -173,7 +173,7 @@ def interpolate_coarse(x, positions, scale, side, table, out):  # type: ignore[n
                 break
             stop += 1
         s = min(1.0, 0.5 * (lowest + highest) if stop > i + 1 else scale[i])
-        # Whole steps of the grid in samples; half a sample only near the full bandwidth.
+        # The grid's step is a whole number of samples, or half a sample near the full bandwidth.
         step = 0.5 if s > 0.5 else np.floor(0.5 / s)
         first = np.floor(positions[i]) - np.ceil(6 * step)
         n_grid = int((positions[stop - 1] - first) / step) + 8
@@ -185,7 +185,7 @@ def interpolate_coarse(x, positions, scale, side, table, out):  # type: ignore[n
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _lowpassed(x, first, step, n, s, side):  # type: ignore[no-untyped-def]
-    """Low-passed x at first + m·step, m < n."""
+    """Return low-passed x at first + m·step for m < n."""
     reach = int(np.ceil(HALF_BAND / s)) + 1
     y = np.empty(n)
     whole = _taps(reach, 0.0, s, side)
@@ -211,7 +211,7 @@ def _lowpassed(x, first, step, n, s, side):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, fastmath=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _along(x, start, n, taps):  # type: ignore[no-untyped-def]
-    """Σⱼ x[start + i + j] taps[j] for each i < n: tap by tap, which suits vector instructions."""
+    """Return Σⱼ x[start + i + j] taps[j] for each i < n, tap by tap, which suits vector instructions."""
     y = np.zeros(n)
     for block in range(0, n, 2048):
         out = y[block : min(n, block + 2048)]
@@ -232,7 +232,7 @@ def _along(x, start, n, taps):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _taps(reach, shift, s, side):  # type: ignore[no-untyped-def]
-    """Kernel at s·(j - shift), j = -reach …, summing to one; zeros at the end make their number a multiple of four."""
+    """Return the kernel at s·(j - shift), j = -reach …, with unit sum, zero-padded to a multiple of four taps."""
     taps = np.empty(4 * ((2 * reach + 4) // 4))
     for j in range(taps.shape[0]):
         place = min(abs(j - reach - shift) * s * _N_STEPS, side.shape[0] - 2.0)
@@ -243,7 +243,7 @@ def _taps(reach, shift, s, side):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, fastmath=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _dot(x, start, taps):  # type: ignore[no-untyped-def]
-    """Σⱼ x[start + j] taps[j]; where the taps reach beyond x, the rest of them counts for all."""
+    """Return Σⱼ x[start + j] taps[j]; if the taps extend beyond x, the remaining ones are renormalised."""
     low, high = max(0, -start), min(taps.shape[0], x.shape[0] - start)
     segment = x[start + low : start + high]
     part = taps[low:high]
@@ -259,21 +259,21 @@ def _dot(x, start, taps):  # type: ignore[no-untyped-def]
 # Times at which a shaft passes given angles: the inverse of a piecewise cubic, solved exactly.
 
 
-# Points per block that start from one cubic guess; short enough for the guess to be good, long enough to pay.
+# Points per block that share one cubic guess; short enough for a good guess, long enough to be worthwhile.
 _INVERSION_BLOCK = 32
 
-# Slope of the inverse, over an interval's length, beyond which the shaft all but stands: no cubic guess follows that.
+# Slope of the inverse, relative to the interval, beyond which the shaft is nearly at rest and a cubic guess fails.
 _STEEPEST = 1e3
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def times_at(knots, angle, speed, k, first, step, out):  # type: ignore[no-untyped-def]
-    """Solve θ(t) = first + i·step for each i, θ the Hermite cubic through knots, values `angle` and slopes `speed`.
+    """Solve θ(t) = first + i·step for each i, with θ the Hermite cubic of values `angle` and slopes `speed` at `knots`.
 
     The search starts at interval k, which must not lie beyond the first angle; all angles lie within the knots' range.
-    In u = (t - t₀)/h of an interval, θ - θ₀ = ((c u + b) u + a) u. The ends of each block are solved one by one, the
-    points between by two Newton steps from the cubic through the ends of the inverse function; these steps do not wait
-    for each other.
+    With u = (t - t₀)/h in an interval, θ - θ₀ = ((c u + b) u + a) u. The ends of each block are solved one by one; the
+    points between them follow from a cubic guess of the inverse function and two Newton steps, independent of each
+    other.
     """
     n, n_knots = out.shape[0], knots.shape[0]
     i = 0
@@ -304,7 +304,7 @@ def times_at(knots, angle, speed, k, first, step, out):  # type: ignore[no-untyp
 
 @njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "arcp"})  # type: ignore[untyped-decorator,unused-ignore]
 def _between(a, b, c, low, high, offset, step, start, last, t0, h, out):  # type: ignore[no-untyped-def]
-    """Fill out[start:last] between solved points `low` (at start - 1) and `high` (at last); say if Newton settled."""
+    """Fill out[start:last] between solved points `low` (at start - 1) and `high` (at last); return if it converged."""
     slope_low, slope_high = (3.0 * c * low + 2.0 * b) * low + a, (3.0 * c * high + 2.0 * b) * high + a
     if slope_low <= 0.0 or slope_high <= 0.0:
         return False
@@ -325,13 +325,13 @@ def _between(a, b, c, low, high, offset, step, start, last, t0, h, out):  # type
         change = (((c * u + b) * u + a) * u - target) * per_slope
         worst = max(worst, abs(change))
         out[j] = t0 + (u - change) * h
-    # Newton's error squares itself: after a step of 1e-8 the next one would be below rounding.
+    # Newton's method converges quadratically: after a step of 1e-8 the next one would be below rounding.
     return worst < 1e-8
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def solve_cubic(a, b, c, rise, target, start):  # type: ignore[no-untyped-def]
-    """Return u in 0 to 1 with ((c u + b) u + a) u = target, for a cubic rising to `rise`; Newton in a bracket."""
+    """Return u in 0 to 1 with ((c u + b) u + a) u = target for a cubic that rises to `rise`, by bracketed Newton."""
     if target <= 0.0 or rise <= 0.0:
         return 0.0
     if target >= rise:
@@ -346,7 +346,7 @@ def solve_cubic(a, b, c, rise, target, start):  # type: ignore[no-untyped-def]
         else:
             low = u
         following = u - error / slope if slope > 0.0 else -1.0
-        # Where the speed touches zero, Newton may leave the bracket; halving does not.
+        # Where the speed touches zero, Newton may leave the bracket; bisection does not.
         if not low <= following <= high:
             following = 0.5 * (low + high)
         change = abs(following - u)
@@ -357,7 +357,7 @@ def solve_cubic(a, b, c, rise, target, start):  # type: ignore[no-untyped-def]
 
 
 def times_of_revolutions(angle: ShaftAngle, first: float, step: float, n: int) -> FloatArray:
-    """Return the n times at which the shaft passes `first`, `first` + `step`, …; the angle holds all of them."""
+    """Return the times in s, (n,), at which the shaft passes `first`, `first` + `step`, …, all within the angle."""
     knots, revolutions, speeds = _knots(angle)
     out = np.empty(n)
     interval = int(np.searchsorted(revolutions, first, side="right")) - 1
@@ -366,15 +366,15 @@ def times_of_revolutions(angle: ShaftAngle, first: float, step: float, n: int) -
 
 
 def _knots(angle: ShaftAngle) -> tuple[FloatArray, ...]:
-    """Times, revolutions and speeds of an angle as the one kind of array that the kernels are compiled for."""
+    """Return times, revolutions and speeds of an angle as arrays of the type that the kernels are compiled for."""
     arrays = angle.time_s, angle.revolutions, angle.speed_rev_per_s
     return tuple(read_only(np.ascontiguousarray(a, np.float64)) for a in arrays)
 
 
 _CHUNK = 1 << 15  # angles at a time: positions and a segment of the signal stay in the cache
-_MAX_VALUES = 1 << 28  # 2 GB of results; beyond it a typing error is likelier than a wish
-CHUNKS_FOR_THREADS = 8  # fewer take less time than threads do to begin
-_SLOW_SHARE = 0.05  # revolutions that may lose bandwidth to the default number of samples per revolution
+_MAX_VALUES = 1 << 28  # 2 GB of results; more is more likely a mistyped parameter than intended
+CHUNKS_FOR_THREADS = 8  # fewer take less time than starting threads
+_SLOW_SHARE = 0.05  # share of revolutions that may lose bandwidth with the default samples per revolution
 
 
 def resample_to_angle(
@@ -385,45 +385,44 @@ def resample_to_angle(
     samples_per_revolution: int | None = None,
     highest_order: float | None = None,
 ) -> AngleSignal:
-    """Sample channels at equal steps of a shaft's angle.
+    """Resample channels to equal steps of a shaft's angle.
 
-    The times of the equal angles come from the angle's cubic, inverted exactly; values between samples from a
-    pair of filters that doubles the rate and then delays by a fraction, y(t) = Σ x[k] h(t·fs - k). Where the angle
-    grid is coarser than the time grid, the sinc is stretched
-    to cut off at half the angle grid's momentary sampling rate.
+    The times of equal angles are found by exact inversion of the angle's cubic; values between samples come from two
+    filters, which double the rate and then delay by a fraction, y(t) = Σ x[k] h(t·fs - k). Where the angle grid is
+    coarser than the time grid, the sinc is stretched to cut off at half the angle grid's instantaneous sampling rate.
 
     Parameters
     ----------
     recording : Recording
     shaft_angle : ShaftAngle
-        On the recording's time axis; what lies outside of it is left out.
+        On the recording's time axis; samples outside it are left out.
     channels : sequence of str, optional
         Default: the vibration channels.
     samples_per_revolution : int, optional
-        Default: enough to keep the whole bandwidth on 95 % of the revolutions (sampling rate over the speed that 5 % of
-        them fall below, at most four times as many samples as before), or enough for `highest_order`; rounded up to
-        a good FFT length.
+        Default: enough for `highest_order` or, without one, to keep the whole bandwidth on 95 % of the revolutions
+        (sampling rate over the speed that 5 % of them fall below, with at most four times the original number of
+        samples); rounded up to a good FFT length.
     highest_order : float, optional
         Highest order needed.
 
     Returns
     -------
     AngleSignal
-        Same unit as the channels. Sample i lies at start_revolution + i / samples_per_revolution; the start is a whole
-        step, so that revolution 0 of the shaft angle falls on the grid. The first and last 24 samples of the recording
-        (more where the grid is coarse) have no complete kernel and are left out. Error below 5e-6 of full scale up to
-        0.4 of the lower of both sampling rates.
+        In the units of the channels. Sample i lies at start_revolution + i / samples_per_revolution; the start is a
+        whole step, so that revolution 0 of the shaft angle falls on the grid. The first and last 24 samples of the
+        recording (more if the grid is coarse) have no complete kernel and are left out. The error is below 5e-6 of full
+        scale up to 0.4 of the lower of both sampling rates.
 
     Raises
     ------
     InputError
-        On a channel that is not there, or a grid that is too coarse for `highest_order` or too large.
+        On an unknown channel, or a grid that is too coarse for `highest_order` or too large.
     RefusalError
         If the angle covers no part of the recording, or less than one revolution of it.
 
     Notes
     -----
-    Not for statistics of amplitudes at a standstill: a standing shaft has no samples here.
+    Not for amplitude statistics at standstill: a shaft at rest yields no samples.
     """
     check_recording(recording)
     check_shaft_angle(shaft_angle)
@@ -457,7 +456,7 @@ def resample_to_angle(
 
 
 def _covered_times(recording: Recording, angle: ShaftAngle, n_per_rev: int | None = None) -> tuple[float, float]:
-    """Times between which angle and complete kernels exist; kernels are longer where the grid of angles is coarse."""
+    """Return the times between which angle and complete kernels exist; a coarse angle grid needs longer kernels."""
     rate, last_s = recording.sampling_rate_hz, (recording.n_samples - 1) / recording.sampling_rate_hz
     begin, end = max(angle.start_s, REACH / rate), min(angle.end_s, last_s - REACH / rate)
     if n_per_rev is not None and end > begin:
@@ -469,13 +468,13 @@ def _covered_times(recording: Recording, angle: ShaftAngle, n_per_rev: int | Non
     if end <= begin and min(angle.end_s, last_s) > max(angle.start_s, 0.0):
         raise RefusalError(
             f"the signal is too short: {counted(recording.n_samples, 'sample')}, {recording.duration_s:.4g} s, and a "
-            f"value between samples takes {REACH} of them to either side, more where the shaft turns slowly",
+            f"value between samples needs {REACH} of them on either side, more where the shaft turns slowly",
             remedy="record longer",
         )
     if end <= begin:
         raise RefusalError(
-            f"the shaft angle is known from {angle.start_s:.4g} to {angle.end_s:.4g} s, the recording lasts from 0 to "
-            f"{recording.duration_s:.4g} s: there is nothing to resample",
+            f"the shaft angle is known from {angle.start_s:.4g} to {angle.end_s:.4g} s, but the recording lasts from 0 "
+            f"to {recording.duration_s:.4g} s: there is nothing to resample",
             remedy="check that both use the same time axis",
         )
     return float(begin), float(end)
@@ -492,7 +491,7 @@ def _covered_revolutions(recording: Recording, angle: ShaftAngle, n_per_rev: int
 
 
 def _covered_speeds(recording: Recording, angle: ShaftAngle) -> FloatArray:
-    """Speeds in rev/s at 1024 equal steps of angle through the covered part, lowest first."""
+    """Return the speeds in rev/s at 1024 equal steps of angle over the covered part, sorted ascending."""
     begin, end = _covered_times(recording, angle)
     t = np.linspace(begin, end, 4096)
     revolutions = angle.revolutions_at(t)
@@ -502,7 +501,7 @@ def _covered_speeds(recording: Recording, angle: ShaftAngle) -> FloatArray:
 
 
 def _grid(recording: Recording, covered: FloatArray, requested: int | None, highest_order: float | None) -> int:
-    """Samples per revolution: as requested, as the highest order needs, or enough for the bandwidth mostly."""
+    """Return the samples per revolution: as requested, as `highest_order` requires, or for most of the bandwidth."""
     from scipy.fft import next_fast_len
 
     if highest_order is not None:
@@ -518,7 +517,7 @@ def _grid(recording: Recording, covered: FloatArray, requested: int | None, high
         return requested
     if highest_order is not None:
         return int(next_fast_len(math.ceil(highest_order / PASSBAND), real=True))
-    # No more than four times the samples there are at the mean speed: a nearly standing shaft asks for endless ones.
+    # At most four times the original samples at the mean speed: a shaft nearly at rest would need infinitely many.
     typical = max(float(covered[int(_SLOW_SHARE * len(covered))]), float(covered.mean()) / 4.0)
     return max(2, int(next_fast_len(math.ceil(recording.sampling_rate_hz / typical - 1e-9), real=True)))
 
@@ -539,7 +538,7 @@ def _fill(
         knot = min(max(0, int(np.searchsorted(revolutions, begin)) - 1), len(knots) - 2)
         times_at(knots, revolutions, speeds, knot, begin, 1.0 / n_per_rev, times)
         around = slice(knot, min(len(knots), int(np.searchsorted(knots, times[-1])) + 1))
-        # The speed is linear between knots here: if none of them is slow, no time between them is.
+        # The speed is interpolated linearly between knots: if no knot is slow, no time between them is.
         coarse = float(speeds[around].min()) * n_per_rev / rate < 1.0 - 1e-6
         if coarse:
             scale = np.clip(n_per_rev / rate * np.interp(times, knots[around], speeds[around]), LOWEST_SCALE, 1.0)
@@ -562,7 +561,7 @@ def _fill(
 
 
 def _with_notes(angle: ShaftAngle, recording: Recording, covered: FloatArray, n_per_rev: int) -> ShaftAngle:
-    """Add to the angle's notes where the grid is coarser than the samples, or the shaft nearly stands still."""
+    """Add notes to the angle if the grid is coarser than the samples or the shaft is nearly at rest."""
     scale = covered * n_per_rev / recording.sampling_rate_hz
     notes = list(angle.notes)
     if scale[0] < 0.99:
@@ -572,5 +571,5 @@ def _with_notes(angle: ShaftAngle, recording: Recording, covered: FloatArray, n_
             f"{PASSBAND * n_per_rev:.4g} times the speed are filtered out"
         )
     if scale[0] < LOWEST_SCALE:
-        notes.append("while the shaft nearly stands still, the anti-aliasing filter stops short of its speed")
+        notes.append("while the shaft is nearly at rest, the anti-aliasing filter does not follow its speed that low")
     return replace(angle, notes=tuple(notes))

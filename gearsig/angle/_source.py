@@ -1,4 +1,4 @@
-"""The angle of a recording's reference shaft, from whatever speed source there is."""
+"""The angle of a recording's reference shaft, from any available speed source."""
 
 from __future__ import annotations
 
@@ -32,26 +32,26 @@ from gearsig.rig import (
 def find_shaft_angle(recording: Recording, rig: Rig | None = None) -> ShaftAngle:
     """Return the angle of the reference shaft.
 
-    From the recording's speed source, else the rig's, else from the vibration itself, or of a machine without gears by
-    its nominal speed. A source on another shaft is converted by the teeth between them.
+    It comes from the recording's speed source, else from the rig's, else from the vibration itself or, for a machine
+    without gears, from its nominal speed. A source on another shaft is converted by the teeth between the two.
 
     Parameters
     ----------
     recording : Recording
     rig : Rig, optional
-        Default: the recording's own.
+        Default: the recording's rig.
 
     Returns
     -------
     ShaftAngle
-        Pulses may begin before and end after the recording, or cover a part of it only.
+        Pulses may begin before and end after the recording, or cover only part of it.
 
     Raises
     ------
     InputError
-        If the source is malformed, or names a channel or shaft that is not there.
+        If the source is malformed, or names a channel or shaft that does not exist.
     RefusalError
-        If the machine is at rest or the source does not tell the speed.
+        If the machine is at rest or the source does not determine the speed.
     """
     check_recording(recording)
     check_rig(rig)
@@ -68,7 +68,7 @@ def find_shaft_angle(recording: Recording, rig: Rig | None = None) -> ShaftAngle
         point = rig.operating_point if rig is not None else OperatingPoint()
         off = f"; the nominal speed may be {point.speed_tolerance_percent:g} % off" if point.speed_rpm else ""
         raise RefusalError(
-            f"there is no speed source, and no gear is described whose mesh lines would tell the speed{off}",
+            f"there is no speed source, and no gear is described whose mesh lines would give the speed{off}",
             remedy="give a tachometer, a speed channel, a speed that is known to "
             f"{STATED_SPEED_TOLERANCE_PERCENT:g} %, or the teeth in a rig file",
         )
@@ -89,12 +89,12 @@ def _from_source(recording: Recording, source: SpeedSource) -> ShaftAngle:
             return encoder_angle(values, rate, source.units_per_revolution, wraps=source.wraps)
         case SpeedChannel():
             return speed_channel_angle(recording.values(source.channel), rate, source.rpm_per_unit)
-        case _:  # neither a Recording nor a Rig takes another
+        case _:  # neither a Recording nor a Rig accepts any other
             assert_never(source)
 
 
 def tachometer_edges(recording: Recording, source: TachometerChannel) -> PulseEdges:
-    """Return the pulses of a tachometer that a rig or recording names, by its threshold, hysteresis and edge."""
+    """Return the pulses of a tachometer channel, found with its source's threshold, hysteresis and edge."""
     return find_pulse_edges(
         recording.values(source.channel),
         recording.sampling_rate_hz,
@@ -111,8 +111,8 @@ def _from_tachometer(recording: Recording, source: TachometerChannel) -> ShaftAn
             f"the tachometer has {counted(len(edges.times_s), 'pulse')} in {recording.duration_s:.4g} s",
             where=f"channel {source.channel!r}",
             allowed="at least two",
-            remedy=f"the machine stands, or the threshold of {edges.threshold:.4g} does not fit the signal, which runs "
-            f"from {edges.low:.4g} to {edges.high:.4g}",
+            remedy=f"the machine is at rest, or the threshold of {edges.threshold:.4g} does not fit the signal, which "
+            f"runs from {edges.low:.4g} to {edges.high:.4g}",
         )
     return pulse_train_angle(edges.times_s, source.pulses_per_revolution, tick_s=edges.tick_s)
 
@@ -126,7 +126,7 @@ def _to_reference_shaft(angle: ShaftAngle, shaft: str, rig: Rig | None) -> Shaft
     ratio = rig.ratio(reference, to=shaft)
     if ratio is None:
         raise InputError(
-            f"the speed is that of shaft {shaft!r}, and the teeth do not tell its ratio to {reference!r}",
+            f"the speed is that of shaft {shaft!r}, but the teeth do not give its ratio to {reference!r}",
             where="rig",
             remedy=f"complete the teeth between both shafts, or make {shaft!r} the reference shaft",
         )
@@ -135,7 +135,7 @@ def _to_reference_shaft(angle: ShaftAngle, shaft: str, rig: Rig | None) -> Shaft
     return replace(converted, notes=(*converted.notes, note))
 
 
-# Shaft angle at a stated, constant speed.
+# Shaft angle at a stated constant speed.
 
 
 def constant_speed_angle(speed_rpm: float, duration_s: float) -> ShaftAngle:
@@ -153,7 +153,7 @@ def constant_speed_angle(speed_rpm: float, duration_s: float) -> ShaftAngle:
     Raises
     ------
     RefusalError
-        If the speed is zero: nothing turns, there is no angle to resample over.
+        If the speed is zero: there is no angle to resample over.
     """
     not_negative(speed_rpm, "speed_rpm", "rpm")
     positive(duration_s, "duration_s", "s")

@@ -1,4 +1,4 @@
-"""Shaft angle without a tachometer, from the lines that gears put into the vibration."""
+"""Shaft angle without a tachometer, from the lines that gears cause in the vibration."""
 
 from __future__ import annotations
 
@@ -30,19 +30,19 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Recording
 from gearsig.rig import Rig
 
-# Speed over time from short-time comb scores: the path that collects most score without jumping.
+# Speed over time from short-time comb scores: the path with the highest score that does not jump.
 
 
 def track_speed(
     samples: FloatArray, rate: float, comb: CombLines, low: float, high: float, n_block: int, change: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the most likely profile of the speed: times of the blocks' middles, and the speed there.
+    """Return the most likely speed profile: times of the blocks' middles, and the speed there, (n_blocks,) each.
 
-    `change` is the standard deviation of the change of log speed from block to block, or six steps of the grid if
-    that is more. Blocks at half overlap are scored for all speeds; the path maximises Σ score - Σ min((Δ ln
+    `change` is the standard deviation of the change of log speed from block to block; σ is at least six steps of the
+    grid. Half-overlapping blocks are scored for all speeds; the path maximises Σ score - Σ min((Δ ln
     speed)²/(2σ²), 20), found by dynamic programming over the 200 best candidates of each block (A. J. Viterbi, *Error
-    bounds for convolutional codes …*, IEEE Trans. Inf. Theory 13 (1967)). A few blocks without lines must not decide
-    over the rest, hence the limit.
+    bounds for convolutional codes …*, IEEE Trans. Inf. Theory 13 (1967)). The limit of 20 keeps a few blocks without
+    lines from determining the rest.
     """
     starts = np.arange(0, samples.shape[1] - n_block + 1, max(1, n_block // 2))
     reach = comb.highest * high
@@ -61,7 +61,7 @@ def track_speed(
 
 
 def _best_path(places: FloatArray, scores: FloatArray, highest_cost: float) -> list[int]:
-    """Candidate per block on the path with the highest Σ score - Σ min((Δ place)²/2, highest_cost)."""
+    """Return the candidate per block on the path with the highest Σ score - Σ min((Δ place)²/2, highest_cost)."""
     total, came_from = scores[0], []
     for before, here, score in zip(places[:-1], places[1:], scores[1:], strict=True):
         values = total - np.minimum(0.5 * (here[:, None] - before) ** 2, highest_cost)
@@ -73,15 +73,15 @@ def _best_path(places: FloatArray, scores: FloatArray, highest_cost: float) -> l
     return path[::-1]
 
 
-# A rough shaft angle made exact by the phase of mesh harmonics.
+# Refinement of a rough shaft angle by the phase of mesh harmonics.
 
 
-_PER_WIDTH = 4  # points per reciprocal half width; two would do by the sampling theorem
+_PER_WIDTH = 4  # points per reciprocal half width; the sampling theorem requires two
 
 
 @dataclass(frozen=True)
 class _Harmonic:
-    """Baseband of one mesh harmonic in all channels, (n_channels, n), how far it stands out, and its sampling step."""
+    """Baseband of one mesh harmonic in all channels, (n_channels, n), its prominence, and its sampling step."""
 
     order: float
     baseband: FloatArray
@@ -92,18 +92,18 @@ class _Harmonic:
 def refine_by_phase(
     recording: Recording, channels: tuple[str, ...], angle: ShaftAngle, orders: tuple[float, ...]
 ) -> ShaftAngle:
-    """Return the angle with which the strongest mesh harmonics run at constant phase.
+    """Return the angle over which the strongest mesh harmonics have constant phase.
 
-    Over the estimated angle a harmonic of order o has the phase 2πo(θ_true - θ), so θ_true = θ + phase/(2πo). The
-    phase is summed from sample to sample over all channels, weighted over harmonics by o² times their height over the
-    neighbourhood. Repeated, each time over a better angle and with a narrower band.
+    Over the estimated angle, a harmonic of order o has the phase 2πo(θ_true - θ), so θ_true = θ + phase/(2πo). Phase
+    steps from sample to sample are summed over all channels; harmonics are weighted by o² times their height over the
+    neighbourhood. This is repeated, each time over a better angle and finally with narrower bands.
 
     Parameters
     ----------
     recording : Recording
     channels : tuple of str
     angle : ShaftAngle
-        Off by less than half an order of the mesh harmonic, i.e. 2 % for 23 teeth.
+        Wrong by less than half an order at the mesh harmonic, i.e. 2 % for 23 teeth.
     orders : tuple of float
         Mesh harmonics.
 
@@ -116,7 +116,7 @@ def refine_by_phase(
     """
     if orders:
         recording = _thinned(recording, channels, (max(orders) + 2.0) * angle.speed_range_rpm[1] / 60.0)
-    # Around the mesh order, in orders of the shaft: below one, so that the shaft's sidebands stay outside.
+    # In orders of the shaft around the mesh order: below one, so that the shaft's sidebands stay outside.
     for half_width in (0.45, 0.45, 0.3, 0.2):
         refined = _refined_once(recording, channels, angle, orders, half_width)
         if refined is None:
@@ -126,7 +126,7 @@ def refine_by_phase(
 
 
 def _thinned(recording: Recording, channels: tuple[str, ...], highest_hz: float) -> Recording:
-    """Return the channels at 3.5 times the highest frequency of interest, where that is less than half their rate."""
+    """Return the channels decimated to 3.5 times the highest frequency of interest, if that halves the rate or more."""
     from scipy.fft import irfft, next_fast_len, rfft
 
     n, rate = recording.n_samples, recording.sampling_rate_hz
@@ -162,7 +162,7 @@ def _refined_once(
     spectra = rfft(signal.samples, n_padded, axis=1)
     harmonics = [_demodulate(spectra, n_samples, n_padded, n_per_rev, o, half_width) for o in usable]
     best = sorted((h for h in harmonics if h is not None), key=lambda h: -h.ratio)[:3]
-    # Power of the band over its median line: noise has 0.5. A band of noise must not be bent into a line.
+    # Power of the band over its median line: 0.5 for noise. A band of noise must not be bent into a line.
     best = [h for h in best if h.ratio > max(2.0, 0.05 * best[0].ratio)]
     if not best or best[0].baseband.shape[1] < 8:
         return None
@@ -179,7 +179,7 @@ def _tachless(shaft: str, time_s: FloatArray, revolutions: FloatArray) -> ShaftA
 def _demodulate(
     spectra: NDArray[np.complexfloating], n_samples: int, n_padded: int, n_per_rev: int, order: float, half_width: float
 ) -> _Harmonic | None:
-    """Shift one order to zero and keep ± half_width around it, sampled accordingly, over the samples without padding.
+    """Shift one order to zero and keep ± half_width around it, sampled accordingly, without the padding.
 
     `spectra` are transforms of `n_padded` samples, the last of which are zeros.
     """
@@ -195,13 +195,13 @@ def _demodulate(
     basebands = []
     for row in spectra:
         lines = row[middle - reach : middle + reach + 1]
-        # In units of its own neighbourhood, so that no channel drowns the others.
+        # Normalised by the neighbourhood, so that no channel dominates the others.
         floor = float(np.median(np.abs(lines))) or 1.0
         spread = np.zeros(n, dtype=complex)
         spread[np.arange(-reach, reach + 1)] = lines * taper / floor
         basebands.append(ifft(spread)[: n * n_samples // n_padded] * n)
     baseband = np.array(basebands)
-    # The middle is a whole number of bins; the rest of the shift is a slow turn.
+    # The middle is a whole number of bins; the rest of the shift is a slow rotation.
     turn = np.exp(2j * np.pi * (middle / per_order - order) * per_order * np.arange(baseband.shape[1]) / n)
     z = baseband * turn
     power = np.square(np.abs(z)).sum() / (z.size * (2 * reach + 1))
@@ -209,7 +209,7 @@ def _demodulate(
 
 
 def _common_shift(harmonics: list[_Harmonic]) -> FloatArray:
-    """Angle by which the shaft runs ahead of the estimate, in revolutions, from all harmonics."""
+    """Return the angle by which the shaft leads the estimate, in revolutions, from all harmonics, (n,)."""
     n = harmonics[0].baseband.shape[1]
     total, weights = np.zeros(n), 0.0
     for h in harmonics:
@@ -219,7 +219,7 @@ def _common_shift(harmonics: list[_Harmonic]) -> FloatArray:
         total += weight * phase / (2 * np.pi * h.order)
         weights += weight
     shift = total / weights
-    # The band's own ringing spoils both ends: half a reciprocal width of revolutions.
+    # The filter's ringing corrupts both ends over half a reciprocal width of revolutions.
     edge = min(n // 4, max(1, int(_PER_WIDTH / 2)))
     shift[:edge] = shift[edge]
     shift[n - edge :] = shift[n - edge - 1]
@@ -227,16 +227,16 @@ def _common_shift(harmonics: list[_Harmonic]) -> FloatArray:
     return centred
 
 
-# Shaft angle of a changing speed: followed block by block, made exact by phase, weighed over orders.
+# Shaft angle at varying speed: tracked block by block, refined by phase, scored over orders.
 
 
 def varying_speed(search: SpeedSearch, start: SpeedCandidate | None) -> SpeedCandidate | None:
-    """Best of the refined angles, from the constant one or from tracking with blocks of several lengths."""
+    """Return the best refined angle, from the constant one or from tracking with blocks of several lengths."""
     candidates: list[SpeedCandidate] = []
     for angle in _starts(search, start):
         candidate = _refined(search, angle)
         if candidate is not None and abs(candidate.decision.speed - 1.0) > 0.02:
-            # Over the true profile of the speed the comb is sharp at its true scale only: take it from there.
+            # Over the true speed profile, the comb is sharp only at its true scale: start again from there.
             candidate = _refined(search, angle.of_shaft(angle.shaft, candidate.decision.speed))
         if candidate is not None and abs(candidate.decision.speed - 1.0) <= 0.02:
             candidates.append(candidate)
@@ -245,7 +245,7 @@ def varying_speed(search: SpeedSearch, start: SpeedCandidate | None) -> SpeedCan
     best = max(candidates, key=_rank, default=None)
     if best is None or best.decision.quality < MIN_QUALITY or search.high < NARROW * search.low:
         return best
-    # With the scale open, half, double and triple speed are refined as well and have to lose.
+    # If the scale is open, half, double, triple and a third of the speed are refined as well and must score lower.
     mean = best.angle.mean_speed_rpm / 60.0
     factors = [factor for factor in (2.0, 0.5, 3.0, 1.0 / 3.0) if search.low <= factor * mean <= search.high]
     alternatives = [_refined(search, best.angle.of_shaft(best.angle.shaft, factor)) for factor in factors]
@@ -253,7 +253,7 @@ def varying_speed(search: SpeedSearch, start: SpeedCandidate | None) -> SpeedCan
 
 
 def _starts(search: SpeedSearch, start: SpeedCandidate | None) -> Iterator[ShaftAngle]:
-    """Yield the constant speed where there is one; unless that is beyond doubt, the profiles followed as well."""
+    """Yield the angle at constant speed, if any; unless its quality is clear, also the tracked profiles."""
     if start is not None:
         yield start.angle
         if start.decision.quality >= CLEAR:
@@ -261,16 +261,16 @@ def _starts(search: SpeedSearch, start: SpeedCandidate | None) -> Iterator[Shaft
     from scipy.integrate import cumulative_trapezoid
 
     rate, n = search.recording.sampling_rate_hz, search.samples.shape[1]
-    # Blocks per recording: the middle one first, it fits most machines. One is enough to contradict a steady speed.
+    # Blocks per recording: the middle one first, as it fits most machines. One is enough to contradict a steady speed.
     for n_blocks in (96, 24, 384) if start is None else (96,):
         n_block = 2 * n // n_blocks
-        low = max(search.low, 2.0 * rate / n_block)  # two turns per block, or its spectrum does not show orders
+        low = max(search.low, 2.0 * rate / n_block)  # fewer than two turns per block would not resolve orders
         if n_block < 512 or low >= search.high:
             continue
         change = 0.04 * 0.5 * n_block / rate  # log speed changes by 0.04 per second
         time_s, speed = track_speed(search.samples, rate, search.comb, low, search.high, n_block, change)
         if np.abs(np.diff(np.log(speed))).max() > 0.2:
-            continue  # a path that changes to a multiple of the speed jumps so far
+            continue  # such a jump is a change to a multiple of the speed
         smooth = _smooth(speed)
         t = np.concatenate([[0.0], time_s, [search.recording.duration_s]])
         v = np.concatenate([[smooth[0]], smooth, [smooth[-1]]])
@@ -285,13 +285,13 @@ def _rank(candidate: SpeedCandidate) -> tuple[bool, float]:
 
 
 def _refined(search: SpeedSearch, angle: ShaftAngle) -> SpeedCandidate | None:
-    """Make an angle exact, and weigh the comb over the order spectrum, where a right angle makes its lines sharp."""
+    """Refine an angle by phase and score the comb over the order spectrum, where a correct angle gives sharp lines."""
     refined = refine_by_phase(search.recording, search.channels, angle, search.comb.mesh_harmonics)
     signal = _over_angle(search, refined)
     if signal is None:
         return None
     mean = refined.mean_speed_rpm / 60.0
-    # The search was at least this wide; a known nominal speed leaves a margin for the runner-up.
+    # The search was at least this wide; for a known nominal speed there is a margin for the runner-up.
     low = max(search.low / mean, 0.15) if search.high / search.low > NARROW else 0.95
     high = min(search.high / mean, 6.0) if search.high / search.low > NARROW else 1.05
     n_per_rev = float(signal.samples_per_revolution)
@@ -303,9 +303,9 @@ def _refined(search: SpeedSearch, angle: ShaftAngle) -> SpeedCandidate | None:
 
 
 def _over_angle(search: SpeedSearch, angle: ShaftAngle) -> AngleSignal | None:
-    """Resample to twice the comb's highest order, so that twice the true speed shows itself; less where there is less.
+    """Resample up to twice the comb's highest order, so that twice the true speed would show, or as far as possible.
 
-    None where the angle does not cover a revolution of the recording.
+    Return None if the angle covers less than one revolution of the recording.
     """
     top = TOP * search.recording.sampling_rate_hz / (angle.speed_range_rpm[1] / 60.0)
     highest = min(2.0 * search.comb.highest, top)
@@ -316,7 +316,7 @@ def _over_angle(search: SpeedSearch, angle: ShaftAngle) -> AngleSignal | None:
 
 
 def _corrected(search: SpeedSearch, angle: ShaftAngle, span: float, n_blocks: int) -> ShaftAngle:
-    """Follow what is left of the change of speed over the angle found so far, where the lines are already sharper."""
+    """Track the remaining change of speed over the angle found so far, where the lines are already sharper."""
     from scipy.integrate import cumulative_trapezoid
 
     signal = _over_angle(search, angle)
@@ -335,7 +335,7 @@ def _corrected(search: SpeedSearch, angle: ShaftAngle, span: float, n_blocks: in
 
 
 def _smooth(speed: FloatArray) -> FloatArray:
-    """Take out the steps of the speed grid by a short running mean."""
+    """Smooth the steps of the speed grid by a short Gaussian filter."""
     from scipy.ndimage import gaussian_filter1d
 
     smooth: FloatArray = gaussian_filter1d(speed, 1.0, mode="nearest")
@@ -343,7 +343,7 @@ def _smooth(speed: FloatArray) -> FloatArray:
 
 
 def _coverage(samples: FloatArray, n_per_rev: float, comb: CombLines) -> float:
-    """Share of the recording, in eighths, in which the comb lies where the angle says and not beside."""
+    """Return the share of the recording, in eighths, in which the comb lies where the angle predicts it."""
     n_part = samples.shape[1] // 8
     if n_part < 4 * n_per_rev or n_part < 512:
         return 1.0
@@ -354,7 +354,7 @@ def _coverage(samples: FloatArray, n_per_rev: float, comb: CombLines) -> float:
         speeds = candidate_speeds(0.94, 1.06, comb, evidence)
         scores = score_speeds(evidence, comb, speeds)
         here = np.abs(speeds - 1.0) <= 2.0 * evidence.bin_width / comb.meshes[0]
-        right += scores.max() - scores[here].max() <= 4.0  # by so much another speed has to win there
+        right += scores.max() - scores[here].max() <= 4.0  # another speed must win by this margin there
     return right / 8.0
 
 
@@ -368,9 +368,9 @@ def estimate_shaft_angle(
 ) -> ShaftAngle:
     """Estimate the angle of the reference shaft from mesh harmonics, their sidebands and shaft harmonics.
 
-    First at constant speed: the comb of orders is laid over a whitened spectrum at each speed of the range. If its
-    lines are smeared, the speed is followed from block to block. Either angle is then made exact by the phase of the
-    mesh harmonics, and weighed by the comb over the order spectrum: against chance, other speeds, other teeth.
+    First, constant speed is assumed: the comb of orders is compared with a whitened spectrum at each speed of the
+    range. If its lines are smeared, the speed is tracked from block to block. Either angle is then refined by the phase
+    of the mesh harmonics, and the comb over the order spectrum is scored against chance, other speeds and other teeth.
 
     Parameters
     ----------
@@ -383,18 +383,18 @@ def estimate_shaft_angle(
         Of the reference shaft. Default: the rig's nominal speed with its tolerance, else 30 to 30000 rpm as far as
         sampling rate and duration allow.
     explained : bool
-        Whether a refusal says at which other speeds a comb lies, which takes about as long as the search.
+        Whether a refusal states at which other speed a comb was found, which takes about as long as the search.
 
     Returns
     -------
     ShaftAngle
-        With quality and uncertainty; angle zero is arbitrary.
+        With quality and uncertainty; the zero of the angle is arbitrary.
 
     Raises
     ------
     RefusalError
-        If no teeth are known, the recording is too short, or no comb stands out: noise, a bearing alone, wrong teeth or
-        sampling rate, or a scale of the speed that stays ambiguous.
+        If no teeth are known, the recording is too short, or no comb stands out: noise, only a bearing, wrong teeth or
+        sampling rate, or a speed scale that remains ambiguous.
 
     Notes
     -----
@@ -412,16 +412,16 @@ def estimate_shaft_angle(
     low, high = 60.0 * search.low, 60.0 * search.high
     if usual[1] - usual[0] > 0.9 * (high - low):  # the range is narrow already, and the profile still jumps
         raise RefusalError(
-            "the speed that follows from the mesh lines jumps for moments, as no shaft does: the phase slips by cycles",
+            "the speed that follows from the mesh lines jumps briefly, as no shaft can: the phase slips by cycles",
             remedy="give a tachometer, or a recording with less noise",
         )
     return estimate_shaft_angle(recording, rig, channels=channels, speed_range_rpm=usual, explained=explained)
 
 
 def _range_without_slips(angle: ShaftAngle) -> tuple[float, float] | None:
-    """Return the range of speeds (rpm) to search again if the profile leaves its usual range for moments; else None.
+    """Return the speed range (rpm) to search again if the profile briefly leaves its usual range; otherwise None.
 
-    A phase that slips by a cycle shows as a short excursion far beyond the speeds of all other times.
+    A phase slip of one cycle appears as a short excursion far beyond the speeds at all other times.
     """
     speed = angle.speed_rpm_at(np.linspace(angle.start_s, angle.end_s, 4096))
     low, middle, high = (float(q) for q in np.quantile(speed, (0.05, 0.5, 0.95)))
@@ -448,7 +448,7 @@ def _better(
     if steady is None:
         return varying
     if not _is_sharp(search, steady) and not steady.decision.narrow:
-        # Smeared lines of an unknown speed: half and double speed look much alike.
+        # With smeared lines and an unknown speed, half and double speed look much alike.
         steady = replace(steady, decision=replace(steady.decision, coverage=0.95))
     sure = steady.decision.quality >= MIN_QUALITY
     if varying is not None and varying.decision.quality >= MIN_QUALITY:
@@ -458,14 +458,14 @@ def _better(
 
 @dataclass(frozen=True)
 class OffsetComb:
-    """A comb of mesh lines that lies beside the place where speed and teeth put it.
+    """A comb of mesh lines at another speed than speed and teeth predict.
 
     Parameters
     ----------
     factor : float
-        Its speed over the stated one.
+        Its speed relative to the stated speed.
     text : str
-        What was found, in one sentence.
+        The finding in one sentence.
     """
 
     factor: float
@@ -473,13 +473,14 @@ class OffsetComb:
 
 
 FARTHEST_COMB = 12.5
-"""Factor on the stated speed up to which the comb is sought: sampling rates are mistaken by 10, and by 2.56."""
+"""Factor on the stated speed up to which the comb is searched: sampling rates are often wrong by 10 or 2.56."""
 
 
 def find_offset_comb(recording: Recording, rig: Rig, stated_speed_rpm: float) -> OffsetComb | None:
-    """Return at which multiple of a stated speed the comb of the gears does lie, if anywhere else.
+    """Return the multiple of a stated speed at which the gears' comb actually lies; None if there is no other.
 
-    For "sampling rate, speed and teeth disagree": a factor of 2, or of two common sampling rates, names the culprit.
+    For "sampling rate, speed and teeth disagree": a factor of 2, or the ratio of two common sampling rates, points to
+    the cause.
     """
     positive(stated_speed_rpm, "stated_speed_rpm", "rpm")
     stated = stated_speed_rpm / 60.0
@@ -498,13 +499,13 @@ def find_offset_comb(recording: Recording, rig: Rig, stated_speed_rpm: float) ->
     return OffsetComb(
         factor,
         f"Mesh lines with sidebands lie at {mesh * candidate.decision.speed:.5g} Hz and its multiples, "
-        f"{factor:.4g} times where speed and teeth put them ({candidate.decision.evidence()}): "
+        f"{factor:.4g} times where speed and teeth predict them ({candidate.decision.evidence()}): "
         "sampling rate, speed or teeth are wrong.",
     )
 
 
 def _constant_speed(search: SpeedSearch) -> SpeedCandidate | None:
-    """Best comb over the spectrum of the whole recording, or of its parts where the lines are wider."""
+    """Return the best comb over the spectrum of the whole recording, or of shorter parts if its lines are wider."""
     rate = search.recording.sampling_rate_hz
     decision = best_decision(search.samples, rate, search.comb, search.low, search.high)
     if decision is None:
@@ -518,7 +519,7 @@ def _finished(search: SpeedSearch, candidate: SpeedCandidate) -> ShaftAngle:
     decision, angle = candidate.decision, candidate.angle
     constant, duration_s, meshes = len(angle.time_s) == 2, search.recording.duration_s, search.comb.meshes
     smeared = constant and decision.bin_width * duration_s > 1.5
-    # A tenth of a bin at the mesh order where its line was sharp, half a bin where it was not.
+    # A tenth of a bin at the mesh order if its line is sharp, half a bin otherwise.
     uncertainty = 0.1 / (duration_s * meshes[-1] * angle.mean_speed_rpm / 60.0)
     unit = "rev/s" if constant else "times the angle's speed"
     notes = [f"estimated from the vibration of {', '.join(search.channels)}: {decision.evidence(unit)}"]
@@ -539,7 +540,7 @@ def _finished(search: SpeedSearch, candidate: SpeedCandidate) -> ShaftAngle:
 
 
 def _refusal(search: SpeedSearch, best: SpeedCandidate | None, rig: Rig, *, explained: bool) -> RefusalError:
-    """Explain what was searched and found instead, also outside of the nominal range."""
+    """Return the refusal, stating what was searched and what was found instead, also outside the nominal range."""
     reason = f"no comb of mesh lines stands out between {60 * search.low:.4g} and {60 * search.high:.4g} rpm"
     if best is not None:
         reason += f" ({best.decision.evidence()}; quality {best.decision.quality:.2f}, needed {MIN_QUALITY})"

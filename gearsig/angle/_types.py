@@ -1,4 +1,4 @@
-"""Shaft angle over time, and signals sampled over it."""
+"""Shaft angle over time, and signals sampled at equal steps of it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ AngleMethod = Literal["constant", "pulses", "encoder", "speed channel", "tachles
 
 @dataclass(frozen=True)
 class ShaftAngle(Result, columns=("time_s", "revolutions", "speed_rev_per_s")):
-    """Angle of a shaft against time, as a piecewise cubic through knots.
+    """Angle of a shaft over time, as a piecewise cubic through knots.
 
     Parameters
     ----------
@@ -29,17 +29,17 @@ class ShaftAngle(Result, columns=("time_s", "revolutions", "speed_rev_per_s")):
     time_s : array, (n_knots,)
         Strictly increasing; at least two.
     revolutions : array, (n_knots,)
-        Shaft angle in revolutions, not decreasing. A shaft that turns backwards counts up as well.
+        Shaft angle in revolutions, not decreasing. The angle of a shaft that turns backwards also counts up.
     speed_rev_per_s : array, (n_knots,)
-        Slope at the knots, not negative; the cubic (Hermite) through value and slope is the angle between them.
+        Slope at the knots, not negative; between knots, the angle is the Hermite cubic through values and slopes.
     method : str
-        How it was found.
+        How the angle was found.
     relative_speed_uncertainty : float
-        One standard deviation of the mean speed over the mean speed, as estimated by the method; nan if not known.
+        Standard deviation of the mean speed relative to the mean speed, as estimated by the method; nan if not known.
     quality : float
-        0 to 1: the method's own confidence that this is the true angle and not, e.g., another harmonic.
+        0 to 1: the method's confidence that this is the true angle and not, e.g., that of another harmonic.
     notes : tuple of str
-        What was repaired or assumed on the way (missed pulses, …), for the reader of the report.
+        Repairs and assumptions (missed pulses, …), for the reader of the report.
     """
 
     shaft: str
@@ -62,40 +62,40 @@ class ShaftAngle(Result, columns=("time_s", "revolutions", "speed_rev_per_s")):
 
     @property
     def start_s(self) -> float:
-        """First time at which the angle is known."""
+        """First time at which the angle is known, in s."""
         return float(self.time_s[0])
 
     @property
     def end_s(self) -> float:
-        """Last time at which the angle is known."""
+        """Last time at which the angle is known, in s."""
         return float(self.time_s[-1])
 
     @property
     def n_revolutions(self) -> float:
-        """Revolutions from first to last knot."""
+        """Revolutions from the first to the last knot."""
         return float(self.revolutions[-1] - self.revolutions[0])
 
     @property
     def mean_speed_rpm(self) -> float:
-        """Revolutions over time, in rpm."""
+        """Mean speed from the first to the last knot, in rpm."""
         return 60.0 * self.n_revolutions / (self.end_s - self.start_s)
 
     @property
     def speed_range_rpm(self) -> tuple[float, float]:
-        """Lowest and highest speed at the knots."""
+        """Lowest and highest speed at the knots, in rpm."""
         return 60.0 * float(self.speed_rev_per_s.min()), 60.0 * float(self.speed_rev_per_s.max())
 
     def is_steady(self, share: float = 0.01) -> bool:
-        """Whether the speed varies by no more than that share of its mean; by 1 %, lines stay sharp over frequency."""
+        """Whether the speed varies by at most `share` of its mean; up to 1 %, lines stay sharp over frequency."""
         low, high = self.speed_range_rpm
         return high - low <= share * self.mean_speed_rpm
 
     def revolutions_at(self, time_s: FloatArray) -> FloatArray:
-        """Shaft angle in revolutions at `time_s`; beyond the knots it goes on at the last speed."""
+        """Return the shaft angle in revolutions at `time_s`; beyond the knots it continues at the end speed."""
         return self._evaluate(time_s, 0)
 
     def speed_rpm_at(self, time_s: FloatArray) -> FloatArray:
-        """Speed in rpm at `time_s`; beyond the knots it stays at the last one."""
+        """Return the speed in rpm at `time_s`; beyond the knots it is constant."""
         return 60.0 * self._evaluate(time_s, 1)
 
     def of_shaft(self, shaft: str, ratio: float) -> ShaftAngle:
@@ -111,12 +111,12 @@ class ShaftAngle(Result, columns=("time_s", "revolutions", "speed_rev_per_s")):
         Raises
         ------
         RefusalError
-            If the angle is not known in any part of that time.
+            If the angle is not known at any time in this range.
         """
         start, end = max(start_s, self.start_s), min(end_s, self.end_s)
         if start >= end:
             raise RefusalError(
-                f"the shaft angle is known from {self.start_s:.4g} to {self.end_s:.4g} s, the recording lasts from "
+                f"the shaft angle is known from {self.start_s:.4g} to {self.end_s:.4g} s, but the recording lasts from "
                 f"{start_s:.4g} to {end_s:.4g} s",
                 remedy="check that both use the same time axis",
             )
@@ -148,7 +148,7 @@ class ShaftAngle(Result, columns=("time_s", "revolutions", "speed_rev_per_s")):
 
 
 def check_shaft_angle(value: object, name: str = "shaft_angle") -> None:
-    """Raise unless the value is a shaft's angle; a number may be meant as its speed."""
+    """Raise unless the value is a `ShaftAngle`; for a number, the error suggests `speed_rpm`."""
     is_number = isinstance(value, int | float)
     remedy = "give a constant speed as speed_rpm" if is_number else "gearsig.find_shaft_angle(recording) finds one"
     instance_of(value, ShaftAngle, name, remedy=remedy)
@@ -163,11 +163,11 @@ class AngleSignal(Result, matrix=("samples.T", "revolutions", "channel_names")):
     samples : array, (n_channels, n_samples)
     samples_per_revolution : int
     shaft_angle : ShaftAngle
-        The angle it was resampled with; sample 0 lies at `start_revolution`.
+        The angle used for resampling; sample 0 lies at `start_revolution`.
     start_revolution : float
     channel_names, units : tuples of str
     highest_order : float
-        Orders above this one are attenuated by the anti-aliasing filter or were never in the recording.
+        Orders above this are attenuated by the anti-aliasing filter or were not in the recording.
     """
 
     samples: FloatArray
@@ -183,7 +183,7 @@ class AngleSignal(Result, matrix=("samples.T", "revolutions", "channel_names")):
 
     @property
     def revolutions(self) -> FloatArray:
-        """Angle of each sample, (n_samples,)."""
+        """Angle of each sample in revolutions, (n_samples,)."""
         return self.start_revolution + np.arange(self.samples.shape[1]) / self.samples_per_revolution
 
     @property
@@ -192,7 +192,7 @@ class AngleSignal(Result, matrix=("samples.T", "revolutions", "channel_names")):
         return float(self.samples.shape[1] / self.samples_per_revolution)
 
     def values(self, name: str) -> FloatArray:
-        """Samples of one channel, (n_samples,)."""
+        """Return the samples of one channel, (n_samples,)."""
         at = self.channel_names.index(known_name(name, self.channel_names, f"there is no channel {name!r}"))
         row: FloatArray = self.samples[at]
         return row
@@ -204,8 +204,8 @@ class AngleSignal(Result, matrix=("samples.T", "revolutions", "channel_names")):
 def monotone_slopes(t: FloatArray, y: FloatArray) -> FloatArray:
     """Return slopes at the knots of non-decreasing data.
 
-    The slope is that of the quartic through the knot and two neighbours on each side (fewer at the ends and for short
-    data), so polynomials up to degree four, and with them constant acceleration, are exact. Slopes are then limited to
+    Each slope is that of the quartic through the knot and two neighbours on each side (fewer at the ends and for short
+    data), which is exact for polynomials up to degree four, including constant acceleration. Slopes are then limited to
     three times the smaller adjacent secant, which is sufficient for a monotone Hermite cubic.
 
     Source: F. N. Fritsch, R. E. Carlson, *Monotone piecewise cubic interpolation*, SIAM J. Numer. Anal. 17 (1980).
@@ -219,7 +219,7 @@ def monotone_slopes(t: FloatArray, y: FloatArray) -> FloatArray:
     middle = width // 2
     inner = np.arange(n - width + 1)
     slopes[inner + middle] = _lagrange_slope(t, y, inner, width, middle)
-    # At the ends a lower degree: a one-sided quartic would amplify timing errors several times.
+    # A lower degree at the ends: a one-sided quartic would amplify timing errors several times.
     end = min(4, n)
     for i in range(middle):
         slopes[i] = _lagrange_slope(t, y, np.array([0]), end, i)[0]
@@ -229,16 +229,16 @@ def monotone_slopes(t: FloatArray, y: FloatArray) -> FloatArray:
 
 
 def limited_slopes(t: FloatArray, y: FloatArray, slopes: FloatArray) -> FloatArray:
-    """Keep slopes between 0 and three times the smaller adjacent secant, so that the cubic does not decrease."""
+    """Limit slopes to between 0 and three times the smaller adjacent secant, so that the cubic does not decrease."""
     secants = np.diff(y) / np.diff(t)
     limit = 3.0 * np.minimum(np.append(secants, secants[-1]), np.insert(secants, 0, secants[0]))
     return np.clip(slopes, 0.0, limit)
 
 
 def _lagrange_slope(t: FloatArray, y: FloatArray, start: NDArray[np.integer[Any]], width: int, at: int) -> FloatArray:
-    """Slope at node `at` of the polynomial through `width` nodes from each `start`.
+    """Return the slope at node `at` of the polynomial through `width` nodes from each `start`.
 
-    With nodes t_j: p'(t_a) = Σ_{j≠a} (y_j - y_a) · w_j/w_a / (t_a - t_j), w the barycentric weights.
+    With nodes t_j: p'(t_a) = Σ_{j≠a} (y_j - y_a) · w_j/w_a / (t_a - t_j), with w the barycentric weights.
 
     Source: J.-P. Berrut, L. N. Trefethen, *Barycentric Lagrange interpolation*, SIAM Review 46 (2004), eq. 9.4.
     """
@@ -246,7 +246,7 @@ def _lagrange_slope(t: FloatArray, y: FloatArray, start: NDArray[np.integer[Any]
     values = y[start[:, None] + np.arange(width)]
     gaps = nodes[:, :, None] - nodes[:, None, :]
     gaps[:, np.arange(width), np.arange(width)] = 1.0
-    # Scaling by the span keeps the products away from under- and overflow.
+    # Scaling by the span keeps the products from under- or overflowing.
     span = (nodes[:, -1] - nodes[:, 0])[:, None]
     weights = 1.0 / np.prod(gaps / span[:, :, None], axis=2)
     slope = np.zeros(len(nodes))

@@ -1,4 +1,4 @@
-"""Signals taken apart: variational modes, wavelet denoising."""
+"""Signal decomposition: variational modes and wavelet denoising."""
 
 from gearsig.decompose._suggestion import ModeSuggestion, ModeTrial, noise_width, suggest_modes
 from gearsig.decompose._vmd import (

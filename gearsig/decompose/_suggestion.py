@@ -1,4 +1,4 @@
-"""Number of modes and penalty that are suggested for a signal, and the trials that they rest on."""
+"""Suggested number of modes and penalty for a signal, with the trials behind the suggestion."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ from gearsig.timefreq import Source, UniformSignal, uniform
 
 @dataclass(frozen=True)
 class ModeTrial:
-    """One number of modes at one penalty.
+    """A trial decomposition with one number of modes at one penalty.
 
     Parameters
     ----------
     settings : VmdSettings
-        With the start that did better: "uniform", or "peaks" where the uniform one met an objection.
+        With the better start: "uniform", or "peaks" if only the latter met no objection.
     centres, bandwidths : tuple of float
-        By rising centre, in Hz or orders.
+        By ascending centre, in Hz or orders.
     reconstruction_error : float
         Root mean square of the residual over that of the signal.
     separation : float
-        Smallest distance of two centres over the distance at which a mode's gain is one half; inf for one mode. Below 1
-        two modes share their lines.
+        Smallest distance of two centres over the distance at which a mode's gain is one half; inf for one mode. Below
+        1, two modes share their lines.
     widest : float
-        Largest bandwidth over the one that white noise alone would give a mode; 1 is noise, a tone is near 0.
+        Largest bandwidth relative to that of a mode of white noise; 1 is noise, a tone is near 0.
     smallest_share : float
         Energy of the weakest mode over the signal's.
     n_iterations : int
@@ -61,18 +61,18 @@ class ModeTrial:
 
     @property
     def n_modes(self) -> int:
-        """Number of modes tried."""
+        """Number of modes in this trial."""
         return self.settings.n_modes
 
     @property
     def penalty(self) -> float:
-        """Penalty tried."""
+        """Penalty in this trial."""
         return self.settings.penalty
 
 
 @dataclass(frozen=True)
 class ModeSuggestion(Result, rows="trials"):
-    """Settings for a signal, with their reasons and everything that was tried.
+    """Suggested settings for a signal, with the reasons and all trials.
 
     Parameters
     ----------
@@ -94,20 +94,20 @@ class ModeSuggestion(Result, rows="trials"):
 
     @property
     def settings(self) -> VmdSettings:
-        """The suggested number of modes, penalty and start."""
+        """Suggested number of modes, penalty and start."""
         return self.chosen.settings
 
 
 PENALTIES = (500.0, 1000.0, 2000.0, 5000.0, 10_000.0, 20_000.0)
 USUAL_PENALTY = 2000.0
 NOISE_LIKE = 0.75
-"""Modes wider than this share of white noise's width hold no component that stands out of the noise."""
+"""Modes wider than this share of white noise's width hold no component that stands out from the noise."""
 NARROWEST_LIMIT = 0.3
-"""With few lines in a mode's reach the width of noise scatters, and the limit goes down to this."""
+"""Lower bound of that limit: with few lines within a mode's reach, the width of noise scatters."""
 GIVE_UP_AFTER = 3
-"""Refused trials in a row at one penalty, after which no larger number of modes is tried there."""
+"""Consecutive rejected trials at one penalty after which no larger number of modes is tried."""
 MIN_SHARE = 1e-4
-"""Modes with less of the signal's energy hold leftovers of their neighbours."""
+"""Modes with a smaller share of the signal's energy hold only remnants of their neighbours."""
 
 
 def suggest_modes(
@@ -120,11 +120,11 @@ def suggest_modes(
 ) -> ModeSuggestion:
     """Return the number of modes and the penalty that separate a signal's components.
 
-    Every number of modes up to `max_modes` is tried at every penalty until three in a row are refused, from uniform
-    starts and, where that does not do, from the spectrum's peaks. A trial is refused where two centres lie closer
-    than the distance at which a mode's gain is one half (the modes share lines), where a mode is as wide as white noise
-    alone would make it, or where a mode is all but empty. Of the others, the one with most modes wins; at equal
-    numbers the penalty nearest to 2000.
+    Each number of modes up to `max_modes` is tried at each penalty until three in a row are rejected, from uniform
+    starts and, if that fails, from the spectrum's peaks. A trial is rejected if two centres are closer than the
+    distance at which a mode's gain is one half (the modes share lines), if a mode is as wide as white noise alone would
+    make it, if a mode is almost empty, or if it does not converge. Of the others, the trial with the most modes wins;
+    among equals, the one with the penalty nearest to 2000.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def suggest_modes(
     max_modes : int
     penalties : sequence of float
     longest : int
-        A longer signal is tried on this many samples from its middle.
+        For a longer signal, only this many samples from its middle are used.
 
     Returns
     -------
@@ -144,13 +144,13 @@ def suggest_modes(
     InputError
         On NaN, a constant, or too few samples.
     RefusalError
-        If no trial separates anything: noise, broad-band impulses.
+        If no trial separates a component, as for noise or broad-band impulses.
 
     Notes
     -----
-    White noise between the neighbours of a mode with gain g(x) = 1/(1 + x²), x in half-gain distances, |x| ≤ R, has the
-    root mean square width √[(atan R - R/(1+R²)) / (atan R + R/(1+R²))] half-gain distances; R is half the mean distance
-    of the modes. A suggestion is a start, not a proof: look at the modes.
+    White noise between the neighbours of a mode with gain g(x) = 1/(1 + x²), x in half-gain distances, |x| ≤ R, has an
+    rms width of √[(atan R - R/(1+R²)) / (atan R + R/(1+R²))] half-gain distances; R is half the mean distance of the
+    modes. A suggestion is a starting point, not a proof: inspect the modes.
     """
     x = uniform(signal, channel)
     count(max_modes, "max_modes")
@@ -175,7 +175,7 @@ def suggest_modes(
 
 
 def noise_width(penalty: float, n_modes: int) -> float:
-    """Return the root mean square width of a mode that holds white noise, in half-gain distances (see Notes above)."""
+    """Return the rms width of a mode of white noise, in half-gain distances; see the notes of `suggest_modes`."""
     reach = 0.25 * np.sqrt(penalty) / n_modes
     angle, fall = np.arctan(reach), reach / (1.0 + reach * reach)
     return float(np.sqrt((angle - fall) / (angle + fall)))
@@ -184,8 +184,8 @@ def noise_width(penalty: float, n_modes: int) -> float:
 def noise_limit(penalty: float, n_samples: int) -> float:
     """Return the share of white noise's width up to which a mode counts as a component.
 
-    The width of noise over M = 2n/√penalty lines scatters by about 1/√M; a mode that was started at the highest of many
-    places is narrower than most by several times that.
+    The width of noise over M = 2n/√penalty lines scatters by about 1/√M; a mode that started at the highest of many
+    peaks is narrower than most by several times that.
     """
     n_lines = 2.0 * n_samples / np.sqrt(penalty)
     return float(np.clip(1.0 - 6.0 / np.sqrt(n_lines), NARROWEST_LIMIT, NOISE_LIKE))
@@ -206,7 +206,7 @@ def _trials(x: UniformSignal, max_modes: int, penalty: float) -> list[ModeTrial]
 
 
 def _better_trial(x: UniformSignal, n_modes: int, penalty: float) -> ModeTrial:
-    """Return the trial from uniform starts, or from the spectrum's peaks if only that one meets no objection."""
+    """Return the trial from a uniform start, or from the spectrum's peaks if only that meets no objection."""
     uniform = _trial(x, VmdSettings(n_modes, penalty))
     if not uniform.objection:
         return uniform
@@ -240,7 +240,7 @@ def _objection(modes: Modes, gaps: FloatArray, relative_widths: FloatArray, shar
     if len(gaps) and gaps.min() < 1.0:
         return "two modes share the same lines"
     if shares.min() < MIN_SHARE:
-        return "a mode is all but empty"
+        return "a mode is almost empty"
     if relative_widths.max() > noise_limit(modes.settings.penalty, len(modes.residual)):
         return "a mode is as wide as noise"
     return "" if modes.converged else "not converged"

@@ -1,4 +1,4 @@
-"""Variational mode decomposition: exact, in one real cosine spectrum; of signals of any length, block by block."""
+"""Variational mode decomposition, exact in one real cosine spectrum; block by block for signals of any length."""
 
 from __future__ import annotations
 
@@ -29,38 +29,39 @@ REFERENCE_ITERATIONS = 499
 
 @dataclass(frozen=True)
 class VmdSettings:
-    """What variational mode decomposition is told; names of the reference programs in brackets.
+    """Settings of variational mode decomposition; names of the reference programs in brackets.
 
     Parameters
     ----------
     n_modes : int
         Number of modes [K].
     penalty : float
-        Weight of the modes' bandwidth against their sum's fit [alpha], above zero. A mode's gain at a distance d from
-        its centre is 1 / (1 + penalty (d / sampling rate)²): one half at sampling rate / √penalty, which for 2000 is
-        0.022 of the sampling rate. 2000 as in the source.
+        Weight of the modes' bandwidth relative to the fit of their sum [alpha], above zero. A mode's gain at a distance
+        d from its centre is 1 / (1 + penalty (d / sampling rate)²): one half at sampling rate / √penalty, which for
+        2000 is 0.022 of the sampling rate. 2000 is the value in the source.
     dual_step : float
         Step of the Lagrange multiplier that makes the modes sum to the signal [tau]; 0 leaves noise in the residual.
     zero_mode : bool
-        Whether the first mode's centre is kept at zero, so that it takes the mean and slow drift [DC].
+        Whether to keep the first mode's centre at zero, so that it takes the mean and slow drift [DC].
     start : str or tuple of float
-        First centre frequencies [init]: "uniform" over the spectrum [1], "zero" [0], "random" on a logarithmic scale
-        [2], at the "peaks" of the spectrum (no such thing there), or one per mode, in the result's axis (Hz or orders).
-        The modes found depend on it: from a uniform start, two modes may settle on one component and miss another.
+        Initial centre frequencies [init]: "uniform" over the spectrum [1], "zero" [0], "random" on a logarithmic scale
+        [2], at the "peaks" of the spectrum (not in the references), or one per mode, in the result's axis (Hz or
+        orders). The modes found depend on it: from a uniform start, two modes may converge to one component and miss
+        another.
     tolerance : float or None
-        Iterations end when the modes' energy (sum over samples of the squared change) moves by less than this [tol].
-        It carries the signal's unit squared and grows with its length. None: `RELATIVE_TOLERANCE` of the signal's own
-        energy, which gives the same modes in any unit.
+        Iterations end when the change of the modes (sum over samples of the squared change) is below this [tol]. It
+        has the signal's unit squared and grows with its length. None: `RELATIVE_TOLERANCE` of the signal's energy,
+        which gives the same modes in any unit.
     max_iterations : int
         At least 2.
     engine : str
         "gearsig", or "vmdpy": the reference program in Python, much slower and with up to 16 kB of memory per sample
-        and mode; it starts "uniform" or "zero" and always iterates up to 499 times.
+        and mode; it starts "uniform" or "zero" and always allows 499 iterations.
 
     Raises
     ------
     InputError
-        On a value out of range, or one that the engine cannot take.
+        On a value out of range, or one that the engine does not support.
     """
 
     n_modes: int
@@ -90,7 +91,7 @@ class VmdSettings:
             raise InputError(f"start has {len(self.start)} frequencies", allowed=f"{self.n_modes}, one per mode")
 
     def _check_vmdpy(self) -> None:
-        """Raise on what vmdpy cannot be told; its random start would draw from numpy's global state."""
+        """Raise on settings that vmdpy does not support; its random start would draw from numpy's global state."""
         remedy = 'choose engine="gearsig"'
         if self.start not in ("uniform", "zero"):
             raise InputError(f"start is {self.start!r} with the engine vmdpy", allowed="uniform, zero", remedy=remedy)
@@ -109,9 +110,9 @@ class Modes(Result, columns=("centres", "bandwidths", "rms")):
     Parameters
     ----------
     waveforms : array, (n_modes, n_samples)
-        In `unit`. In the order of the first centre frequencies; `by_centre` sorts them.
+        In `unit`, in the order of the initial centre frequencies; `by_centre` sorts them.
     residual : array, (n_samples,)
-        Signal less `offset` less the modes' sum.
+        Signal minus `offset` minus the sum of the modes.
     centres : array, (n_modes,)
         Centroid of each mode's power spectrum, in Hz or orders (see `axis`).
     bandwidths : array, (n_modes,)
@@ -124,15 +125,16 @@ class Modes(Result, columns=("centres", "bandwidths", "rms")):
     converged : bool
         Whether the tolerance was reached within the iterations allowed.
     last_change : float
-        Change of the modes' energy in the last iteration over the signal's energy; nan where the engine keeps it.
+        Squared change of the modes in the last iteration over the signal's energy; nan if the engine does not report
+        it.
     centre_history : array, (n_iterations, n_modes)
         Centres before each iteration; the last row holds `centres`.
     settings : VmdSettings
     unit, source, shaft : str
     offset : float
-        A constant taken out of the signal before; 0 unless `source` says so.
+        A constant removed from the signal before the decomposition; 0 unless `source` says so.
     notes : tuple of str
-        What the reader must know: no convergence, modes that overlap.
+        Warnings for the reader: no convergence, overlapping modes.
     """
 
     waveforms: FloatArray
@@ -161,7 +163,7 @@ class Modes(Result, columns=("centres", "bandwidths", "rms")):
 
     @property
     def n_modes(self) -> int:
-        """How many modes there are."""
+        """Number of modes."""
         return len(self.centres)
 
     @property
@@ -181,11 +183,11 @@ class Modes(Result, columns=("centres", "bandwidths", "rms")):
         return _root_mean_square(self.residual) / _root_mean_square(signal)
 
     def by_centre(self) -> tuple[int, ...]:
-        """Return the modes' indices by rising centre."""
+        """Return the modes' indices in ascending order of their centres."""
         return tuple(int(i) for i in np.argsort(self.centres, kind="stable"))
 
     def signal(self, mode: int, *, start: float = 0.0) -> UniformSignal:
-        """Return one mode as a signal that every transform takes, e.g. `squeezed_cwt_map(modes.signal(2))`.
+        """Return one mode as a signal for any transform, e.g. `squeezed_cwt_map(modes.signal(2))`.
 
         Parameters
         ----------
@@ -207,17 +209,17 @@ class Modes(Result, columns=("centres", "bandwidths", "rms")):
 
 
 def _root_mean_square(x: FloatArray) -> float:
-    """Divide by the largest value first: squares of very small or large values leave the range of numbers."""
+    """Return the rms, scaled by the largest value so that squares of very small or large values stay in range."""
     largest = float(np.abs(x).max(initial=0.0))
     return largest * float(np.sqrt(np.mean(np.square(x / largest)))) if largest > 0.0 else 0.0
 
 
 SAMPLES_PER_MODE = 4
-"""A signal of n samples has n lines; with fewer than four each, a mode has no bandwidth to speak of."""
+"""Minimum samples per mode: n samples have n lines, and with fewer than four lines a mode has no real bandwidth."""
 
 
 def check_supported(x: FloatArray, n_modes: int) -> None:
-    """Raise where `x` is constant or too short for `n_modes`."""
+    """Raise InputError if `x` is constant or too short for `n_modes`."""
     if len(x) < SAMPLES_PER_MODE * n_modes:
         raise InputError(
             f"n_modes is {n_modes} for {len(x)} samples",
@@ -241,7 +243,7 @@ def half_gain_distance(penalty: float, sampling_rate: float) -> float:
 def mode_notes(
     centres: FloatArray, sampling_rate: float, settings: VmdSettings, *, converged: bool, axis: ModeAxis
 ) -> tuple[str, ...]:
-    """Return what the reader must know: no convergence, modes that share the same lines."""
+    """Return warnings for the reader: no convergence, modes that share the same lines."""
     notes = []
     if not converged:
         notes.append(
@@ -264,7 +266,7 @@ def mode_notes(
 def first_centres(
     settings: VmdSettings, sampling_rate: float, spectrum: FloatArray, rng: np.random.Generator | None
 ) -> FloatArray:
-    """Return the first centre frequencies in cycles per sample, (n_modes,).
+    """Return the initial centre frequencies in cycles per sample, (n_modes,).
 
     "uniform": k/2K; "random": one draw per mode, uniform over the logarithm from 1/n to 1/2, ascending; "peaks": see
     `peak_centres`. `spectrum` is the signal's cosine transform, (n_samples,).
@@ -282,7 +284,7 @@ def first_centres(
         if rng is None:
             remedy = "give numpy's default_rng(seed)"
             raise InputError('start is "random" without a generator', where="rng", remedy=remedy)
-        n = len(spectrum) - len(spectrum) % 2  # as the reference program, which drops the last sample of an odd length
+        n = len(spectrum) - len(spectrum) % 2  # like the reference program, which drops an odd last sample
         low = np.log(1.0 / n)
         centres = np.sort(np.exp(low + (np.log(0.5) - low) * rng.random(K)))
     elif settings.start == "peaks":
@@ -299,19 +301,19 @@ def first_centres(
 
 
 def peak_centres(power: FloatArray, penalty: float, n_modes: int) -> FloatArray:
-    """Return where modes of this penalty would each take most energy, one after the other, (n_modes,), ascending.
+    """Return the centres at which modes of this penalty, one after another, take most energy, (n_modes,), ascending.
 
-    Each takes the place ω of largest Σ P(q) g²(q - ω), g = 1/(1 + penalty (q - ω)²), goes to the centroid of that
+    Each mode starts at the ω of largest Σ P(q) g²(q - ω), g = 1/(1 + penalty (q - ω)²), moves to the centroid of that
     product, and leaves P (1 - g)² to the next.
 
     Parameters
     ----------
     power : array, (n_lines,)
-        Power at q/2n cycles per sample.
+        Power at line q, i.e. q/2n cycles per sample.
     penalty : float
     n_modes : int
     """
-    # Cells of a quarter of the half-gain distance, but no more of them than lines or than a matrix can have.
+    # Cells of a quarter of the half-gain distance, but at most as many as there are lines or a matrix can hold.
     n_cells = int(min(len(power), max(16, np.ceil(2.0 * np.sqrt(penalty))), 2000))
     edges = np.arange(n_cells) * len(power) // n_cells
     frequency = np.arange(len(power)) * (0.5 / len(power))
@@ -322,7 +324,7 @@ def peak_centres(power: FloatArray, penalty: float, n_modes: int) -> FloatArray:
     centres = np.zeros(n_modes)
     for k in range(n_modes):
         best = middle[int(np.argmax(_gain(middle[:, None] - middle, penalty) ** 2 @ remaining))]
-        for _ in range(3):  # the centroid moves the filter, which moves the centroid: a few steps settle it
+        for _ in range(3):  # the centroid moves the filter, which moves the centroid: a few steps converge
             taken = remaining * _gain(place - best, penalty) ** 2
             best = float(taken @ place / taken.sum()) if taken.sum() > 0.0 else best
         centres[k] = best
@@ -335,12 +337,12 @@ def _gain(distance: FloatArray, penalty: float) -> FloatArray:
 
 
 RELATIVE_TOLERANCE = 1e-9
-"""Of the signal's energy; where `VmdSettings.tolerance` is None."""
+"""Tolerance relative to the signal's energy, used if `VmdSettings.tolerance` is None."""
 _MUCH_MEMORY = 2**23
 
 
 def modes_of_whole(signal: UniformSignal, settings: VmdSettings, rng: np.random.Generator | None) -> Modes:
-    """Return the modes of a signal, all of it at once; see `vmd`."""
+    """Return the modes of a signal, decomposed as a whole; see `vmd`."""
     x, fs = signal.values, float(signal.rate)
     check_supported(x, settings.n_modes)
     solution = _solve(x.astype(np.float64), fs, settings, rng)
@@ -383,13 +385,13 @@ class _Solution:
     converged: bool
 
     def waveforms(self) -> FloatArray:
-        """Transform each mode back; even lengths get the reference programs' line at half the sampling rate."""
+        """Transform each mode back to time; even lengths include the reference programs' line at Nyquist."""
         from scipy.fft import idct
 
         n = self.lines.shape[1]
-        # The line's phase there is (-1)^m cos(π/2n) after the mirrored part is cut off; odd lengths have none.
+        # That line's phase is (-1)^m cos(π/2n) after the mirrored part is cut off; odd lengths have no such line.
         alternating = self.lines[:, -1:] * (np.cos(0.5 * np.pi / n) / (2 * n) if n % 2 == 0 else 0.0)
-        # In place is quicker, but the result then holds on to the solver's memory, which only matters for long signals.
+        # In place is faster, but the result then keeps the solver's memory alive, which matters only for long signals.
         u: FloatArray = idct(self.lines, type=2, axis=1, overwrite_x=self.lines.nbytes < _MUCH_MEMORY, workers=1)
         u[:, ::2] -= alternating
         u[:, 1::2] += alternating
@@ -398,7 +400,7 @@ class _Solution:
 
 @dataclass(frozen=True)
 class _VmdpySolution(_Solution):
-    """The same from vmdpy, which returns waveforms; `lines` is their cosine transform."""
+    """Solution from vmdpy, which returns waveforms; `lines` is their cosine transform."""
 
     u: FloatArray
 
@@ -408,9 +410,9 @@ class _VmdpySolution(_Solution):
 
 
 def _solve(x: FloatArray, fs: float, settings: VmdSettings, rng: np.random.Generator | None) -> _Solution:
-    # A power of two leaves every digit as it is, and keeps squares of very small or large values in range.
+    # Scaling by a power of two changes no digit, and keeps squares of very small or large values in range.
     scale = 2.0 ** np.floor(np.log2(np.abs(x).max()))
-    energy = float(np.square(x / scale).sum())  # no scalar product: threads of BLAS cost more than they save here
+    energy = float(np.square(x / scale).sum())  # not a dot product: BLAS threads cost more than they save here
     threshold = RELATIVE_TOLERANCE * energy
     if settings.tolerance is not None:  # the reference program starts its sum of changes at one unit in the last place
         threshold = float((settings.tolerance - np.spacing(1.0)) / scale / scale)
@@ -444,17 +446,17 @@ def _solve_here(
     start = first_centres(settings, fs, spectrum, rng)
     history = np.empty((settings.max_iterations + 1, settings.n_modes))
     grid, space = _grid(len(x)), working_space(settings.n_modes, len(x))
-    # Floats: whole numbers would have the kernel compiled once more.
+    # Floats: integers would make numba compile the kernel again.
     constants = (float(settings.penalty), float(settings.dual_step), settings.zero_mode)
     lines, n_done, change = iterate(spectrum, grid, space, start, *constants, threshold, len(history) - 1, history)
     lines *= scale
-    if not np.isfinite(history[n_done]).all():  # the centres after the last iteration, which no row returned shows
+    if not np.isfinite(history[n_done]).all():  # centres after the last iteration, not in the rows returned
         history[0] = np.nan
     return _Solution(lines, history[:n_done], change / energy, bool(change <= threshold))
 
 
 def _solve_with_vmdpy(x: FloatArray, scale: float, settings: VmdSettings, threshold: float) -> _Solution:
-    """Let vmdpy 0.2 do it; it drops the last sample of an odd length, so the signal is mirrored by one sample first."""
+    """Solve with vmdpy 0.2, which drops the last sample of an odd length, so the last sample is repeated first."""
     from scipy.fft import dct
 
     even = np.append(x, x[-1]) if len(x) % 2 else x
@@ -471,7 +473,7 @@ def _solve_with_vmdpy(x: FloatArray, scale: float, settings: VmdSettings, thresh
 def _grid(n: int) -> FloatArray:
     """Return the lines' frequencies q/2n in cycles per sample, (n,).
 
-    Rounded as in the reference programs: where the multiplier amplifies rounding, the last digit shows in the modes.
+    Rounded as in the reference programs: where the multiplier amplifies rounding, the last digit affects the modes.
     """
     return np.arange(n + 1, 2 * n + 1) / (2 * n) - 0.5 - 0.5 / n
 
@@ -490,33 +492,33 @@ def _bandwidths(solution: _Solution) -> FloatArray:
 
 # Iterations of variational mode decomposition in one real cosine spectrum.
 #
-# The signal f is mirrored at both ends, period 2n. The mirrored signal's spectrum at line q is a cosine transform C[q]
-# times a phase that depends on q alone; since every update multiplies by real gains and subtracts, all modes and the
-# multiplier keep that phase. Only their real factors on the n non-negative lines are computed.
+# The signal f is mirrored at both ends, with period 2n. The mirrored signal's spectrum at line q is a cosine transform
+# C[q] times a phase that depends on q alone; since every update only multiplies by real gains and subtracts, all modes
+# and the multiplier keep that phase. Only their real factors on the n non-negative lines are computed.
 #
-# Memory traffic decides the speed. Lines lie in blocks, all modes of a block together, and are updated in place.
+# Memory traffic limits the speed. Lines are stored in blocks, all modes of a block together, and updated in place.
 
 
 # Reordering sums lets the compiler use vector instructions; divisions stay exact.
 _REORDER = {"contract", "reassoc", "nsz"}
 _BLOCK = 512
-"""Lines per block: a block of a few modes stays in the processor's nearest cache."""
+"""Lines per block: a block of a few modes stays in the L1 cache."""
 _NEARLY = 4.0
-"""From this multiple of the tolerance on, the modes before an iteration are kept: it may be the last one."""
+"""Below this multiple of the tolerance, the modes before each iteration are kept, as it may be the last one."""
 
 
 def working_space(n_modes: int, n_lines: int) -> FloatArray:
-    """Return memory for `iterate`; numpy asks the system for large pages, which fresh memory is quicker in."""
+    """Return memory for `iterate`; numpy requests large pages, in which new memory is faster."""
     return np.empty((2, -(-n_lines // _BLOCK), n_modes, _BLOCK))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
 def iterate(C, grid, space, omega, alpha, tau, fixed_zero, tolerance, max_iterations, history):  # type: ignore[no-untyped-def]
-    """Iterate until the modes' energy changes by no more than `tolerance`.
+    """Iterate until the modes' squared change is at most `tolerance`.
 
-    Returns the modes' real spectra before the last iteration (see `vmd`), the number of iterations and
-    the last change of energy. Row m of `history` (max_iterations + 1, K) receives the centres after m iterations.
-    The spectra lie in `space`, which comes from `working_space`.
+    Returns the modes' real spectra before the last iteration (see `vmd`), the number of iterations and the last change.
+    Row m of `history` (max_iterations + 1, K) receives the centres after m iterations. The spectra are stored in
+    `space`, which comes from `working_space`.
     """
     n_limit = max_iterations
     modes, before = space[0], space[1]
@@ -534,14 +536,14 @@ def iterate(C, grid, space, omega, alpha, tau, fixed_zero, tolerance, max_iterat
             n_done += 1
         if kept:
             return _rows(before, len(C), modes), n_done, change
-        n_limit = n_done  # it stopped all of a sudden: once more, with the last iteration known
+        n_limit = n_done  # it stopped unexpectedly: repeat with the last iteration known
 
 
 @njit(cache=True, nogil=True, fastmath=_REORDER, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
 def _update(C, grid, modes, before, keep, dual, alpha, tau, fixed_zero, omega, omega_next):  # type: ignore[no-untyped-def]
-    """One iteration: û_k = (Ĉ - Σ_{i<k} û_i - Σ_{i>k} û_i(old) - λ/2) / (1 + α (ω - ω_k)²), ω_k = centroid of û_k².
+    """Iterate once: û_k = (Ĉ - Σ_{i<k} û_i - Σ_{i>k} û_i(old) - λ/2) / (1 + α (ω - ω_k)²), ω_k = centroid of û_k².
 
-    Returns Σ_k ‖û_k - û_k(old)‖² / 2n, which is the change of energy of the mirrored signal's positive lines.
+    Returns Σ_k ‖û_k - û_k(old)‖² / 2n, the squared change over the mirrored signal's positive lines.
     """
     n, K = len(C), modes.shape[1]
     energy, moment = np.zeros(K), np.zeros(K)
@@ -551,7 +553,7 @@ def _update(C, grid, modes, before, keep, dual, alpha, tau, fixed_zero, omega, o
         start = b * _BLOCK
         m = min(_BLOCK, n - start)
         frequency = grid[start : start + m]
-        if keep:  # element by element: assigning arrays takes seconds to compile, for the text of its error
+        if keep:  # element by element: array assignment takes seconds to compile, because of its error message
             for k in range(K):
                 for i in range(m):
                     before[b, k, i] = modes[b, k, i]
@@ -584,7 +586,7 @@ def _update(C, grid, modes, before, keep, dual, alpha, tau, fixed_zero, omega, o
 
 @njit(cache=True, nogil=True, fastmath=_REORDER, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
 def _remainder(C, modes, dual, rest):  # type: ignore[no-untyped-def]
-    """Ĉ - λ/2 - Σ_{i>0} û_i(old) of one block: what the first mode may take."""
+    """Compute Ĉ - λ/2 - Σ_{i>0} û_i(old) of one block: what is left for the first mode."""
     m = len(C)
     for i in range(m):
         rest[i] = C[i]
@@ -598,7 +600,7 @@ def _remainder(C, modes, dual, rest):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _rows(blocks, n, space):  # type: ignore[no-untyped-def]
-    """Lay the lines of each mode in one row, (K, n), in the memory of `space`: fresh memory costs time."""
+    """Copy the lines of each mode to one row, (K, n), in the memory of `space`, since new memory costs time."""
     rows = space.reshape(-1)[: blocks.shape[1] * n].reshape(blocks.shape[1], n)
     for b in range(blocks.shape[0]):
         start = b * _BLOCK
@@ -610,9 +612,9 @@ def _rows(blocks, n, space):  # type: ignore[no-untyped-def]
 
 
 def mode_spectra(modes: Modes) -> tuple[Spectrum, ...]:
-    """Return the amplitude spectrum (peak, Hann window) of each mode in its order, and of the residual last.
+    """Return the amplitude spectrum (peak, Hann window) of each mode, in order, and of the residual last.
 
-    Over frequency or order, as the modes are.
+    The spectra are over frequency or order, like the modes.
     """
     names = [*(f"mode {k + 1}" for k in range(modes.n_modes)), "residual"]
     spectra = (
@@ -623,14 +625,14 @@ def mode_spectra(modes: Modes) -> tuple[Spectrum, ...]:
 
 
 # --------------------
-# Signals of any length: the whole, or block by block, joined, with what the seams say.
+# Signals of any length: as a whole, or block by block with joined seams and notes on them.
 # --------------------
 
 IndexArray = NDArray[np.intp]
 
 N_PER_BLOCK = 2**18
 _LARGE_MISMATCH = 0.5
-"""Of a mode over a seam, from which on the reader is told."""
+"""Mismatch of a mode at a seam above which a note is given."""
 
 
 def vmd(
@@ -642,7 +644,7 @@ def vmd(
     n_per_block: int = N_PER_BLOCK,
     rng: np.random.Generator | None = None,
 ) -> Modes:
-    """Return the variational modes of a signal: each most compact around a centre frequency, together they fit it.
+    """Return the variational modes of a signal, each compact around a centre frequency and with a sum that fits it.
 
     min Σ_k α ‖∂_t [(δ + j/πt) * u_k] e^(-jω_k t)‖² + ‖f - Σ_k u_k‖², solved by alternating Wiener filters
     û_k = (f̂ - Σ_{i≠k} û_i - λ̂/2) / (1 + α (ω - ω_k)²) and centroids ω_k of |û_k|².
@@ -650,45 +652,45 @@ def vmd(
     Parameters
     ----------
     signal : Recording, AngleSignal, UniformSignal or array, (n_samples,)
-        Not constant; at least 4 samples per mode. Over angle, centres and bandwidths are orders: at variable speed an
-        order stays one narrow mode, where over time it would be smeared.
+        Not constant; at least 4 samples per mode. Over angle, centres and bandwidths are in orders: at variable speed,
+        an order remains one narrow mode, whereas over time it would be smeared.
     channel : str, float or None
-        None: the only channel there is. Of an array its sampling rate in Hz.
+        None: the only channel. For an array, its sampling rate in Hz.
     settings : VmdSettings or int
-        An int is the number of modes, with everything else as usual; `suggest_modes` finds it.
+        An int is the number of modes, with all other settings at their defaults; `suggest_modes` finds it.
     engine : str or None
-        "gearsig" or "vmdpy", in place of that of the settings.
+        "gearsig" or "vmdpy"; overrides the settings.
     n_per_block : int
-        A longer signal is taken block by block, see `modes_by_block`.
+        A longer signal is decomposed block by block, see `modes_by_block`.
     rng : numpy.random.Generator or None
-        Needed for `start="random"` only.
+        Needed only for `start="random"`.
 
     Returns
     -------
     Modes
-        In the signal's unit; computed in double precision whatever the input's. Of several blocks: centres are
-        c = Σ E_i c_i / Σ E_i, E_i a mode's energy in block i, and bandwidths √(Σ E_i (b_i² + (c_i - c)²) / Σ E_i), so
-        that how far a mode wanders counts as width; `n_iterations` is the sum, `last_change` is nan, and
-        `centre_history` has one row per block, then the centres. The notes say where a mode does not go on over a seam.
+        In the signal's unit; always computed in double precision. For several blocks, with E_i a mode's energy in
+        block i, centres are c = Σ E_i c_i / Σ E_i and bandwidths √(Σ E_i (b_i² + (c_i - c)²) / Σ E_i), so that drift of
+        a mode counts as width; `n_iterations` is the sum, `last_change` is nan, and `centre_history` has one row per
+        block, then the centres. The notes say where a mode does not continue across a seam.
 
     Raises
     ------
     InputError
-        On NaN, a constant, too few samples for the number of modes, start frequencies outside the spectrum.
+        On NaN, a constant, too few samples for the number of modes, or start frequencies outside the spectrum.
     RefusalError
-        If a mode stays empty: the signal does not hold that many.
+        If a mode stays empty: the signal does not contain that many.
 
     Notes
     -----
-    The signal is mirrored at both ends, by half its length in the reference programs; that length does not matter, as
-    mirroring makes the signal periodic. For even lengths the result is that of vmdpy 0.2 within rounding, with two of
-    its habits: it returns the modes before the last iteration, and it fills the line at half the sampling rate, where a
-    mirrored signal has nothing, with its neighbour's value (an alternating ±|û|/2n, mostly invisible). vmdpy drops
-    the last sample of an odd length; here all samples are kept, and the line at half the sampling rate is empty.
+    The signal is mirrored at both ends, by half its length in the reference programs; the length does not matter, as
+    mirroring makes the signal periodic. For even lengths the result equals that of vmdpy 0.2 within rounding, with two
+    of its peculiarities: it returns the modes before the last iteration, and it fills the line at half the sampling
+    rate, which is empty for a mirrored signal, with its neighbour's value (an alternating ±|û|/2n, mostly invisible).
+    vmdpy drops the last sample of an odd length; here all samples are kept, and that line stays empty.
 
-    Memory is 8 bytes per sample and mode, and about four times that of one block.
+    Memory is 8 bytes per sample and mode, plus about four times that for one block.
 
-    When not to use it: for broad-band impulses, whose spectrum is no narrow band (take their envelope, or a band);
+    When not to use it: for broad-band impulses, whose spectrum is not a narrow band (use their envelope, or a band);
     for speeds that vary by more than a mode's width (resample over angle first).
 
     References
@@ -745,10 +747,10 @@ class ModeSegment:
     centres, bandwidths : arrays, (n_modes,)
         Of the block it comes from, in Hz or orders.
     n_fade : int
-        Samples at its begin over which it was faded in from the block before: the seam.
+        Length of the seam: samples at its start over which it is cross-faded with the previous block.
     seam_mismatch : array, (n_modes,)
-        Root mean square difference of both blocks' modes over the seam, over the modes' own there; 0 for the first
-        segment. Small: the mode goes on. Near 1 or above: it is another one from here on.
+        Rms difference of the two blocks' modes over the common samples, relative to the rms of the modes there; 0 for
+        the first segment. If small, the mode continues; if near 1 or above, it is a different mode from here on.
     converged : bool
     n_iterations : int
     """
@@ -772,29 +774,29 @@ def modes_by_block(
     overlap: float = 0.125,
     rng: np.random.Generator | None = None,
 ) -> Iterator[ModeSegment]:
-    """Yield the modes of a long signal segment by segment; memory is bounded by the block.
+    """Yield the modes of a long signal segment by segment; the block length bounds the memory.
 
-    Equal blocks cover the signal. Each starts from the centres of the one before, its modes are paired with that one's
-    by least squares over the common samples, and a raised cosine in the middle of those fades one block into the next.
-    Segments join without gap; the residual is the signal less their sum.
+    Equal blocks cover the signal. Each starts from the centres of the previous block, its modes are paired with the
+    previous ones by least squares over the common samples, and a raised cosine in the middle of these cross-fades the
+    two blocks. Segments join without gaps; the residual is the signal minus their sum.
 
     Parameters
     ----------
     signal, channel, settings, rng
         As in `vmd`; an array may be a memory map.
     n_per_block : int
-        A shorter signal is one block. A block's modes may follow slow changes of frequency.
+        Block length; a shorter signal is one block. Modes may follow slow changes of frequency from block to block.
     overlap : float
-        Length of the seam over that of the block, above 0 to 1/3.
+        Length of the seam relative to the block, 0.001 to 1/3.
 
     Raises
     ------
     InputError
-        As in `vmd`, of each block: a constant segment as long as a block has no modes.
+        As in `vmd`, for each block: a block over which the signal is constant has no modes.
 
     Notes
     -----
-    The blocks' modes differ from the whole signal's: each block has centres of its own.
+    The result differs from that of the whole signal, as each block has its own centres.
     """
     x = uniform(signal, channel)
     n_block = min(count(n_per_block, "n_per_block", minimum=64), x.n_samples)
@@ -804,7 +806,7 @@ def modes_by_block(
 
 
 def _starts(n: int, n_block: int, n_fade: int) -> list[int]:
-    """Return the blocks' first samples: equal steps, the last block ends with the signal."""
+    """Return the first sample of each block, at equal steps; the last block ends with the signal."""
     n_blocks = 1 + -(-(n - n_block) // (n_block - n_fade))
     return [round(i * (n - n_block) / max(1, n_blocks - 1)) for i in range(n_blocks)]
 
@@ -830,7 +832,7 @@ def _segments(
             seam = slice(done - start, done - start + n_fade)
             waveforms[:, seam] = rising * waveforms[:, seam] + (1.0 - rising) * previous[:, seam]
         stop = start + n_block
-        # The seam lies in the middle of what two blocks share; from its begin on, the samples are the next block's.
+        # The seam lies in the middle of the overlap; from its start on, samples belong to the next segment.
         end = stop if following is None else (following + stop - n_fade) // 2
         yield ModeSegment(
             start=done,
@@ -848,10 +850,10 @@ def _segments(
 
 
 def _continuation(previous: FloatArray, waveforms: FloatArray, *, fixed_first: bool) -> IndexArray:
-    """Return the order of modes in which they continue the previous block's over the common samples."""
+    """Return the order of modes in which they best continue the previous block's modes over the common samples."""
     from scipy.optimize import linear_sum_assignment
 
-    # The least sum of squared differences is the largest sum of products: the squares alone do not hang on the order.
+    # The minimum sum of squared differences is the maximum sum of products, as the squares do not depend on the order.
     likeness = previous @ waveforms[:, : previous.shape[1]].T
     if fixed_first:
         likeness[0, 1:] = likeness[1:, 0] = -np.inf
@@ -865,7 +867,7 @@ def _mismatch(previous: FloatArray, following: FloatArray) -> FloatArray:
 
 
 def _together(segments: list[ModeSegment], energies: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return centres and bandwidths of all blocks, weighted by each mode's energy there."""
+    """Return centres and bandwidths over all blocks, (n_modes,) each, weighted by each mode's energy per block."""
     share = energies / np.maximum(energies.sum(axis=0), np.finfo(np.float64).tiny)
     centres_of = np.array([segment.centres for segment in segments])
     widths = np.array([segment.bandwidths for segment in segments])
@@ -879,7 +881,7 @@ def _seam_notes(segments: list[ModeSegment], x: UniformSignal) -> tuple[str, ...
     for k in np.flatnonzero(mismatch.max(axis=0) > _LARGE_MISMATCH):
         i = int(np.argmax(mismatch[:, k]))
         notes.append(
-            f"Mode {k + 1} does not go on over the seam at {segments[i].start / x.rate:.4g} {x.length_unit}: both "
-            f"blocks' modes differ there by {percent(mismatch[i, k])} of their own."
+            f"Mode {k + 1} does not continue across the seam at {segments[i].start / x.rate:.4g} {x.length_unit}: both "
+            f"blocks' modes differ there by {percent(mismatch[i, k])} of their rms."
         )
     return tuple(notes)

@@ -18,7 +18,7 @@ MEDIAN_OF_NORMAL = 0.674489750196081743
 
 
 def noise_level(d: FloatArray) -> float:
-    """Return the standard deviation of Gaussian noise in which few coefficients hold signal: median|d| / 0.6745.
+    """Return the standard deviation of Gaussian noise if few coefficients contain signal: median|d| / 0.6745.
 
     Source: D. L. Donoho and I. M. Johnstone, "Ideal spatial adaptation by wavelet shrinkage", 1994.
     """
@@ -26,14 +26,14 @@ def noise_level(d: FloatArray) -> float:
 
 
 def universal(sigma: float, n: int) -> float:
-    """Return σ √(2 ln n), which the largest of n noise values hardly exceeds (same source)."""
+    """Return the universal threshold σ √(2 ln n), which the largest of n noise values hardly exceeds (same source)."""
     return float(sigma * np.sqrt(2.0 * np.log(max(n, 2))))
 
 
 def sure(d: FloatArray, sigma: float, n: int) -> float:
-    """Return the threshold of least estimated risk of the soft rule, or the universal one on a sparse level.
+    """Return the threshold with minimum estimated risk for the soft rule, or the universal one for a sparse level.
 
-    SURE(T) = m - 2 #{|d| ≤ T} + Σ min(|d|, T)² in units of σ, least at one of the |d|. A level counts as sparse if
+    SURE(T) = m - 2 #{|d| ≤ T} + Σ min(|d|, T)² in units of σ, with its minimum at one of the |d|. A level is sparse if
     Σ d²/m - 1 ≤ (log₂ m)^(3/2) / √m. `n` is the signal's length.
 
     Source: D. L. Donoho and I. M. Johnstone, "Adapting to unknown smoothness via wavelet shrinkage", 1995.
@@ -50,7 +50,7 @@ def sure(d: FloatArray, sigma: float, n: int) -> float:
 
 
 def bayes(d: FloatArray, sigma: float) -> float:
-    """Return σ²/σ_signal, σ_signal² = mean d² - σ²; inf where there is no signal.
+    """Return the threshold σ²/σ_signal, with σ_signal² = mean d² - σ²; inf if there is no signal.
 
     Source: S. G. Chang, B. Yu and M. Vetterli, "Adaptive wavelet thresholding for image denoising and compression",
     2000.
@@ -62,7 +62,7 @@ def bayes(d: FloatArray, sigma: float) -> float:
 def apply(d: FloatArray, threshold: float, rule: str) -> FloatArray:
     """Return thresholded coefficients.
 
-    soft: sign(d) (|d| - T); hard: d; garrote: d - T²/d; each for |d| > T, else 0.
+    For |d| > T: soft: sign(d) (|d| - T); hard: d; garrote: d - T²/d. Otherwise 0.
 
     Source of the garrote: H.-Y. Gao, "Wavelet shrinkage denoising using the non-negative garrote", 1998.
     """
@@ -80,8 +80,8 @@ ThresholdName = Literal["universal", "sure", "bayes"]
 RuleName = Literal["soft", "hard", "garrote"]
 NoiseScope = Literal["quietest level", "finest level", "each level"]
 MIN_QUIET, QUIETER = 500, 0.8
-"""Coefficients that a level must have to count as the quietest, and by which factor it must be quieter than the finest:
-of white noise, levels of so many scatter by 5 %."""
+"""Minimum coefficients of the quietest level, and factor below the finest level's noise: for white noise, levels of
+this size scatter by 5 %."""
 
 
 @dataclass(frozen=True)
@@ -91,25 +91,25 @@ class DenoiseSettings:
     Parameters
     ----------
     threshold : str
-        "universal": σ √(2 ln n), next to no noise is left; "sure": least estimated risk of each level, universal where
-        the level is sparse; "bayes": σ²/σ_signal of each level, keeps most.
+        "universal": σ √(2 ln n), leaves almost no noise; "sure": minimum estimated risk for each level, universal for
+        sparse levels; "bayes": σ²/σ_signal for each level, keeps most.
     rule : str
         "soft": kept coefficients d shrink by the threshold T; "hard": they stay; "garrote": d - T²/d, in between.
         "sure" and "bayes" are derived for "soft".
     wavelet : str
-        An orthogonal or biorthogonal wavelet of PyWavelets; "sym8" is smooth and nearly symmetric. For biorthogonal
-        wavelets the noise of the coefficients is only nearly what the thresholds assume.
+        An orthogonal or biorthogonal wavelet of PyWavelets; "sym8" is smooth and nearly symmetric. With biorthogonal
+        wavelets, the thresholds' assumptions on the noise hold only approximately.
     n_levels : int or None
-        None: as many as leave eight filter lengths on the coarsest one.
+        None: as many as leave eight filter lengths of samples on the coarsest level.
     noise : str
-        Where the noise's standard deviation is estimated. White noise has the same on all levels, a signal only adds to
-        it: "quietest level" takes the least of all, "finest level" the usual one, which must be free of signal: that of
-        gears, whose mesh harmonics reach up to it, seldom is. "each level" by itself is for coloured noise; steady
-        tones that fill a level are then taken for noise.
+        Level at which the noise's standard deviation is estimated. White noise has the same on all levels, and a signal
+        only adds to it: "quietest level" takes the minimum of all; "finest level", the usual choice, must be free of
+        signal, which it seldom is for gears, whose mesh harmonics extend into it. "each level", separately, is for
+        coloured noise; steady tones that fill a level are then mistaken for noise.
     noise_rms : float or None
-        The noise's standard deviation where it is known, in the signal's unit; white. None: estimated.
+        The standard deviation of white noise in the signal's unit, if known. None: estimated.
     n_shifts : int
-        Cycle spinning: the mean over this many shifts of the signal against the wavelet grid. 1: none. More than
+        Cycle spinning: mean over this many shifts of the signal relative to the wavelet grid. 1: none. More than
         2^n_levels shifts repeat.
 
     Raises
@@ -144,21 +144,21 @@ class DenoiseSettings:
 
 @dataclass(frozen=True)
 class DenoisedLevel:
-    """What happened on one level of the wavelet transform.
+    """Result of denoising on one level of the wavelet transform.
 
     Parameters
     ----------
     level : int
         1 is the finest.
     band_hz : (float, float)
-        Sampling rate / 2^(level + 1) to twice that: where the level's coefficients come from, roughly.
+        Approximate band of the level: sampling rate / 2^(level + 1) to twice that.
     noise : float
         Estimated standard deviation of the noise in its coefficients, in the signal's unit.
     threshold : float
-        In the signal's unit; inf where all coefficients were set to zero. Mean over the shifts, as `noise` and
+        In the signal's unit; inf if all coefficients were set to zero. Mean over the shifts, like `noise` and
         `kept_share`.
     kept_share : float
-        Share of its coefficients that are not zero afterwards.
+        Share of the coefficients that are not zero afterwards.
     """
 
     level: int
@@ -170,18 +170,18 @@ class DenoisedLevel:
 
 @dataclass(frozen=True)
 class Denoised(Result, columns=("time_s", "values", "removed")):
-    """A signal without its noise.
+    """A denoised signal.
 
     Parameters
     ----------
     values : array, (n_samples,)
     removed : array, (n_samples,)
-        Signal less `values`: look at it for what should not have gone.
+        Signal minus `values`: inspect it for content that should have been kept.
     sampling_rate_hz : float
     levels : tuple of DenoisedLevel
-        Finest first. What is coarser than the last one is kept as it is.
+        Finest first. Content coarser than the last level is kept unchanged.
     noise_rms : float
-        Estimated standard deviation of the noise, in the signal's unit; of the finest level, where each has its own.
+        Estimated standard deviation of the noise, in the signal's unit; that of the finest level if they differ.
     settings : DenoiseSettings
         With the number of levels used.
     unit, source : str
@@ -206,7 +206,7 @@ class Denoised(Result, columns=("time_s", "values", "removed")):
 
     @property
     def removed_share(self) -> float:
-        """Energy of the removed part over that of the signal without its mean."""
+        """Energy of the removed part relative to that of the signal without its mean."""
         signal = self.values + self.removed
         energy = float(np.sum(np.square(signal - signal.mean())))
         return float(np.sum(np.square(self.removed))) / energy if energy > 0.0 else 0.0
@@ -220,18 +220,18 @@ def denoise(
     unit: str = "",
     source: str = "",
 ) -> Denoised:
-    """Take Gaussian noise out of a signal by thresholding its wavelet coefficients.
+    """Remove Gaussian noise from a signal by thresholding its wavelet coefficients.
 
-    x = s + σ z; the discrete wavelet transform leaves white noise white and gathers transients and smooth parts in few
-    large coefficients. Coefficients below a threshold are set to zero, the others kept or shrunk, and the transform is
-    inverted. With cycle spinning the signal is shifted against the wavelet grid, and the results are averaged.
+    x = s + σ z; the discrete wavelet transform leaves white noise white and concentrates transients and smooth parts in
+    a few large coefficients. Coefficients below a threshold are set to zero, the others kept or shrunk, and the
+    transform is inverted. With cycle spinning, results for several shifts of the signal are averaged.
 
     Parameters
     ----------
     signal : Recording or array, (n_samples,)
-        Finite, not constant, at least as long as the wavelet's filter. Any length.
+        Finite, not constant, of any length from that of the wavelet's filter on.
     channel_or_rate_hz : str or float
-        The channel of a recording; of an array its sampling rate in Hz.
+        A recording's channel, or an array's sampling rate in Hz.
     settings : DenoiseSettings or None
         None: universal threshold, soft, "sym8", eight shifts.
     unit, source : str
@@ -245,14 +245,14 @@ def denoise(
     Raises
     ------
     InputError
-        On NaN, a constant, or a signal too short for the level.
+        On NaN, a constant, or a signal too short for the number of levels.
 
     Notes
     -----
-    The signal is continued at both ends by its mirror image. Memory is about six times the signal's.
+    The signal is continued at both ends by its mirror image. Memory is about six times that of the signal.
 
-    When not to use it: for steady tones in noise (a spectrum or a synchronous average gathers them far better), and
-    before indicators that measure impulsiveness, which thresholds raise by themselves.
+    When not to use it: for steady tones in noise (a spectrum or a synchronous average extracts them far better), and
+    before indicators of impulsiveness, which thresholding itself raises.
 
     References
     ----------
@@ -266,7 +266,7 @@ def denoise(
     n_levels, n_shifts = settings.n_levels or 1, settings.n_shifts
     totals = np.zeros((n_levels, 3))  # noise, threshold, kept share
     clean = np.zeros_like(x)
-    # A power of two leaves every digit as it is, and keeps squares of very small or large values in range.
+    # Scaling by a power of two changes no digit, and keeps squares of very small or large values in range.
     scale = 2.0 ** np.floor(np.log2(np.abs(x).max()))
     noise_rms = None if settings.noise_rms is None else settings.noise_rms / scale
     for shift in range(n_shifts):
@@ -289,7 +289,7 @@ def _with_levels(settings: DenoiseSettings, x: FloatArray) -> DenoiseSettings:
             where="values",
             remedy="check the channel: there is no noise to remove",
         )
-    # The deepest level at which a coefficient still sees the signal more than its continuation.
+    # The deepest level at which coefficients still depend more on the signal than on its continuation.
     deepest = pywt.dwt_max_level(len(x), settings.wavelet)
     if deepest < (settings.n_levels or 1):
         raise InputError(
@@ -299,14 +299,14 @@ def _with_levels(settings: DenoiseSettings, x: FloatArray) -> DenoiseSettings:
         )
     if settings.n_levels is not None:
         return settings
-    # The level that has eight filter lengths of coefficients: its noise can still be told.
+    # The level with eight filter lengths of coefficients: its noise can still be estimated.
     return replace(settings, n_levels=max(1, pywt.dwt_max_level(len(x) // 8, settings.wavelet)))
 
 
 def _denoise_shifted(
     x: FloatArray, shift: int, n_levels: int, noise_rms: float | None, settings: DenoiseSettings
 ) -> tuple[FloatArray, FloatArray]:
-    """Denoise with the signal moved by `shift` samples; also return noise, threshold and kept share of each level."""
+    """Return the signal denoised at a shift of `shift` samples, and (noise, threshold, kept share) of each level."""
     import pywt
 
     n = len(x)

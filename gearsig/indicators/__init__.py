@@ -1,4 +1,4 @@
-"""Condition indicators."""
+"""Condition indicators of raw signals, synchronous averages and spectra."""
 
 from gearsig.indicators._gear import (
     energy_operator,

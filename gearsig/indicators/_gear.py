@@ -1,6 +1,6 @@
 """Gear indicators of a synchronous average and its parts.
 
-Which signal goes in, here and in MATLAB's `gearConditionMetrics`:
+Input signals, here and in MATLAB's `gearConditionMetrics`:
 
 ============================ ====================================== =====================================
 indicator                    signal here                            MATLAB
@@ -14,10 +14,11 @@ NA4                          residual, with history                 residual, wi
 NA4*, NB4, NB4*              residual; envelope of band-passed mesh not there
 ============================ ====================================== =====================================
 
-The last column follows MATLAB's documentation of what the function takes (average, difference, regular and residual,
-earlier records for NA4) and returns (RMS, kurtosis and crest factor of the average, FM4, M6A, M8A, FM0, energy ratio,
-NA4); it has not been run side by side. `tsaregular` and `tsadifference` leave a chosen number of shaft harmonics and
-sidebands on the regular side, `gearsig.orders` says which it takes: values agree only where these agree.
+The last column follows MATLAB's documentation of the function's inputs (average, difference, regular and residual,
+earlier records for NA4) and outputs (RMS, kurtosis and crest factor of the average, FM4, M6A, M8A, FM0, energy ratio,
+NA4); the two have not been run side by side. `tsaregular` and `tsadifference` leave a selectable number of shaft
+harmonics and sidebands in the regular signal; `gearsig.orders.separate` states its own choice. Values agree only if
+these choices agree.
 """
 
 from __future__ import annotations
@@ -35,25 +36,25 @@ from gearsig.orders import SynchronousAverage, check_average
 
 # Gear indicators that compare with earlier records of the same gear.
 #
-# Each is a fourth moment of the present record over a variance that includes earlier records, so that it goes on rising
-# when damage grows, where a plain kurtosis would fall back. With no history NA4 is the kurtosis of the residual.
+# Each is a fourth moment of the present record over a variance that includes earlier records, so that it keeps rising
+# as damage grows, whereas a plain kurtosis would fall again. Without history, NA4 is the kurtosis of the residual.
 
 
 def na4(residual: SynchronousAverage, history: Sequence[SynchronousAverage] = (), *, star: bool = False) -> float:
-    """Fourth moment of the residual over the square of its variance averaged over all records so far.
+    """Return the fourth moment of the residual over the squared mean variance of all records so far, NA4.
 
-    NA4 = (1/N) Σ_i (r_i - r̄)⁴ / ( (1/M) Σ_{j=1}^{M} v_j )², v_j the variance of record j's residual, M counting the
-    present record. NA4* has the mean variance of healthy records only.
+    NA4 = (1/N) Σ_i (r_i - r̄)⁴ / ( (1/M) Σ_{j=1}^{M} v_j )², with v_j the variance of record j's residual and M
+    including the present record. NA4* uses the mean variance of healthy records only.
 
     Parameters
     ----------
     residual : SynchronousAverage
-        The present record's, of kind "residual".
+        Residual of the present record, of kind "residual".
     history : sequence of SynchronousAverage
-        Residuals of earlier records, same gear, speed and load, in any order; for NA4* those in good condition, which
-        `healthy_records` finds.
+        Residuals of earlier records of the same gear at the same speed and load, in any order; for NA4* only healthy
+        ones, which `healthy_records` finds.
     star : bool
-        Whether to return NA4*, which counts the history alone.
+        Whether to return NA4*, for which only the history counts.
 
     Returns
     -------
@@ -68,8 +69,8 @@ def na4(residual: SynchronousAverage, history: Sequence[SynchronousAverage] = ()
 
     Notes
     -----
-    MATLAB's `gearConditionMetrics` takes the residual as well, and the records up to the present one as the history;
-    it has no NA4*. Not for records at different load: the variance then follows the load.
+    MATLAB's `gearConditionMetrics` also takes the residual, with the records up to the present one as history; it has
+    no NA4*. Not for records at different loads, as the variance then follows the load.
 
     References
     ----------
@@ -84,18 +85,18 @@ def na4(residual: SynchronousAverage, history: Sequence[SynchronousAverage] = ()
 def nb4(
     band_passed_mesh: SynchronousAverage, history: Sequence[SynchronousAverage] = (), *, star: bool = False
 ) -> float:
-    """NA4 of the envelope of the mesh band: fluctuating load on few teeth shows in the envelope.
+    """Return NA4 of the envelope of the mesh band, which shows a fluctuating load on few teeth.
 
-    s(θ) = |b(θ) + i H[b](θ)|, b the average band-passed about a mesh harmonic and H the Hilbert transform.
+    s(θ) = |b(θ) + i H[b](θ)|, with b the average band-passed around a mesh harmonic and H the Hilbert transform.
 
     Parameters
     ----------
     band_passed_mesh : SynchronousAverage
         Of kind "band-passed mesh".
     history : sequence of SynchronousAverage
-        The same of earlier records; for NB4* of healthy ones.
+        The same for earlier records; for NB4* only healthy ones.
     star : bool
-        Whether to return NB4*, which is to NB4 as NA4* is to NA4.
+        Whether to return NB4*, for which only the history counts.
 
     Returns
     -------
@@ -118,17 +119,17 @@ def _trend_value(x: FloatArray, history: Sequence[FloatArray], *, star: bool) ->
 
 
 def healthy_records(variances: Sequence[float], *, z: float = 2.33, n_first: int = 5) -> tuple[bool, ...]:
-    """Which records count as healthy for NA4* and NB4*: those before the variance leaves its own scatter.
+    """Return which records count as healthy for NA4* and NB4*: those before the variance leaves its scatter.
 
-    The first `n_first` records are taken as healthy. From then on, the first record whose variance exceeds mean + z s
-    of those before it ends the healthy ones: later records never change the reference again.
+    The first `n_first` records are assumed healthy. After them, the first record whose variance exceeds mean + z s of
+    all previous ones ends the healthy period: later records never change the reference again.
 
     Parameters
     ----------
     variances : sequence of float
         Of the residuals (or envelopes), oldest first.
     z : float
-        Standard deviations; 2.33 is exceeded by 1 % of normal records.
+        Number of standard deviations; 1 % of normal records exceed 2.33.
     n_first : int
         At least 2.
 
@@ -143,7 +144,7 @@ def healthy_records(variances: Sequence[float], *, z: float = 2.33, n_first: int
 
     Notes
     -----
-    The test is on the single record; Decker et al. (1994) fix the reference by a test of the same kind.
+    Each record is tested by itself; Decker et al. (1994) fix the reference by a test of the same kind.
     """
     if n_first < 2:
         raise InputError(f"n_first is {n_first}", allowed="at least 2")
@@ -155,7 +156,7 @@ def healthy_records(variances: Sequence[float], *, z: float = 2.33, n_first: int
 
 
 def envelope(values: FloatArray) -> FloatArray:
-    """|x + i H[x]| of a periodic signal, by its Fourier lines."""
+    """Return the envelope |x + i H[x]| of a periodic signal, (n_angles,), computed from its Fourier lines."""
     from scipy.signal import hilbert
 
     return np.abs(hilbert(values))
@@ -177,9 +178,9 @@ def _check(present: SynchronousAverage, history: Sequence[SynchronousAverage], *
 
 
 def fm0(average: SynchronousAverage, teeth: int, *, n_harmonics: int | None = None) -> float:
-    """Zero-order figure of merit: peak-to-peak over the sum of the mesh harmonics' amplitudes.
+    """Return the zero-order figure of merit FM0, the peak-to-peak value over the sum of mesh harmonic amplitudes.
 
-    FM0 = (max x - min x) / Σ_h A(h z). Rises with heavy wear (mesh harmonics fall) and with breakage (peaks rise).
+    FM0 = (max x - min x) / Σ_h A(h z). It rises with heavy wear (mesh harmonics fall) and with breakage (peaks rise).
 
     Parameters
     ----------
@@ -188,12 +189,12 @@ def fm0(average: SynchronousAverage, teeth: int, *, n_harmonics: int | None = No
     teeth : int
         z.
     n_harmonics : int or None
-        None: all below the average's highest order.
+        None: all up to the average's highest order.
 
     Returns
     -------
     float
-        2 for one unmodulated mesh harmonic; nan where no mesh harmonic is in the average.
+        2 for one unmodulated mesh harmonic; nan if no mesh harmonic is in the average.
 
     References
     ----------
@@ -207,17 +208,17 @@ def fm0(average: SynchronousAverage, teeth: int, *, n_harmonics: int | None = No
 
 
 def fm4(difference: SynchronousAverage, *, size: float | None = None) -> float:
-    """Kurtosis of the difference signal; 3 for Gaussian noise, more where one or two teeth stand out.
+    """Return the kurtosis of the difference signal, FM4: 3 for Gaussian noise, more if one or two teeth stand out.
 
-    FM4 = N Σ (d - d̄)⁴ / (Σ (d - d̄)²)². `size`: magnitude against which the difference may be mere rounding.
-    Falls back when damage spreads to many teeth. Source: Stewart 1977, see `fm0`.
+    FM4 = N Σ (d - d̄)⁴ / (Σ (d - d̄)²)². `size` is the magnitude relative to which a difference may be only rounding.
+    FM4 falls again when damage spreads to many teeth. Source: Stewart 1977, see `fm0`.
     """
     _check(difference, (), "difference")
     return standardised_moment(difference.values, 4, size)
 
 
 def m6a(difference: SynchronousAverage, *, size: float | None = None) -> float:
-    """Sixth standardised moment of the difference signal; 15 for Gaussian noise.
+    """Return the sixth standardised moment of the difference signal, M6A: 15 for Gaussian noise.
 
     M6A = N² Σ (d - d̄)⁶ / (Σ (d - d̄)²)³. More sensitive to single peaks than FM4.
 
@@ -229,7 +230,7 @@ def m6a(difference: SynchronousAverage, *, size: float | None = None) -> float:
 
 
 def m8a(difference: SynchronousAverage, *, size: float | None = None) -> float:
-    """Eighth standardised moment of the difference signal; 105 for Gaussian noise.
+    """Return the eighth standardised moment of the difference signal, M8A: 105 for Gaussian noise.
 
     M8A = N³ Σ (d - d̄)⁸ / (Σ (d - d̄)²)⁴. Source: Martin 1989, see `m6a`.
     """
@@ -238,9 +239,10 @@ def m8a(difference: SynchronousAverage, *, size: float | None = None) -> float:
 
 
 def energy_ratio(difference: SynchronousAverage, regular: SynchronousAverage | FloatArray) -> float:
-    """Standard deviation of the difference over that of the regular signal; rises with wear on many teeth.
+    """Return the standard deviation of the difference over that of the regular signal; rises with wear on many teeth.
 
-    ER = σ(d)/σ(y), y the regular signal, or average minus difference as an array. nan for a constant regular signal.
+    ER = σ(d)/σ(y), with y the regular signal, or average minus difference as an array. nan for a constant regular
+    signal.
 
     Source: N. S. Swansson, "Application of vibration signal analysis techniques to signal monitoring", 1980.
     """
@@ -255,14 +257,14 @@ def energy_ratio(difference: SynchronousAverage, regular: SynchronousAverage | F
 
 
 def energy_operator(signal: SynchronousAverage) -> float:
-    """Kurtosis of the Teager–Kaiser energy ψ_i = x_i² - x_{i-1} x_{i+1}, the ends joined.
+    """Return the kurtosis of the Teager–Kaiser energy ψ_i = x_i² - x_{i-1} x_{i+1}, with the ends joined.
 
-    ψ is about (amplitude × frequency)²: a tooth that changes amplitude or phase locally makes a peak in it.
+    ψ is about (amplitude × frequency)²: a tooth that changes amplitude or phase locally causes a peak in it.
 
     Parameters
     ----------
     signal : SynchronousAverage
-        The average, as reviews have it, or the band-passed mesh, for which ψ has its meaning of one modulated carrier.
+        The average, as in reviews, or the band-passed mesh, for which ψ is that of a single modulated carrier.
 
     Returns
     -------
@@ -271,7 +273,7 @@ def energy_operator(signal: SynchronousAverage) -> float:
 
     Notes
     -----
-    Emphasises high orders, with the number of samples per revolution: compare only at the same one.
+    It emphasises high orders, depending on the number of samples per revolution: compare only at the same number.
 
     References
     ----------
@@ -286,10 +288,10 @@ def energy_operator(signal: SynchronousAverage) -> float:
 
 
 def sideband_index(average: SynchronousAverage, teeth: int) -> float:
-    """Mean amplitude of the two first-order sidebands of the mesh fundamental, in the average's unit.
+    """Return the mean amplitude of the two first-order sidebands of the mesh fundamental, in the average's unit.
 
-    SI = (A(z-1) + A(z+1))/2; A m/2 for a carrier A with amplitude modulation m at shaft order 1. nan where a sideband
-    lies above the average's highest order.
+    SI = (A(z-1) + A(z+1))/2; A m/2 for a carrier A with amplitude modulation m at shaft order 1. nan if a sideband lies
+    above the average's highest order.
 
     Source: P. Večeř, M. Kreidl, R. Šmíd, "Condition indicators for gearbox condition monitoring systems", Acta
     Polytechnica 45 (2005).
@@ -300,7 +302,7 @@ def sideband_index(average: SynchronousAverage, teeth: int) -> float:
 
 
 def sideband_level_factor(average: SynchronousAverage, teeth: int) -> float:
-    """Sum of the two first-order sidebands of the mesh fundamental over the average's standard deviation.
+    """Return the sum of the two first-order sidebands of the mesh fundamental over the average's standard deviation.
 
     SLF = (A(z-1) + A(z+1))/σ(x). Source: Večeř et al. 2005, see `sideband_index`.
     """
@@ -327,16 +329,16 @@ def gear_indicators(
     Parameters
     ----------
     average, residual, difference, band_passed_mesh : SynchronousAverage
-        Of those kinds, as `gearsig.orders` makes them. Without the mesh band its indicators are left out.
+        Of these kinds, from `gearsig.orders`. Without the mesh band, its indicators are left out.
     teeth : int
     gear : str
         "pair/shaft".
     history : sequence of SynchronousAverage
         Residuals of earlier records, oldest first, for NA4 and NA4*.
     band_history : sequence of SynchronousAverage
-        Their mesh bands, for NB4 and NB4*.
+        Mesh bands of the same records, for NB4 and NB4*.
     healthy : sequence of bool or None
-        Which records of `history` (and `band_history`) were in good condition; None: all, see `healthy_records`.
+        Which records of `history` (and `band_history`) were healthy; None: all, see `healthy_records`.
 
     Returns
     -------
@@ -346,7 +348,7 @@ def gear_indicators(
     Raises
     ------
     InputError
-        On signals of another kind, or of different gears.
+        On signals of another kind, or of a different shaft, channel or length.
     """
     check_average(average)
     for part in (residual, difference, *([band_passed_mesh] if band_passed_mesh else [])):
@@ -358,10 +360,10 @@ def gear_indicators(
             )
     size = float(np.abs(average.values).max())
     regular = average.values - difference.values
-    rounding = "undefined: the difference holds nothing but rounding"
+    rounding = "undefined: the difference contains only rounding"
     no_modulation = "undefined: the signal is one unmodulated order"
     beyond = f"undefined: order {teeth + 1} lies above the average's highest order {average.highest_order:g}"
-    # Name, value, unit, signal, and the note: of an undefined value alone where it begins so.
+    # Name, value, unit, signal, and note; a note that begins with "undefined" applies only to an undefined value.
     rows: list[_Row] = [
         ("FM0", fm0(average, teeth), "", _AVERAGE, "undefined: no mesh harmonic is in the average"),
         ("FM4", fm4(difference, size=size), "", "difference", rounding),
@@ -396,7 +398,7 @@ def _trend(
     size: float,
 ) -> list[_Row]:
     if is_constant(signal.values, size):
-        empty = f"undefined: {signal.kind} holds nothing but rounding"
+        empty = f"undefined: {signal.kind} contains only rounding"
         return [(n, float("nan"), "", signal.kind, empty) for n in (name, f"{name}*")]
     good = list(history) if healthy is None else [h for h, ok in zip(history, healthy, strict=True) if ok]
     alone = f"trend indicator without earlier records: the kurtosis of {of}"
@@ -417,7 +419,7 @@ def _note(value: float, note: str) -> str:
 
 
 def line_amplitude(average: SynchronousAverage, order: int) -> float:
-    """Peak amplitude of a whole order of the average; nan above its highest order."""
+    """Return the peak amplitude of a whole order of the average; nan above its highest order."""
     n = len(average.values)
     if order > average.highest_order or 2 * order > n:
         return float("nan")
@@ -427,7 +429,7 @@ def line_amplitude(average: SynchronousAverage, order: int) -> float:
 
 
 def mesh_amplitudes(average: SynchronousAverage, teeth: int, n_harmonics: int | None = None) -> FloatArray:
-    """Peak amplitudes of the mesh harmonics that the average holds, (n_harmonics,)."""
+    """Return the peak amplitudes of the mesh harmonics in the average, (n_harmonics,)."""
     check_average(average)
     z = count(teeth, "teeth", minimum=3)
     highest = min(average.highest_order, len(average.values) / 2)

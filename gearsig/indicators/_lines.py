@@ -17,26 +17,26 @@ from gearsig.rig import Bearing, GearPair, Rig
 from gearsig.spectra import Spectrum
 
 LineSource = Spectrum | SynchronousAverage
-"""Where an order's amplitude can be read: an order spectrum, or the lines of an average."""
+"""Source from which an order's amplitude can be read: an order spectrum, or the lines of an average."""
 
 _PEAK_PER = {"amplitude peak": 1.0, "amplitude rms": sqrt(2.0)}
 
 
 @dataclass(frozen=True)
 class MeasuredLine:
-    """One order as it was found.
+    """The line found for an order.
 
     Parameters
     ----------
     order : float
-        Where the largest line was; the order asked for in an average.
+        Order of the largest line; in an average, the requested order.
     amplitude : float
-        Peak amplitude; nan where `note` says why.
+        Peak amplitude; if nan, `note` says why.
     largest : float
-        Height of the largest line itself, to be compared with a floor of single lines; up to the window's scalloping
-        (Hann: 1.4 dB) below `amplitude`.
+        Height of the largest line itself, for comparison with a floor of single lines; up to the window's scalloping
+        loss (Hann: 1.4 dB) below `amplitude`.
     n_lines : int
-        Lines among which the largest was taken.
+        Number of lines among which the largest was taken.
     note : str
     """
 
@@ -48,17 +48,17 @@ class MeasuredLine:
 
     @property
     def place(self) -> str:
-        """The order in words."""
+        """Text of the order."""
         return order_text(self.order)
 
 
 def order_text(order: float) -> str:
-    """Return an order in words, by which an indicator is known again: where it is expected, not where it was found."""
+    """Return the text of an order; that of the expected order, not of the one found, identifies an indicator."""
     return f"order {order:.5g}"
 
 
 def over_orders(spectrum: Spectrum, speed_rev_per_s: float) -> Spectrum:
-    """Return a spectrum over frequency as one over the orders of a shaft at constant speed, order = frequency/speed.
+    """Convert a spectrum over frequency to orders of a shaft at constant speed, order = frequency/speed.
 
     Parameters
     ----------
@@ -76,23 +76,23 @@ def over_orders(spectrum: Spectrum, speed_rev_per_s: float) -> Spectrum:
 
 
 def find_line(source: LineSource, order: float, *, search_orders: float = 0.0) -> MeasuredLine:
-    """Return the peak amplitude of the largest line within `search_orders` of `order`.
+    """Return the largest line within `search_orders` of `order`, with its peak amplitude.
 
-    In a spectrum a sine spreads over the window's main lobe; A = √(Σ A_i² Δ/B) over the lobe, Δ the line spacing and B
-    the noise bandwidth, is its amplitude wherever it lies between the lines.
+    In a spectrum, a sine spreads over the window's main lobe; A = √(Σ A_i² Δ/B) over the lobe, with Δ the line spacing
+    and B the noise bandwidth, is its amplitude at any position between the lines.
 
     Parameters
     ----------
     source : Spectrum or SynchronousAverage
     order : float
-        Cycles per revolution of the shaft that the source's orders are counted on.
+        Cycles per revolution of the shaft to which the source's orders refer.
     search_orders : float
-        Half width of the search; in an average the order must be whole and is not searched.
+        Half width of the search; in an average the order must be whole, and there is no search.
 
     Raises
     ------
     InputError
-        On a spectrum of power or of quefrencies, or over frequency: see `over_orders`.
+        On a power spectrum, a cepstrum, or a spectrum over frequency (see `over_orders`).
     """
     if isinstance(source, SynchronousAverage):
         return _line_of_average(source, order)
@@ -120,31 +120,31 @@ def _line_of_average(average: SynchronousAverage, order: float) -> MeasuredLine:
 
 
 def floor_near(source: Spectrum, order: float, half_width_orders: float, *, leave_out_orders: float) -> float:
-    """Median peak amplitude of the lines around an order, the order's own surroundings left out; nan below 8 lines."""
+    """Return the median peak amplitude of the lines around an order, without those next to it; nan below 8 lines."""
     distance = np.abs(source.positions - order)
     lobe = lobe_lines(source) * source.resolution
-    # Lines at zero hold the mean of the signal, or what is left of it.
+    # Lines near zero contain the mean of the signal, or its remainder.
     near = (distance <= half_width_orders) & (distance > max(leave_out_orders, lobe)) & (source.positions > lobe)
     return float(np.median(source.values[near])) * _to_peak(source) if np.count_nonzero(near) >= 8 else float("nan")
 
 
 def noise_reaches(n_lines: int, probability: float = 0.05) -> float:
-    """Ratio to the median that the largest of `n_lines` lines of noise exceeds with `probability`.
+    """Return the ratio to the median that the largest of `n_lines` noise lines exceeds with `probability`.
 
-    Lines of noise have Rayleigh amplitudes: P(a > x m) = 2^(-x²), m the median. Neighbouring lines of a window share
-    noise and averaged spectra scatter less, so that the true probability is lower.
+    Noise lines have Rayleigh amplitudes: P(a > x m) = 2^(-x²), with m the median. Neighbouring lines share noise
+    because of the window, and averaged spectra scatter less, so the true probability is lower.
     """
     each = 1 - exp(log(1 - probability) / max(n_lines, 1))
     return sqrt(-log(each) / log(2))
 
 
 def lobe_lines(source: Spectrum) -> int:
-    """Half width of the window's main lobe in lines, from its noise bandwidth: 2 for Hann, 5 for flat-top."""
+    """Return the half width of the main lobe in lines, from the noise bandwidth: 2 for Hann, 5 for flat top."""
     return max(2, ceil(1.3 * source.noise_bandwidth / source.resolution))
 
 
 def _to_peak(source: Spectrum) -> float:
-    """Factor from the spectrum's scaling to peak amplitudes; refuses what holds no amplitudes of orders."""
+    """Return the factor from the spectrum's scaling to peak amplitudes; raise unless it holds amplitudes of orders."""
     if source.scaling not in _PEAK_PER:
         remedy = "compute it with an amplitude scaling"
         raise InputError(f"the spectrum is scaled as {source.scaling!r}", allowed=", ".join(_PEAK_PER), remedy=remedy)
@@ -159,7 +159,7 @@ def _ratio_db(value: float, reference: float) -> float:
 
 
 def _origin(source: LineSource, channel: str) -> tuple[str, str]:
-    """Channel and kind of signal that an indicator is computed on."""
+    """Return the channel and the kind of signal on which an indicator is computed."""
     if isinstance(source, SynchronousAverage):
         return channel or source.channel, "synchronous average"
     return channel, f"{source.axis} spectrum"
@@ -175,20 +175,20 @@ def mesh_indicators(
     n_harmonics: int = 3,
     n_sidebands: int = 2,
 ) -> tuple[Indicator, ...]:
-    """Return levels of a pair's mesh harmonics, sidebands per shaft, and sideband-to-carrier ratios.
+    """Return the levels of a pair's mesh harmonics, its sidebands per shaft, and sideband-to-carrier ratios.
 
     A carrier A with amplitude modulation m cos and phase modulation b sin (small b) has first-order sidebands
-    A |m - h b|/2 (lower) and A |m + h b|/2 (upper): equal for either alone, unequal for both. The ratio is that of
-    their mean to the carrier, 20 lg.
+    A |m - h b|/2 (lower) and A |m + h b|/2 (upper): equal for either alone, unequal for both. The ratio is 20 lg of
+    their mean over the carrier.
 
     Parameters
     ----------
     source : Spectrum or SynchronousAverage
-        An average holds only sidebands of its own shaft; those of the other shaft are left out.
+        An average contains only sidebands of its own shaft; those of the other shaft are left out.
     rig : Rig
     pair : GearPair
     shaft : str
-        Shaft that the source's orders are counted on; default: the source's own, else the rig's reference shaft.
+        Shaft to which the source's orders refer; default: the source's shaft, else the rig's reference shaft.
     channel : str
         Default: the average's.
     n_harmonics, n_sidebands : int
@@ -196,8 +196,8 @@ def mesh_indicators(
     Returns
     -------
     tuple of Indicator
-        "mesh level h×", "sideband level h× − k" and "h× + k", "sideband ratio h×" in dB. nan with a note where an order
-        is not in the source, or a spectrum does not resolve the sidebands.
+        "mesh level h×", "sideband level h× − k" and "h× + k", "sideband ratio h×" in dB. nan with a note if an order is
+        not in the source, or a spectrum does not resolve the sidebands.
 
     Raises
     ------
@@ -254,7 +254,7 @@ def _sidebands(
 def shaft_indicators(
     source: LineSource, shaft: str, *, shaft_ratio: float = 1.0, channel: str = "", n_harmonics: int = 3
 ) -> tuple[Indicator, ...]:
-    """Return the amplitudes at 1×, 2×, … of a shaft: unbalance (1×), misalignment (2×), looseness and others (3×).
+    """Return the peak amplitudes at 1×, 2×, … of a shaft: unbalance (1×), misalignment (2×), looseness etc. (3×).
 
     Parameters
     ----------
@@ -269,7 +269,7 @@ def shaft_indicators(
     Returns
     -------
     tuple of Indicator
-        nan with a note where an order is not in the source.
+        nan with a note if an order is not in the source.
     """
     positive(shaft_ratio, "shaft_ratio")
     channel, on = _origin(source, channel)
@@ -293,7 +293,7 @@ def shaft_indicators(
 
 
 def defect_orders(bearing: Bearing) -> dict[str, float]:
-    """Orders at which a defect impacts, per revolution of the bearing's shaft: BPFO, BPFI, 2×BSF, FTF.
+    """Return the orders of the impacts from a defect, per revolution of the bearing's shaft: BPFO, BPFI, 2×BSF, FTF.
 
     A rolling element's defect strikes both races in one spin, hence twice the BSF.
     """
@@ -312,10 +312,11 @@ def bearing_indicators(
     slip_fraction: float = 0.015,
     band: str = "",
 ) -> tuple[Indicator, ...]:
-    """Return the envelope levels at a bearing's orders and their harmonics, and how far they stand above the floor.
+    """Return the envelope levels at a bearing's orders and their harmonics, and their heights above the floor.
 
-    The level is the largest line's within the slip; the floor the median of the lines within half the order on either
-    side. Noise alone reaches `noise_reaches(n_lines)` over it in one search of twenty, 6 to 11 dB.
+    The level is that of the largest line within the slip; the floor is the median of the lines within half the order,
+    at most two orders, on either side. In one search of twenty, noise alone exceeds it by `noise_reaches(n_lines)`, 6
+    to 11 dB.
 
     Parameters
     ----------
@@ -323,24 +324,24 @@ def bearing_indicators(
         Amplitude-scaled, over order.
     bearing : Bearing
     shaft_ratio : float
-        Revolutions of the bearing's shaft per revolution of the shaft that the spectrum counts on.
+        Revolutions of the bearing's shaft per revolution of the shaft to which the spectrum's orders refer.
     channel : str
     n_harmonics : int
     slip_fraction : float
-        Half width of the search over the order, 0 to 0.1: rolling elements slip by one or two per cent.
+        Half width of the search relative to the order, 0 to 0.1: rolling elements slip by one or two per cent.
     band : str
-        The demodulated band, for the record.
+        The demodulated band, stored with the indicators.
 
     Returns
     -------
     tuple of Indicator
-        "BPFO envelope level h×" and "BPFO over floor h×" (dB) for each order name. `gear` is empty, `shaft` the
-        bearing's; the note names the order found.
+        "BPFO envelope level h×" and "BPFO over floor h×" (dB) for each order name. `gear` is empty, `shaft` is the
+        bearing's; the note states the order found.
 
     Raises
     ------
     RefusalError
-        If neither geometry nor orders of the bearing are known.
+        If neither the geometry nor the orders of the bearing are known.
 
     References
     ----------
@@ -371,7 +372,7 @@ def _envelope_levels(
     line = find_line(spectrum, order, search_orders=slip * order)
     where = line.note or f"{line.place}, expected {order:.5g}"
     yield f"{name} envelope level {harmonic}×", line.amplitude, spectrum.unit, where
-    # Half the order to either side keeps the neighbouring harmonic out; harmonics of high orders need not see as far.
+    # Half the order on either side excludes the neighbouring harmonic; high orders do not need such a wide range.
     over = _ratio_db(line.largest, floor_near(spectrum, order, 0.5 * min(order, 4.0), leave_out_orders=slip * order))
     chance = f"noise alone reaches {_ratio_db(noise_reaches(line.n_lines), 1.0):.1f} dB in 1 of 20"
     if isnan(over):

@@ -1,9 +1,8 @@
-"""Indicators of a whole signal: of its amplitude distribution, and overall figures of a band.
+"""Indicators of a whole signal: of its amplitude distribution, and overall values of a band.
 
-Those of the amplitude distribution are taken from the raw signal: all use the values as they are, mean included, except
-skewness and kurtosis. Averages have divisor N. MATLAB's
-`rms`, `peak2rms`, `kurtosis` and `skewness` (with their default flags) agree; `gearConditionMetrics` applies RMS,
-Kurtosis and CrestFactor to the synchronous average instead of the raw signal.
+Indicators of the amplitude distribution are computed from the raw signal, including the mean except for skewness and
+kurtosis. Averages have divisor N. MATLAB's `rms`, `peak2rms`, `kurtosis` and `skewness` (with their default flags)
+agree; `gearConditionMetrics` applies RMS, Kurtosis and CrestFactor to the synchronous average, not the raw signal.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ from gearsig.spectra import Spectrum, amplitude_spectrum, array_rate_hz, joined_
 
 
 def checked_values(values: FloatArray, name: str = "values") -> FloatArray:
-    """Return the values as float64, one-dimensional, finite and at least one."""
+    """Return the values as a one-dimensional, finite float64 array of at least one value."""
     x = frozen_array(values, name, ndim=1)
     if x.size == 0:
         raise InputError(f"{name} is empty", allowed="at least one value")
@@ -37,18 +36,18 @@ def checked_values(values: FloatArray, name: str = "values") -> FloatArray:
 
 
 CONSTANT = 1e-12
-"""Scatter over size that is only rounding."""
+"""Scatter relative to size below which it is only rounding."""
 
 
 def is_constant(x: FloatArray, size: float | None = None) -> bool:
-    """Whether the scatter of `x` is only rounding against `size` (default: its own largest magnitude)."""
+    """Whether the scatter of `x` is only rounding relative to `size` (default: its largest magnitude)."""
     scale = float(np.abs(x).max()) if size is None else size
     largest_deviation = float(np.abs(x - x.mean()).max())
     return largest_deviation <= CONSTANT * scale
 
 
 def standardised_moment(x: FloatArray, order: int, size: float | None = None) -> float:
-    """N^(k/2 - 1) Σ (x - x̄)^k / (Σ (x - x̄)²)^(k/2), i.e. the k-th central moment over σ^k, σ² with divisor N.
+    """Return the k-th central moment over σ^k, N^(k/2 - 1) Σ (x - x̄)^k / (Σ (x - x̄)²)^(k/2); σ² has divisor N.
 
     nan for a constant; see `is_constant` for `size`.
     """
@@ -57,28 +56,28 @@ def standardised_moment(x: FloatArray, order: int, size: float | None = None) ->
     d = x - x.mean()
     d = d / np.abs(d).max()  # powers up to 8 neither overflow nor vanish
     square = d * d
-    power = square ** (order // 2)  # the power of an array by a whole number above two takes thirty times as long
+    power = square ** (order // 2)  # an array to an integer power above two takes thirty times as long
     return float(np.mean(power * d if order % 2 else power) / np.mean(square) ** (order / 2))
 
 
 @dataclass(frozen=True)
 class Indicator(Result):
-    """A number that says something about the condition, with everything needed to read it.
+    """A condition indicator with everything needed to interpret it.
 
     Parameters
     ----------
     name : str
         As in the literature: "FM4", "sideband index", …
     value : float
-        nan where it is undefined (e.g. the kurtosis of a constant); `note` says why.
+        nan if it is undefined (e.g. the kurtosis of a constant); `note` says why.
     unit : str
-        Empty for a dimensionless one.
+        Empty if dimensionless.
     channel : str
     computed_on : str
         "raw", "synchronous average", "residual", "difference", "regular", "band-passed mesh", "envelope", …
     shaft, gear, bearing : str
-        What it belongs to: a shaft's name, a gear as "pair/shaft", a bearing's name; all empty where it belongs to the
-        channel.
+        The component it belongs to: a shaft's name, a gear as "pair/shaft", a bearing's name; all empty if it belongs
+        to the channel.
     band : str
         Frequency or order band, with unit.
     note : str
@@ -97,7 +96,7 @@ class Indicator(Result):
 
 
 class Amplitudes:
-    """What the indicators of a signal's amplitudes share: the signal is looked at twice, whatever is asked.
+    """Shared statistics for the indicators of a signal's amplitudes, computed once for all of them.
 
     Parameters
     ----------
@@ -112,7 +111,7 @@ class Amplitudes:
 
     @cached_property
     def means(self) -> tuple[float, ...]:
-        """Means of |y|, √|y|, y² and d², d³, d⁴: y over the peak, d from the mean, over the largest deviation.
+        """Means of |y|, √|y|, y² and d², d³, d⁴, with y = x/peak and d the deviation from the mean over its maximum.
 
         Powers of values up to one neither overflow nor vanish.
         """
@@ -143,60 +142,60 @@ def _of(values: Values) -> Amplitudes:
 
 
 def rms(values: Values) -> float:
-    """√(mean x²), in the signal's unit."""
+    """Return √(mean x²), in the signal's unit."""
     a = _of(values)
     return a.peak * sqrt(a.means[2])
 
 
 def peak(values: Values) -> float:
-    """Largest |x|, in the signal's unit."""
+    """Return the largest |x|, in the signal's unit."""
     return _of(values).peak
 
 
 def peak_to_peak(values: Values) -> float:
-    """Largest minus smallest value, in the signal's unit."""
+    """Return the largest minus the smallest value, in the signal's unit."""
     return _of(values).peak_to_peak
 
 
 def crest_factor(values: Values) -> float:
-    """Peak over rms; √2 for a sine, nan for zeros."""
+    """Return peak over rms; √2 for a sine, nan for zeros."""
     a = _of(values)
     return _ratio(a.peak, rms(a))
 
 
 def skewness(values: Values) -> float:
-    """Third central moment over σ³; 0 for a symmetric distribution, nan for a constant."""
+    """Return the third central moment over σ³; 0 for a symmetric distribution, nan for a constant."""
     return _standardised(_of(values), 3)
 
 
 def kurtosis(values: Values) -> float:
-    """Fourth central moment over σ⁴; 3 for a normal distribution, 1.5 for a sine, nan for a constant.
+    """Return the fourth central moment over σ⁴; 3 for a normal distribution, 1.5 for a sine, nan for a constant.
 
-    Not the excess kurtosis, which is this minus 3.
+    The excess kurtosis is this minus 3.
     """
     return _standardised(_of(values), 4)
 
 
 def shape_factor(values: Values) -> float:
-    """Rms over mean |x|; π/(2√2) for a sine, nan for zeros."""
+    """Return rms over mean |x|; π/(2√2) for a sine, nan for zeros."""
     a = _of(values)
     return _ratio(rms(a), a.peak * a.means[0])
 
 
 def impulse_factor(values: Values) -> float:
-    """Peak over mean |x|; π/2 for a sine, nan for zeros."""
+    """Return peak over mean |x|; π/2 for a sine, nan for zeros."""
     a = _of(values)
     return _ratio(a.peak, a.peak * a.means[0])
 
 
 def clearance_factor(values: Values) -> float:
-    """Peak over (mean √|x|)²; nan for zeros. Also called margin factor."""
+    """Return peak over (mean √|x|)², also called margin factor; nan for zeros."""
     a = _of(values)
     return _ratio(a.peak, a.peak * a.means[1] ** 2)
 
 
 def _standardised(a: Amplitudes, order: int) -> float:
-    """Return the central moment of order 3 or 4 over that power of σ."""
+    """Return the central moment of order 3 or 4 over the same power of σ."""
     if a.largest_deviation <= CONSTANT * a.peak:
         return float("nan")
     return a.means[order + 1] / float(a.means[3] ** (order / 2))
@@ -216,14 +215,14 @@ def time_indicators(
     ----------
     signal : Recording or array, (n_samples,)
     channel : str or float
-        Of a recording: which to read. Of an array: its sampling rate in Hz, as other methods take it, though no
-        indicator depends on it; or what the indicators are labelled with.
+        A recording's channel. For an array: its sampling rate in Hz, as in other methods, though no indicator depends
+        on it; or a channel name for the indicators.
     unit : str
-        In which a recording's channel is read; else what the indicators are labelled with.
+        Unit stated in the indicators; default: that of the recording's channel.
     computed_on : str
         "raw", "synchronous average", …
     shaft : str
-        Where the values are a shaft's average.
+        The shaft, if the values are its average.
 
     Returns
     -------
@@ -249,14 +248,14 @@ def time_indicators(
         signal = signal.values(channel)
     amplitudes = Amplitudes(signal)
     offset = ""
-    if abs(amplitudes.mean) > 0.1 * rms(amplitudes):  # then they say more about the offset than about the vibration
+    if abs(amplitudes.mean) > 0.1 * rms(amplitudes):  # the indicators then reflect the offset rather than the vibration
         offset = f"the signal has a mean of {amplitudes.mean:.4g} {unit}, which is included".replace(" ,", ",")
     indicators = []
     for name, function in _OF_AMPLITUDE.items():
         value = function(amplitudes)
         note = "undefined: the signal is constant" if np.isnan(value) else offset
         if name in ("skewness", "kurtosis") and note == offset:
-            note = ""  # of central moments
+            note = ""  # central moments exclude the mean
         own_unit = unit if function in (rms, peak, peak_to_peak) else ""
         indicators.append(Indicator(name, value, own_unit, channel, computed_on, shaft, note=note))
     return tuple(indicators)
@@ -280,24 +279,24 @@ def _ratio(numerator: float, denominator: float) -> float:
 
 
 # --------------------
-# Overall figures of a band: the velocity that maintenance goes by, and the impulsiveness up high.
+# Overall values of a band: the velocity used in maintenance, and the impulsiveness at high frequencies.
 # --------------------
 
 
 VELOCITY_BAND_HZ = (10.0, 1000.0)
-"""Of the overall velocity, ISO 20816-1."""
+"""Band of the overall velocity, ISO 20816-1."""
 
 SLOW_RPM, SLOW_LOWEST_HZ = 600.0, 2.0
-"""Below that speed the band begins at 2 Hz, ISO 20816-3."""
+"""Below this speed the band begins at 2 Hz, ISO 20816-3."""
 
 MIN_PERIODS = 10
-"""Of the lowest frequency, in a recording: its lines are then apart from the mean."""
+"""Minimum periods of the lowest frequency in a recording, so that its lines are separate from the mean."""
 
 SAME_FREQUENCY = 0.005
-"""Relative: a speed that is stated, and one that wanders a little."""
+"""Relative tolerance of frequencies, for a speed that is only stated or varies slightly."""
 
 HIGH_BAND_HZ = (1000.0, 10_000.0)
-"""Where bearings ring, and gears and unbalance hardly do."""
+"""Band in which bearings ring, but gears and unbalance hardly contribute."""
 
 ZONE_LIMITS_MM_PER_S = {
     (1, "rigid"): (2.3, 4.5, 7.1),
@@ -318,7 +317,7 @@ def overall_velocity_mm_per_s(
 ) -> float:
     r"""Return the rms vibration velocity in a band, in mm/s.
 
-    From the Hann-windowed amplitude spectrum A of acceleration, of noise bandwidth 1.5 lines:
+    It follows from the Hann-windowed amplitude spectrum A of acceleration, with a noise bandwidth of 1.5 lines:
 
     .. math:: v_{rms}^2 = \frac{1}{1.5} \sum_{f \in band} \frac{A(f)^2}{2 (2 \pi f)^2}
 
@@ -331,7 +330,7 @@ def overall_velocity_mm_per_s(
         An acceleration or a velocity in a known unit.
     band_hz : (float, float)
     spectrum : Spectrum or None
-        The values' `amplitude_spectrum`, where it is known.
+        The `amplitude_spectrum` of the values, if known.
 
     Raises
     ------
@@ -363,7 +362,7 @@ def overall_velocity_mm_per_s(
 def velocity_shares(
     spectrum: Spectrum, channel: Channel, places_hz: Mapping[str, Sequence[float]], band_hz: tuple[float, float]
 ) -> dict[str, float]:
-    """Return which share of the squared overall velocity lies about the frequencies of each place, 0 to 1.
+    """Return the share of the squared overall velocity, 0 to 1, around the frequencies of each source.
 
     Parameters
     ----------
@@ -371,7 +370,7 @@ def velocity_shares(
         `amplitude_spectrum` of an acceleration or a velocity.
     channel : Channel
     places_hz : mapping
-        Name of a place → its frequencies; a line counts within two lines of them, or half a per cent.
+        Name of a source → its frequencies; lines within two lines or half a per cent of them count.
     band_hz : (float, float)
         See `velocity_band_hz`.
     """
@@ -387,7 +386,7 @@ def velocity_shares(
 
 
 def _velocity_lines(spectrum: Spectrum, quantity: str, band_hz: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
-    """Return the frequencies within a band, and what each line adds to the mean square velocity."""
+    """Return the frequencies within a band, and each line's contribution to the mean square velocity."""
     inside = slice(*np.searchsorted(spectrum.positions, (band_hz[0], np.nextafter(band_hz[1], np.inf))))
     amplitude, hertz = spectrum.values[inside], spectrum.positions[inside]
     if quantity == "acceleration":
@@ -396,20 +395,21 @@ def _velocity_lines(spectrum: Spectrum, quantity: str, band_hz: tuple[float, flo
 
 
 def velocity_band_hz(speed_rpm: float | None) -> tuple[float, float]:
-    """Return the band of the overall velocity, wider for slow machines (ISO 20816-3)."""
+    """Return the band of the overall velocity in Hz, which is wider for slow machines (ISO 20816-3)."""
     low_hz, high_hz = VELOCITY_BAND_HZ
     return (SLOW_LOWEST_HZ if speed_rpm is not None and speed_rpm < SLOW_RPM else low_hz), high_hz
 
 
 def vibration_zone(velocity_mm_per_s: float, group: int, mounting: str) -> str:
-    """Return the zone of ISO 20816-3 of an overall velocity.
+    """Return the zone of ISO 20816-3 for an overall velocity.
 
-    A: as of new machines; B: fit for unlimited service; C: not fit for long service; D: severe enough to damage.
+    A: typical of new machines; B: acceptable for unrestricted long-term operation; C: not acceptable for long-term
+    operation; D: severe enough to cause damage.
 
     Parameters
     ----------
     velocity_mm_per_s : float
-        Rms from 10 to 1000 Hz, at a bearing housing, at steady speed; the largest of all places.
+        Rms from 10 to 1000 Hz on a bearing housing at steady speed; the maximum of all measuring points.
     group : int
         1 or 2, see `gearsig.rig.MachineSize`.
     mounting : str
@@ -418,7 +418,7 @@ def vibration_zone(velocity_mm_per_s: float, group: int, mounting: str) -> str:
     Raises
     ------
     InputError
-        On a group or mounting that the standard does not have.
+        On a group or mounting that is not in the standard.
 
     Examples
     --------
@@ -440,7 +440,7 @@ def overall_indicators(
     spectrum: Spectrum | None = None,
     transform: NDArray[np.complexfloating] | None = None,
 ) -> Iterator[Indicator]:
-    """Yield the overall velocity, and rms, crest factor and kurtosis of the high frequencies, where they are defined.
+    """Yield the overall velocity, and rms, crest factor and kurtosis of the high frequencies, if they are defined.
 
     Parameters
     ----------
@@ -448,11 +448,11 @@ def overall_indicators(
     sampling_rate_hz : float
     channel : Channel
     speed_rpm : float or None
-        Slow machines have a band from 2 Hz.
+        For slow machines, the velocity band begins at 2 Hz.
     spectrum : Spectrum or None
-        The values' `amplitude_spectrum`, where it is known.
+        The `amplitude_spectrum` of the values, if known.
     transform : array or None
-        The `rfft` of `gearsig.spectra.with_continuous_ends` of the values, where it is known.
+        The `rfft` of `gearsig.spectra.with_continuous_ends` of the values, if known.
     """
     from scipy.fft import irfft, rfft
 

@@ -1,4 +1,4 @@
-"""Time-synchronous averages: mean revolution, standard error, lines; of several shafts at once."""
+"""Time-synchronous averages: mean revolution, standard error and lines; separation of several shafts."""
 
 from __future__ import annotations
 
@@ -32,21 +32,21 @@ LineScaling = Literal["amplitude peak", "amplitude rms"]
 
 @dataclass(frozen=True)
 class SynchronousAverage(Result, columns=("revolutions", "values", "standard_error")):
-    """One mean revolution of a shaft, and how well the revolutions agree on it.
+    """The mean revolution of a shaft and its standard error.
 
     Parameters
     ----------
     values : array, (n_angles,)
         Mean over the revolutions, at equal steps of angle from 0 to just under 1 revolution.
     standard_error : array, (n_angles,)
-        Standard deviation of the mean, from the scatter of the revolutions (jackknife over blocks of revolutions).
+        Standard error of the mean, from the scatter of the revolutions (jackknife over blocks of revolutions).
     n_revolutions : int
         Revolutions averaged.
     shaft, channel, unit : str
     kind : str
-        "average"; "residual": without mesh harmonics; "difference": without mesh harmonics and their first-order
-        sidebands; "regular": what was taken out for the difference; "band-passed mesh": lines around a mesh harmonic;
-        "change": what differs from a reference's average.
+        "average"; "residual": without mesh harmonics; "difference": without mesh harmonics and their sidebands, see
+        `separate`; "regular": what was removed for the difference; "band-passed mesh": lines around a mesh harmonic;
+        "change": the difference from a reference's average.
     highest_order : float
         Orders above it are not in the average.
     """
@@ -72,26 +72,26 @@ class SynchronousAverage(Result, columns=("revolutions", "values", "standard_err
 
     @property
     def highest_line(self) -> int:
-        """Highest whole order that is truly in the average."""
+        """Highest whole order that is valid in the average."""
         return min(int(self.highest_order + 1e-9), (len(self.values) - 1) // 2)
 
     def lines(self, scaling: LineScaling = "amplitude peak") -> ComplexArray:
         """Return the complex amplitudes of the shaft's whole orders, (highest_line + 1,).
 
         With "amplitude peak", A_o = 2/N Σ_m a[m] exp(-2πi o m/N), and the mean A_0 = 1/N Σ_m a[m]; with "amplitude rms"
-        all but the mean are divided by √2. The phase is that of the cosine at shaft angle 0.
+        all except the mean are divided by √2. The phase is that of the cosine at shaft angle 0.
         """
         return lines_of_revolution(self.values, scaling)[: self.highest_line + 1]
 
 
 @dataclass(frozen=True)
 class AverageLines(Result):
-    """Complex lines of a shaft's synchronous averages: of several channels at once, in consecutive parts of a record.
+    """Complex lines of a shaft's synchronous averages of several channels, in consecutive parts of a record.
 
     Parameters
     ----------
     parts : complex array, (n_parts, n_channels, n_orders)
-        parts[i, c, o] is the amplitude of the shaft's order o in channel c, averaged over part i.
+        parts[i, c, o] is the complex amplitude of the shaft's order o in channel c, averaged over part i.
     n_revolutions : array, (n_parts,)
         Revolutions in each part.
     shaft : str
@@ -116,12 +116,12 @@ class AverageLines(Result):
 
     @property
     def highest_order(self) -> int:
-        """The last line's order."""
+        """Order of the last line."""
         return int(self.parts.shape[2]) - 1
 
     @property
     def whole(self) -> ComplexArray:
-        """Lines of the whole record, (n_channels, n_orders): the parts' mean, by their revolutions."""
+        """Lines of the whole record, (n_channels, n_orders): the mean of the parts, weighted by their revolutions."""
         mean: ComplexArray = np.tensordot(self.n_revolutions / self.n_revolutions.sum(), self.parts, axes=1)
         return mean
 
@@ -137,7 +137,7 @@ def lines_of_revolution(revolution: FloatArray, scaling: LineScaling) -> Complex
 
 
 def revolution_of_lines(lines: ComplexArray, n_angles: int, scaling: LineScaling) -> FloatArray:
-    """Return the periodic waveform of lines 0 … along the last axis, N samples, without its mean."""
+    """Return the periodic waveform, `n_angles` samples without the mean, of lines 0 … along the last axis."""
     waves = np.array(lines, dtype=np.complex128)
     waves[..., 0] = 0.0
     scale = n_angles / (2.0 if scaling == "amplitude peak" else np.sqrt(2.0))
@@ -146,9 +146,9 @@ def revolution_of_lines(lines: ComplexArray, n_angles: int, scaling: LineScaling
 
 
 def first_whole_sample(signal: AngleSignal) -> tuple[int, int]:
-    """Return (index of the first sample of a whole revolution, that revolution).
+    """Return (index of the first sample that starts a whole revolution, number of that revolution).
 
-    The index is exact where the samples lie on multiples of 1/samples_per_revolution; else it is off by at most half
+    The index is exact if the samples lie on multiples of 1/samples_per_revolution; otherwise it is off by at most half
     a sample.
     """
     per_rev = signal.samples_per_revolution
@@ -157,7 +157,7 @@ def first_whole_sample(signal: AngleSignal) -> tuple[int, int]:
 
 
 def whole_revolutions(signal: AngleSignal, channel: str, *, minimum: int = 1) -> FloatArray:
-    """Return a channel as (n_revolutions, samples_per_revolution), partial revolutions at either end left out.
+    """Return a channel as (n_revolutions, samples_per_revolution), without partial revolutions at either end.
 
     Raises
     ------
@@ -186,7 +186,7 @@ def unit_of(signal: AngleSignal, channel: str) -> str:
 def block_times(
     signal: AngleSignal, first_sample: int, n_per_block: int, step: int, n_blocks: int
 ) -> tuple[FloatArray, FloatArray]:
-    """Return (time of the middle, mean speed in rpm) of blocks of an angle signal."""
+    """Return (time of the middle in s, mean speed in rpm) of blocks of an angle signal, (n_blocks,) each."""
     per_rev = signal.samples_per_revolution
     start = signal.start_revolution + first_sample / per_rev
     length = n_per_block / per_rev
@@ -204,13 +204,13 @@ def over_angle(
     shaft_angle: ShaftAngle | None,
     speed_rpm: float | FloatArray | None,
 ) -> tuple[AngleSignal, str]:
-    """Return (a channel over a shaft's angle, its name) of what `synchronous_average` and its neighbours accept."""
+    """Return (a channel over a shaft's angle, its name) from any signal that `synchronous_average` accepts."""
     check_signal(signal, AngleSignal | Recording)
     instance_of(shaft, str, "shaft")
     if isinstance(signal, AngleSignal):
         if shaft not in ("", signal.shaft_angle.shaft) or shaft_angle is not None or speed_rpm is not None:
             raise InputError(
-                f"the signal lies over the angle of shaft {signal.shaft_angle.shaft!r}",
+                f"the signal is already over the angle of shaft {signal.shaft_angle.shaft!r}",
                 where="shaft",
                 allowed="no other",
             )
@@ -223,7 +223,7 @@ def over_angle(
 
 
 def as_recording(signal: Recording | FloatArray, channel_or_rate_hz: str | float) -> tuple[Recording, str]:
-    """Return (a recording, the channel's name) of a recording and its channel, or of an array and its rate in Hz."""
+    """Return (a recording, the channel's name) from a recording and channel, or from an array and its rate in Hz."""
     check_signal(signal)
     if isinstance(signal, Recording):
         return signal, signal.channel_names[signal.index(str(channel_or_rate_hz))]
@@ -232,7 +232,7 @@ def as_recording(signal: Recording | FloatArray, channel_or_rate_hz: str | float
 
 
 def angle_of(recording: Recording, shaft_angle: ShaftAngle | None, speed_rpm: float | FloatArray | None) -> ShaftAngle:
-    """Return the shaft angle that is given, or that follows from the speed that is given, or from the recording."""
+    """Return the given shaft angle, or the one that follows from the given speed or from the recording."""
     if shaft_angle is not None and speed_rpm is not None:
         raise InputError("both shaft_angle and speed_rpm are given", remedy="leave one of them out")
     if shaft_angle is not None:
@@ -265,23 +265,23 @@ def synchronous_average(
     """Return the mean over whole revolutions of a shaft, with its standard error.
 
     a(θ) = 1/N Σ_r x(θ + r). Over N revolutions, the shaft's whole orders stay, noise falls as 1/√N, and order o is
-    multiplied by |sin(πNo)/(N sin πo)|: other shafts' orders fall as 1/N, but are only gone where N·o is whole.
+    multiplied by |sin(πNo)/(N sin πo)|: other shafts' orders fall as 1/N, but vanish only if N·o is whole.
 
     Parameters
     ----------
     signal : AngleSignal, Recording or array, (n_samples,)
-        An AngleSignal is averaged over the shaft that it was resampled on.
+        An AngleSignal is averaged over the shaft whose angle it was resampled to.
     channel : str or float
-        The channel's name; of an array its sampling rate in Hz.
+        The channel's name, or an array's sampling rate in Hz.
     shaft : str
-        Of a recording: the shaft to average over; default: that of the angle.
+        For a recording: the shaft to average over; default: that of the angle.
     shaft_angle : ShaftAngle or None
-        Of a recording or an array; default: what `gearsig.angle.find_shaft_angle` finds in the recording.
+        For a recording or an array; default: the angle that `gearsig.angle.find_shaft_angle` finds in the recording.
     speed_rpm : float, array, (n_samples,), or None
         Instead of the angle: the speed, constant or at each sample.
     n_jackknife_blocks : int
-        At least 2. Revolutions are grouped in so many blocks (or as many as there are revolutions) before their
-        scatter is taken, so that a correlation between neighbouring revolutions does not make the error too small.
+        At least 2. Revolutions are grouped into this many blocks (or as many as there are revolutions) before their
+        scatter is taken, so that correlation between neighbouring revolutions does not make the error too small.
 
     Returns
     -------
@@ -292,7 +292,7 @@ def synchronous_average(
     Raises
     ------
     RefusalError
-        With fewer than two whole revolutions, or where the speed is not known.
+        With fewer than two whole revolutions, or if the speed is not known.
     InputError
         On an unknown channel or shaft.
 
@@ -319,14 +319,14 @@ def synchronous_average(
 
 
 def mean_and_error(revolutions: FloatArray, n_blocks: int) -> tuple[FloatArray, FloatArray]:
-    """Return mean over rows and its standard error by the delete-one-block jackknife.
+    """Return the mean over rows and its standard error by the delete-one-block jackknife.
 
     With B blocks, block sums s_b of n_b rows out of N: m_(b) = (Σs - s_b)/(N - n_b),
     SE² = (B - 1)/B Σ_b (m_(b) - mean of m_(b))².
     """
     n = len(revolutions)
     blocks = _blocks(n, min(n, n_blocks))
-    # Row blocks are summed one by one: no copy of the whole signal in double precision is made.
+    # Row blocks are summed one by one to avoid a double-precision copy of the whole signal.
     sums = np.stack([revolutions[block].sum(axis=0, dtype=np.float64) for block in blocks])
     total = sums.sum(axis=0)
     without = (total - sums) / np.array([n - (block.stop - block.start) for block in blocks])[:, None]
@@ -336,7 +336,7 @@ def mean_and_error(revolutions: FloatArray, n_blocks: int) -> tuple[FloatArray, 
 
 
 def _blocks(n_revolutions: int, n_blocks: int) -> list[slice]:
-    """Return consecutive blocks of revolutions of nearly equal length."""
+    """Return slices of consecutive blocks of revolutions, of nearly equal length."""
     edges = np.linspace(0, n_revolutions, n_blocks + 1).round().astype(int)
     return [slice(int(i), int(j)) for i, j in pairwise(edges)]
 
@@ -350,25 +350,25 @@ def average_lines(
     scaling: LineScaling = "amplitude peak",
     highest_order: float | None = None,
 ) -> AverageLines:
-    """Return the complex lines of a shaft's synchronous averages, of several channels and parts of the record at once.
+    """Return the complex lines of a shaft's synchronous averages for several channels and parts of the record.
 
     a(θ) = Σ_r w_r x(θ + r)/Σ w_r over the revolutions of each part, then its Fourier transform at whole orders.
 
     Parameters
     ----------
     signal : AngleSignal
-        Over the angle of the shaft in question; see `separate_shafts` for shafts whose orders lie close.
+        Over the angle of the shaft in question; see `separate_shafts` for shafts with close orders.
     channels : sequence of str or None
-        Default: all of the signal.
+        Default: all channels of the signal.
     n_parts : int
-        Consecutive parts with (nearly) equally many whole revolutions: 2 for halves, more for a jackknife.
+        Number of consecutive parts with (nearly) equally many whole revolutions: 2 for halves, more for a jackknife.
     weighting : str
         "equal", or "hann" for w_r = sin²(π(r + 1/2)/N): another shaft's order that lies d orders from a whole one then
-        leaks as 1/(N d)³ of it instead of 1/(N d), and noise grows by 1.8 dB.
+        leaks as 1/(N d)³ instead of 1/(N d), and noise grows by 1.8 dB.
     scaling : str
         See `SynchronousAverage.lines`.
     highest_order : float or None
-        Of the lines; default: the signal's, up to which they are true. `inf`: all that its samples hold.
+        Highest order of the lines; default: the signal's, up to which they are valid. `inf`: all that its samples hold.
 
     Returns
     -------
@@ -413,20 +413,20 @@ def _weighted_mean(revolutions: FloatArray, weighting: str) -> FloatArray:
     return np.asarray((weights / weights.sum()) @ revolutions)
 
 
-# Several shafts at once: what one repeats does not leak into the other's average.
+# Several shafts at once, so that the periodic part of one does not leak into the average of another.
 
 
 @dataclass(frozen=True)
 class SeparatedShafts(Result):
-    """What each of several meshing shafts repeats.
+    """A signal separated into the periodic parts of several meshing shafts.
 
     Parameters
     ----------
     signals : tuple of AngleSignal
-        Over the angle of each shaft, without what the others repeat besides the mesh: what `synchronous_average` and
-        `average_lines` take.
+        Over the angle of each shaft, without the periodic parts of the others except the mesh: input for
+        `synchronous_average` and `average_lines`.
     residual : AngleSignal
-        Over the first shaft's angle, what none repeats.
+        Over the first shaft's angle, without the periodic parts of all shafts.
     """
 
     signals: tuple[AngleSignal, ...]
@@ -442,10 +442,10 @@ def separate_shafts(signals: Sequence[AngleSignal], teeth: Sequence[int]) -> Sep
     Parameters
     ----------
     signals : sequence of AngleSignal
-        The same record and channels over the angle of each shaft; all count from the same instant.
+        The same record and channels over the angle of each shaft; all angles count from the same instant.
     teeth : sequence of int
-        Of the gear on each shaft; all have one mesh frequency, as a pair or a train of idlers. Mesh harmonics stay in
-        all signals; other orders that shafts have in common go to the first of them.
+        Teeth of the gear on each shaft; all share one mesh frequency, as in a pair or a train of idlers. Mesh harmonics
+        stay in all signals; other orders common to several shafts go to the first of them.
 
     Returns
     -------
@@ -454,7 +454,7 @@ def separate_shafts(signals: Sequence[AngleSignal], teeth: Sequence[int]) -> Sep
     Raises
     ------
     InputError
-        If the numbers of signals and teeth differ or the channels do.
+        If the numbers of signals and teeth differ, or the channels differ.
     RefusalError
         If a signal has no whole revolution.
     """
@@ -466,7 +466,7 @@ def separate_shafts(signals: Sequence[AngleSignal], teeth: Sequence[int]) -> Sep
     residual = separated[0].copy()
     for row, name in enumerate(signals[0].channel_names):
         means: list[FloatArray | None] = [None] * len(signals)
-        for _ in range(3):  # few revolutions tell close orders apart badly: each pass leaves of the leak its square
+        for _ in range(3):  # few revolutions separate close orders badly: each pass squares the relative leak
             for k, signal in enumerate(signals):
                 separated[k][row] = signal.samples[row]
                 for j, mean in enumerate(means):
@@ -500,10 +500,10 @@ def _places(signal: AngleSignal) -> FloatArray:
 
 
 def _at(revolution: FloatArray, place_rev: FloatArray) -> FloatArray:
-    """Return a periodic waveform at any angles, by cubic splines through finer points."""
+    """Return a periodic waveform at arbitrary angles, by cubic splines through oversampled points."""
     from scipy.ndimage import map_coordinates
 
-    n = 2 * len(revolution)  # cubic splines through twice the points are good to 10⁻³ at the highest order
+    n = 2 * len(revolution)  # cubic splines through twice the points are accurate to 10⁻³ at the highest order
     fine = np.fft.irfft(np.fft.rfft(revolution), n) * 2
     values: FloatArray = map_coordinates(fine, [place_rev * n % n], order=3, mode="grid-wrap")
     return values

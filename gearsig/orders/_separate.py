@@ -35,33 +35,33 @@ def separate(
     shaft_orders: tuple[int, ...] = (0, 1, 2),
     n_harmonics: int | None = None,
 ) -> SeparatedAverage:
-    """Split a synchronous average into its regular part and what local tooth faults leave.
+    """Split a synchronous average into its regular part and the part that local tooth faults cause.
 
-    Convention, all by whole lines of the average's Fourier transform (exact, for the average is periodic):
+    Convention, using whole lines of the average's Fourier transform (exact, as the average is periodic):
 
-    - residual: average without mesh harmonics k·z of the shaft's gears and without `shaft_orders`;
-    - difference: the residual without the first `n_sidebands` sidebands k·z ± 1 … of each mesh harmonic as well;
-    - regular: what was taken out for the difference.
+    - residual: the average without mesh harmonics k·z of the shaft's gears and without `shaft_orders`;
+    - difference: the residual also without the first `n_sidebands` sidebands k·z ± 1 … of each mesh harmonic;
+    - regular: everything removed for the difference.
 
     Parameters
     ----------
     average : SynchronousAverage
-        Of kind "average", of the shaft that carries the gears.
+        Of kind "average", for the shaft that carries the gears.
     teeth : int or ints
         Teeth of each gear on the shaft. Mesh orders of other shafts' gears are not whole and are not in the average.
     n_sidebands : int
         Sidebands on each side that count as regular.
     shaft_orders : ints
-        Shaft orders taken out of both: the mean (0), unbalance and misalignment (1, 2). Sources differ here: Večeř et
-        al. take out "shaft components along with their harmonics"; taking out all of them would leave nothing, since
+        Shaft orders removed from both: the mean (0), unbalance and misalignment (1, 2). Sources differ here: Večeř et
+        al. remove "shaft components along with their harmonics"; removing all of them would leave nothing, since
         every line of the average is a shaft harmonic. Pass () to keep them.
     n_harmonics : int or None
-        Mesh harmonics per gear; None takes all that the average holds, also above its highest order.
+        Mesh harmonics per gear; None takes all in the average, including those above its highest order.
 
     Returns
     -------
     SeparatedAverage
-        Standard errors are the average's, reduced by the share of lines that is left.
+        Standard errors are the average's times the square root of the share of lines that is left.
 
     Raises
     ------
@@ -72,8 +72,8 @@ def separate(
 
     Notes
     -----
-    The average's other contents, e.g. an eccentricity with many sidebands, stay in the difference: a large FM4 is a
-    reason to look at it, not a fault.
+    Other contents of the average, e.g. an eccentricity with many sidebands, stay in the difference: a large FM4 is a
+    reason to inspect it, not proof of a fault.
 
     References
     ----------
@@ -86,7 +86,7 @@ def separate(
     gears = checked_teeth(average, teeth)
     count(n_sidebands, "n_sidebands", minimum=0)
     highest = average.highest_line
-    # Beyond the highest order the filter's flank still lets strong mesh harmonics through: they go as well.
+    # Above the highest order, strong mesh harmonics still pass the filter's skirt: they are removed, too.
     last = (len(average.values) - 1) // 2
     mesh = [k * z for z in gears for k in range(1, (n_harmonics or last) + 1) if k * z <= last]
     bare = _line_mask(len(average.values), [*shaft_orders, *mesh])
@@ -112,9 +112,7 @@ def separate(
 def band_passed_mesh(
     average: SynchronousAverage, teeth: int, *, harmonic: int = 1, half_width_orders: int | None = None
 ) -> SynchronousAverage:
-    """Return the average's content around one mesh harmonic.
-
-    The lines from harmonic·z - h to harmonic·z + h; h is the largest below half the mesh order by default.
+    """Return the average's content around one mesh harmonic: the lines from harmonic·z - h to harmonic·z + h.
 
     Parameters
     ----------
@@ -122,12 +120,12 @@ def band_passed_mesh(
     teeth : int
     harmonic : int
     half_width_orders : int or None
-        1 to teeth - 1.
+        h, 1 to teeth - 1; None is the largest below half the mesh order.
 
     Returns
     -------
     SynchronousAverage
-        Of kind "band-passed mesh": the signal that NB4 and amplitude and phase modulation start from.
+        Of kind "band-passed mesh": the signal on which NB4 and the amplitude and phase modulation are based.
 
     Raises
     ------
@@ -159,9 +157,9 @@ def mesh_band(average: SynchronousAverage, teeth: int, harmonic: int, half_width
 
 
 def checked_teeth(average: SynchronousAverage, teeth: int | Iterable[int]) -> tuple[int, ...]:
-    """Return the teeth as a tuple; each at least 3 and with its mesh order inside the average."""
+    """Return the numbers of teeth as a tuple; each is at least 3 and its mesh order is within the average."""
     numbers_of_teeth: Any = teeth
-    is_single = isinstance(numbers_of_teeth, int | float | np.number | str)  # of which `count` says what is wrong
+    is_single = isinstance(numbers_of_teeth, int | float | np.number | str)  # `count` reports what is wrong
     numbers = (numbers_of_teeth,) if is_single else listed(numbers_of_teeth, "teeth", object)
     if not numbers:
         raise InputError("no teeth are given", remedy="give the teeth of each gear on the shaft")
@@ -203,15 +201,15 @@ class MeshModulation(Result):
     Parameters
     ----------
     amplitude : array, (n_angles,)
-        Of the harmonic at each shaft angle, peak, in `unit`.
+        Peak amplitude of the harmonic at each shaft angle, in `unit`.
     phase_rad : array, (n_angles,)
-        Of the harmonic against its mean phase; a tooth that comes late lowers it.
+        Phase of the harmonic relative to the carrier's; a tooth that meshes late lowers it.
     carrier_order : int
         Mesh order: harmonic times teeth.
     carrier_amplitude, carrier_phase_rad : float
         Of the unmodulated harmonic, the line at the mesh order itself.
     half_width_orders : int
-        Faster modulation is not seen.
+        Highest modulation order in the band; faster modulation is not visible.
     shaft, channel, unit : str
     """
 
@@ -235,7 +233,7 @@ def mesh_modulation(
     """Demodulate a mesh harmonic of a synchronous average.
 
     The analytic signal of the band around order h·z, shifted to order zero, is a(θ) exp(iφ(θ)). A cracked tooth
-    shows as a dip of a and a step of φ over the angle where it meshes.
+    appears as a dip in a and a step in φ over the angle where it meshes.
 
     Parameters
     ----------
@@ -245,7 +243,7 @@ def mesh_modulation(
         Of the gear on the average's shaft.
     harmonic : int
     half_width_orders : int or None
-        1 to teeth - 1; None is the largest below half the mesh order, which shares no line with the next harmonic.
+        1 to teeth - 1; None is the largest below half the mesh order, so that no line is shared with the next harmonic.
 
     Returns
     -------
@@ -260,7 +258,7 @@ def mesh_modulation(
 
     Notes
     -----
-    Not for a shaft with two gears whose bands overlap. Choose the harmonic that is strongest above its floor; where a
+    Not for a shaft with two gears whose bands overlap. Choose the harmonic that is strongest above its floor. If a
     sideband is larger than the carrier, the phase jumps by whole turns and means little.
 
     References
@@ -294,7 +292,7 @@ def mesh_modulation(
 def analytic_around(
     lines: np.ndarray[tuple[int], np.dtype[np.complex128]], low: int, high: int, centre: int, n: int
 ) -> np.ndarray[tuple[int], np.dtype[np.complex128]]:
-    """Return Σ_{k=low}^{high} (2/N) X_k exp(2πi (k - centre) m/N), m = 0 … N - 1."""
+    """Return a band's analytic signal shifted to zero, Σ_{k=low}^{high} (2/N) X_k exp(2πi (k - centre) m/N), (n,)."""
     shifted = np.zeros(n, dtype=np.complex128)
     shifted[np.arange(low, high + 1) - centre] = 2 * lines[low : high + 1]
     return np.asarray(np.fft.ifft(shifted))

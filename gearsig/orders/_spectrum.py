@@ -30,7 +30,7 @@ from gearsig.spectra import (
 
 @dataclass(frozen=True)
 class OrderMap(Result, matrix=("values", "time_s", "positions")):
-    """Spectra along speed or time.
+    """Spectra of consecutive blocks, over time and speed.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class OrderMap(Result, matrix=("values", "time_s", "positions")):
     positions : array, (n_lines,)
         Orders or frequencies (Hz), see `axis`.
     time_s, speed_rpm : arrays, (n_blocks,)
-        Middle of each block, mean speed in it.
+        Middle of each block, and mean speed within it.
     axis : str
         "order" or "frequency".
     scaling, unit, resolution, source, shaft
@@ -66,12 +66,12 @@ class OrderMap(Result, matrix=("values", "time_s", "positions")):
 
     @property
     def axis_label(self) -> str:
-        """Name of the axis of lines, with its unit."""
+        """Label of the axis of lines, with its unit."""
         return axis_label(self.axis, self.shaft)
 
 
 MANY_REVOLUTIONS = 500
-"""From there on, some at the end are left out for a fast transform."""
+"""From this number on, some revolutions at the end are left out for a fast transform."""
 
 ORDER_SCALINGS = ("amplitude peak", "amplitude rms", "power", "power density")
 
@@ -90,25 +90,25 @@ def order_spectrum(
 ) -> Spectrum:
     """Return the order spectrum of one channel, over whole revolutions of the shaft.
 
-    The discrete Fourier transform over angle: A(o) = 2 |Σ x[n] w[n] exp(-2πi o n/S)| / Σ w[n] with S samples per
-    revolution. Whole orders of the shaft fall on lines, whatever the window.
+    Discrete Fourier transform over angle: A(o) = 2 |Σ x[n] w[n] exp(-2πi o n/S)| / Σ w[n] with S samples per
+    revolution. Whole orders of the shaft fall on lines with any window.
 
     Parameters
     ----------
     signal : AngleSignal, Recording or array, (n_samples,)
         Partial revolutions at either end are left out.
     channel : str or float
-        The channel's name; of an array its sampling rate in Hz.
+        The channel's name, or an array's sampling rate in Hz.
     shaft, shaft_angle, speed_rpm
-        Of a recording or an array, as in `synchronous_average`.
+        For a recording or an array, as in `synchronous_average`.
     window : str
-        See `make_window`. "hann" for spectra that hold other shafts' orders as well; "rectangular" has the finest
-        resolution, but whatever is not a whole number of cycles per block leaks.
+        See `make_window`. Use "hann" if the spectrum contains other shafts' orders; "rectangular" has the finest
+        resolution, but any component without a whole number of cycles per block leaks.
     scaling : str
         "amplitude peak", "amplitude rms", "power", or "power density" (per order, averaged over blocks).
     revolutions_per_block : int or None
-        Rms mean over blocks of so many revolutions; None takes all revolutions as one block; of 500 and more, those
-        that make a fast transform: up to 1.2 % at the end are left out.
+        Revolutions per block of an rms mean over blocks. None takes all revolutions as one block; from 500 on, up to
+        1.2 % at the end are left out for a fast transform.
     overlap : float
         0 to 0.95.
 
@@ -126,7 +126,7 @@ def order_spectrum(
 
     Notes
     -----
-    Fixed-frequency components (resonances, mains) smear when the speed changes: look at those over frequency.
+    Fixed-frequency components (resonances, mains) smear when the speed changes: view them over frequency.
 
     Examples
     --------
@@ -176,7 +176,7 @@ def order_map(
     highest_order: float | None = None,
     n_blocks_max: int = 1000,
 ) -> OrderMap:
-    """Return the order spectra of consecutive blocks of whole revolutions, with time and speed of each.
+    """Return the order spectra of consecutive blocks of whole revolutions, with the time and speed of each.
 
     Parameters
     ----------
@@ -191,7 +191,7 @@ def order_map(
     highest_order : float or None
         Lines above it are left out; None keeps all up to the signal's highest valid order.
     n_blocks_max : int
-        Bounds the memory: where the overlap would give more blocks, they are spread evenly instead.
+        Limits the memory: if the overlap would give more blocks, this many are spread evenly.
 
     Returns
     -------
@@ -207,7 +207,7 @@ def order_map(
 
     Notes
     -----
-    Not for resonances: a block of revolutions lasts longer at low speed. Use `frequency_map`.
+    Not for resonances, as a block of revolutions lasts longer at low speed: use `frequency_map`.
     """
     one_of(scaling, "scaling", ORDER_SCALINGS)
     count(revolutions_per_block, "revolutions_per_block")
@@ -250,12 +250,12 @@ def frequency_map(
     unit: str = "",
     source: str = "",
 ) -> OrderMap:
-    """Return the spectra over frequency of consecutive blocks in time, with the shaft's speed in each.
+    """Return the frequency spectra of consecutive blocks in time, with the shaft's speed in each.
 
     Parameters
     ----------
     values : array, (n_samples,)
-        From time 0 of the shaft angle. Blocks beyond its knots get the speed it goes on with there.
+        From time 0 of the shaft angle. Blocks beyond its knots get the speed at which it continues there.
     sampling_rate_hz : float
     shaft_angle : ShaftAngle
     n_per_block : int
@@ -266,7 +266,7 @@ def frequency_map(
     highest_hz : float or None
         Lines above it are left out.
     n_blocks_max : int
-        Bounds the memory: where the overlap would give more blocks, they are spread evenly instead.
+        Limits the memory: if the overlap would give more blocks, this many are spread evenly.
     unit, source : str
 
     Returns

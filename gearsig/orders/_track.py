@@ -1,4 +1,4 @@
-"""Level and phase of orders along a change of speed, from the angle-resampled signal."""
+"""Level and phase of orders over speed, from the angle-resampled signal."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from gearsig.spectra import BATCH_SAMPLES, BlockPlan, ComplexArray, plan_blocks
 
 @dataclass(frozen=True)
 class TrackedOrder(Result, columns=("time_s", "speed_rpm", "amplitude", "phase_rad")):
-    """Level and phase of one order along speed.
+    """Level and phase of one order over time and speed.
 
     Parameters
     ----------
@@ -28,11 +28,11 @@ class TrackedOrder(Result, columns=("time_s", "speed_rpm", "amplitude", "phase_r
     amplitude : array, (n,)
         Peak amplitude of the order in `unit`.
     phase_rad : array, (n,)
-        Of the cosine against the shaft angle, -π to π.
+        Phase of the cosine relative to the shaft angle, -π to π.
     bandwidth_orders : float
         Width over which the order's energy was collected.
     unit, source, shaft : str
-        Of the amplitude; the channel; the shaft that the order counts on.
+        Unit of the amplitude; the channel; the shaft that the order refers to.
     """
 
     order: float
@@ -61,10 +61,10 @@ def track_orders(
     overlap: float = 0.75,
     window: str = "hann",
 ) -> tuple[TrackedOrder, ...]:
-    """Return amplitude and phase of each order along the signal.
+    """Return amplitude and phase of each order along the signal, block by block.
 
-    c(o) = 2 Σ x[n] w[n] exp(-2πi o θ_n) / Σ w[n] over each block, θ the shaft angle in revolutions: the amplitude is
-    |c|, the phase is that of x = A cos(2π o θ + φ). Constant amplitudes are exact but for leakage of other orders.
+    c(o) = 2 Σ x[n] w[n] exp(-2πi o θ_n) / Σ w[n] over each block, with θ the shaft angle in revolutions: the amplitude
+    is |c|, the phase is φ of x = A cos(2π o θ + φ). Constant amplitudes are exact except for leakage of other orders.
 
     Parameters
     ----------
@@ -73,8 +73,8 @@ def track_orders(
     orders : floats
         Cycles per revolution; need not be whole.
     revolutions_per_block : float
-        Above zero. Two orders are told apart if they lie at least two bandwidths apart; a level that changes within
-        the block is smoothed.
+        Above zero. Two orders are resolved if they lie at least two bandwidths apart; level changes within the block
+        are smoothed.
     overlap : float
         0 to 0.95.
     window : str
@@ -83,7 +83,7 @@ def track_orders(
     Returns
     -------
     tuple of TrackedOrder
-        In the order asked for, each with its bandwidth: the window's equivalent noise bandwidth in orders.
+        In the requested order, each with its bandwidth: the window's equivalent noise bandwidth in orders.
 
     Raises
     ------
@@ -94,8 +94,8 @@ def track_orders(
 
     Notes
     -----
-    Not for crossing or close orders of two shafts: a block filter cannot separate them.
-    The speed may change inside the block; the level should not change much.
+    Not for crossing or close orders of two shafts, which a block filter cannot separate.
+    The speed may change within the block; the level should not change much.
 
     References
     ----------
@@ -118,7 +118,7 @@ def plan_track(
     *,
     margin: float = 0.0,
 ) -> tuple[FloatArray, BlockPlan]:
-    """Check what is to be tracked; return the orders and the blocks."""
+    """Check the orders and the block length; return the orders and the block plan."""
     numbers = _checked_orders(signal, orders, margin)
     n = len(signal.values(channel))
     n_per_block = round(positive(revolutions_per_block, "revolutions_per_block") * signal.samples_per_revolution)
@@ -133,7 +133,7 @@ def plan_track(
 def tracked_orders(
     signal: AngleSignal, channel: str, orders: FloatArray, plan: BlockPlan, c: ComplexArray
 ) -> tuple[TrackedOrder, ...]:
-    """Wrap complex amplitudes (n_blocks, n_orders) with time, speed and unit."""
+    """Return complex amplitudes (n_blocks, n_orders) as tracked orders with time, speed and unit."""
     time_s, speed_rpm = block_times(signal, 0, plan.n_per_block, plan.step, plan.n_blocks)
     return tuple(
         TrackedOrder(
@@ -154,9 +154,9 @@ def tracked_orders(
 def order_amplitudes(
     x: FloatArray, plan: BlockPlan, cycles_per_sample: FloatArray, start_cycles: FloatArray
 ) -> ComplexArray:
-    """Return the complex amplitudes c of every block and order, (n_blocks, n_orders), as `track_orders` states.
+    """Return the complex amplitudes c, as in `track_orders`, for each block and order, (n_blocks, n_orders).
 
-    One real matrix product per batch of blocks; the phase of each block's start is taken out afterwards.
+    One real matrix product per batch of blocks; the phase at each block's start is removed afterwards.
     """
     n, w = plan.n_per_block, plan.window.values
     turns = 2 * np.pi * np.outer(np.arange(n), cycles_per_sample)
@@ -174,30 +174,30 @@ def order_amplitudes(
 
 
 def amplitude_at_speeds(tracked: TrackedOrder, speeds_rpm: FloatArray) -> FloatArray:
-    """Return a tracked order's peak amplitude at given speeds: linear in power between the blocks.
+    """Return a tracked order's peak amplitude at given speeds, interpolated linearly in power between the blocks.
 
     Parameters
     ----------
     tracked : TrackedOrder
-        Of a run-up or a run-down: the speed must rise or fall all along.
+        Of a run-up or a run-down: the speed must rise or fall monotonically.
     speeds_rpm : array, (n,)
 
     Returns
     -------
     array, (n,)
-        nan outside the speeds that were tracked.
+        nan outside the tracked speed range.
 
     Raises
     ------
     RefusalError
-        If the speed rises and falls: an amplitude then belongs to a time, not to a speed.
+        If the speed both rises and falls: an amplitude then belongs to a time, not to a speed.
     """
     instance_of(tracked, TrackedOrder, "tracked", remedy="gearsig.track_orders(recording, channel, orders) makes them")
     grid = frozen_array(speeds_rpm, "speeds_rpm", ndim=1)
     rising = np.diff(tracked.speed_rpm)
     if not (np.all(rising > 0) or np.all(rising < 0)):
         raise RefusalError(
-            "the speed does not rise or fall all along",
+            "the speed does not rise or fall monotonically",
             remedy="cut the recording into run-up and run-down, or read the level over time",
         )
     along = np.argsort(tracked.speed_rpm)
@@ -235,9 +235,9 @@ def track_order_bands(
     """Return the level of each order as the power within a band of orders around it.
 
     A(o)² = Σ_{|k/R| ≤ b/2} |c(o + k/R)|² / B, with c as in `track_orders`, R revolutions per block, b the bandwidth
-    and B the window's noise bandwidth in lines: a constant sine in the band keeps its amplitude, noise in the band
-    counts with its power. This is what sound and vibration analysers show as "order level": less smoothed than
-    `track_orders` with the same block, for a modulated order's sidebands within the band are kept.
+    and B the window's noise bandwidth in lines: a constant sine in the band keeps its amplitude, and noise in the band
+    contributes its power. Sound and vibration analysers call this "order level". It is less smoothed than
+    `track_orders` with the same block, because a modulated order's sidebands within the band are kept.
 
     Parameters
     ----------
@@ -253,12 +253,12 @@ def track_order_bands(
     Returns
     -------
     tuple of TrackedOrder
-        Amplitude is peak (√2 times the rms in the band); the phase is that of the centre line.
+        The amplitude is peak (√2 times the rms in the band); the phase is that of the centre line.
 
     Raises
     ------
     RefusalError, InputError
-        As `track_orders`; also on a band that is too narrow or reaches below order zero.
+        As `track_orders`; also if the band is too narrow or reaches below order zero.
     """
     width = positive(bandwidth_orders, "bandwidth_orders")
     if width * positive(revolutions_per_block, "revolutions_per_block") < 4.0:

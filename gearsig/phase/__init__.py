@@ -1,4 +1,4 @@
-"""Motion in its phase space: portraits, Poincaré sections, embedding, Lyapunov exponents."""
+"""Motion in phase space: portraits, Poincaré sections, embedding, Lyapunov exponents."""
 
 from gearsig.phase._embedding import (
     EmbeddingDimension,

@@ -1,4 +1,4 @@
-"""Delay embedding: a path through phase space from one channel."""
+"""Delay embedding: a path through phase space from a single channel, with its delay and dimension."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from gearsig.spectra import named_signal
 
 @dataclass(frozen=True)
 class MutualInformation(Result, columns=("delays_s", "information_nats")):
-    """Average mutual information of a signal and its delayed self, and the delay chosen from it.
+    """Average mutual information of a signal and its delayed copy, and the delay chosen from it.
 
     Parameters
     ----------
@@ -29,11 +29,11 @@ class MutualInformation(Result, columns=("delays_s", "information_nats")):
     step_samples : int
     sampling_rate_hz : float
     delay_samples : int
-        The delay chosen.
+        The chosen delay.
     rule : str
-        How: "first minimum", or what stood in for it.
+        Rule by which it was chosen: "first minimum", or its substitute.
     n_bins : int
-        Of the histogram, per axis.
+        Bins of the histogram per axis.
     source : str
     """
 
@@ -50,18 +50,18 @@ class MutualInformation(Result, columns=("delays_s", "information_nats")):
 
     @property
     def delays_s(self) -> FloatArray:
-        """Delays, (n_delays,)."""
+        """Delays in s, (n_delays,)."""
         return np.arange(len(self.information_nats)) * (self.step_samples / self.sampling_rate_hz)
 
     @property
     def delay_s(self) -> float:
-        """The delay chosen."""
+        """The chosen delay, in s."""
         return self.delay_samples / self.sampling_rate_hz
 
 
 @dataclass(frozen=True)
 class EmbeddingDimension(Result):
-    """How many delayed values unfold a signal's path.
+    """Number of delayed values that unfold a signal's path.
 
     Parameters
     ----------
@@ -74,11 +74,11 @@ class EmbeddingDimension(Result):
     determinism : array, (n_dimensions - 1,)
         Cao's E2(d): 1 at every d for a random signal.
     dimension : int
-        The one chosen; 0 where no dimension unfolds the path.
+        The chosen dimension; 0 if no dimension unfolds the path.
     verdict : str
-        "deterministic", or "stochastic": no dimension up to the largest tried unfolds it.
+        "deterministic", or "stochastic" if no dimension up to the largest tried unfolds the path.
     threshold : float
-        Share of false neighbours that still counts as unfolded.
+        Maximum share of false neighbours at which the path counts as unfolded.
     delay_samples : int
     source : str
     """
@@ -112,7 +112,7 @@ def delay_embedding(
     ----------
     signal : Recording or array, (n_samples,)
     channel_or_rate_hz : str or float
-        The channel of a recording; of an array its sampling rate in Hz.
+        A recording's channel, or an array's sampling rate in Hz.
     delay_samples : int or None
         None: the first minimum of the average mutual information.
     dimension : int or None
@@ -123,14 +123,14 @@ def delay_embedding(
     Returns
     -------
     PhasePortrait
-        Its points are a view into the signal: an embedding takes no memory of its own.
+        Its points are a view of the signal, so the embedding needs no extra memory.
 
     Raises
     ------
     InputError
         On NaN, or if the signal is shorter than the embedding.
     RefusalError
-        If the signal is constant; with dimension None also if no dimension unfolds it, as for noise.
+        If the signal is constant; if `dimension` is None, also if no dimension unfolds it, as for noise.
 
     Source: F. Takens, *Detecting strange attractors in turbulence*, Lecture Notes in Mathematics 898 (1981).
     """
@@ -182,19 +182,19 @@ def _chosen_dimension(x: FloatArray, rate: float, tau: int) -> int:
         raise RefusalError(
             f"no dimension up to {embedding.dimensions[-1]} unfolds the signal (false neighbours "
             f"{percent(float(embedding.false_fraction.min()))} at best): it looks stochastic",
-            remedy="filter to the motion of interest, average synchronously, or give dimension= knowingly",
+            remedy="filter to the motion of interest, average synchronously, or set dimension= deliberately",
         )
     return embedding.dimension
 
 
 N_SAMPLES = 200_000
-"""Longer signals are looked at in their first so many samples: the estimate's error is below 1e-3 nats by then."""
+"""Maximum number of samples used, from the start: the estimate's error is then below 1e-3 nats."""
 
 MAX_DELAYS = 400
 MAX_BINS = 48
 SAMPLES_PER_CELL = 12
 PERIODIC_SHARE = 0.4
-"""A periodic signal tells its own future at every delay: its information stays above this share of its entropy."""
+"""A periodic signal predicts its future at every delay: its information stays above this share of its entropy."""
 
 
 def average_mutual_information(
@@ -202,8 +202,8 @@ def average_mutual_information(
 ) -> MutualInformation:
     """Return the average mutual information over delay, and the delay at its first minimum.
 
-    I(τ) = Σ p(x(t), x(t+τ)) ln[ p(x(t), x(t+τ)) / (p(x(t)) p(x(t+τ))) ], from a histogram whose bins hold equally many
-    samples each (adaptive to the signal's distribution), about 12 samples per cell, less the bias of counting.
+    I(τ) = Σ p(x(t), x(t+τ)) ln[ p(x(t), x(t+τ)) / (p(x(t)) p(x(t+τ))) ], from a histogram with equally filled bins
+    (adaptive to the signal's distribution) and about 12 samples per cell, corrected for the counting bias.
 
     Parameters
     ----------
@@ -217,17 +217,18 @@ def average_mutual_information(
     Returns
     -------
     MutualInformation
-        Its rule is "first minimum": the first delay that is followed by a rise larger than the scatter of the estimate.
-        Where that has no meaning: "one step" for a signal without memory, a map or a section, whose neighbouring values
-        lie farther apart than one standard deviation; "quarter period" for a periodic signal, whose information does
-        not fall below 0.4 of its entropy at any delay; "1/e" of the first value where there is no minimum.
+        Its rule is "first minimum": the first minimum followed by a rise larger than the scatter of the estimate. Where
+        this is not meaningful: "one step" for a signal without memory, a map or a section, whose neighbouring values
+        differ by more than one standard deviation (rms); "quarter period" for a periodic signal, whose information does
+        not fall below 0.4 of its entropy at any delay; "1/e" of the first value if there is no minimum.
 
     Raises
     ------
     InputError
-        On NaN, too few samples, a delay longer than the signal allows.
+        On NaN, too few samples, or a `longest_delay_samples` below 2.
     RefusalError
-        If the signal is constant, or the information has no minimum and does not fall to 1/e of its first value.
+        If the signal is constant or too short for the longest delay, or the information has no minimum and does not
+        fall to 1/e of its first value.
 
     Notes
     -----
@@ -248,7 +249,7 @@ def average_mutual_information(
 
 
 def equally_filled_bins(x: FloatArray) -> tuple[IndexArray, int]:
-    """Return each sample's bin, bounded by quantiles; equal samples always share one (quantised signals)."""
+    """Return each sample's bin and the number of bins, bounded by quantiles; equal samples always share a bin."""
     n_bins = int(np.clip(np.sqrt(len(x) / SAMPLES_PER_CELL), 4, MAX_BINS))
     inner = np.quantile(x, np.arange(1, n_bins) / n_bins)
     return np.searchsorted(inner, x, side="right"), n_bins
@@ -266,7 +267,7 @@ def _longest_delay(x: FloatArray, max_delay: int | None) -> int:
 
 
 def _scatter(n: int, n_bins: int) -> float:
-    """Standard deviation of the estimate for independent samples: 2N·I follows a χ² of (B - 1)² degrees."""
+    """Return the standard deviation of the estimate for independent samples: 2N·I is χ² with (B - 1)² degrees."""
     return float((n_bins - 1) / (np.sqrt(2.0) * max(n, 1)))
 
 
@@ -282,14 +283,14 @@ def _choose(information: FloatArray, scatter: float, step: int, x: FloatArray) -
     below = np.flatnonzero(information < information[1] / np.e)
     if len(below) == 0:
         raise RefusalError(
-            "the mutual information has no minimum and does not fall to 1/e within the delays looked at",
-            remedy="give a longer longest_delay_samples, or take the trend out of the signal",
+            "the mutual information has no minimum and does not fall to 1/e within the delays examined",
+            remedy="give a longer longest_delay_samples, or remove the trend from the signal",
         )
     return int(below[0]) * step, "1/e"
 
 
 def first_minimum(information: FloatArray, scatter: float) -> int:
-    """Return the index of the first minimum that a rise above the scatter follows; 0 if there is none."""
+    """Return the index of the first minimum followed by a rise above the scatter; 0 if there is none."""
     at = 1
     for k in range(2, len(information)):
         if information[k] < information[at]:
@@ -300,9 +301,9 @@ def first_minimum(information: FloatArray, scatter: float) -> int:
 
 
 def mutual_information(bins: IndexArray, n_bins: int, delay: int) -> float:
-    """Return Σ p(i, j) ln(p(i, j) / (p(i) p(j))) of bins[t], bins[t + delay], less its bias.
+    """Return Σ p(i, j) ln(p(i, j) / (p(i) p(j))) of bins[t], bins[t + delay] in nats, corrected for bias.
 
-    Counting alone makes the estimate too large by (filled cells - filled rows - filled columns + 1) / 2N.
+    Counting makes the estimate too large by (filled cells - filled rows - filled columns + 1) / 2N.
 
     Source of the correction: M. S. Roulston, *Estimating the errors on measured entropy and mutual information*,
     Physica D 125 (1999).
@@ -331,37 +332,37 @@ def embedding_dimension(
     theiler_samples: int | None = None,
     source: str = "",
 ) -> EmbeddingDimension:
-    """Return the smallest dimension at which (nearly) no nearest neighbour is a false one.
+    """Return the smallest dimension at which (nearly) no nearest neighbour is false.
 
-    Kennel: with R_d the distance to the nearest neighbour in d dimensions and Δ that of the next coordinate, the
+    Kennel: with R_d the distance to the nearest neighbour in d dimensions and Δ that along the next coordinate, the
     neighbour is false if Δ / R_d > 15 or √(R_d² + Δ²) > 2 σ. Cao: E(d) = mean of ‖·‖_{d+1} / ‖·‖_d (largest
     coordinate), E1 = E(d+1)/E(d); E*(d) = mean of Δ, E2 = E*(d+1)/E*(d).
 
     Parameters
     ----------
     values : array, (n_samples,)
-        At least 200. Of longer signals 20 000 points serve as neighbours, 2000 as references, evenly spread.
+        At least 200. From long signals, 20 000 evenly spread points serve as neighbours and 2000 as references.
     sampling_rate_hz : float
     delay_samples : int or None
         None: first minimum of the mutual information.
     largest : int
         Largest dimension tried, 2 to 15.
     threshold : float
-        Share of false neighbours that counts as none. Noise leaves some: 0.02 allows for noise of about 3 % of the
+        Share of false neighbours that counts as none. Noise causes some: 0.02 allows for noise of about 3 % of the
         signal's standard deviation.
     theiler_samples : int or None
-        Points nearer in time are no neighbours; None: one mean period.
+        Points closer in time do not count as neighbours; None: one mean period.
     source : str
 
     Returns
     -------
     EmbeddingDimension
-        Dimension 0 and verdict "stochastic" where no dimension reaches the threshold. Cao's E2 is for reading: near 1
-        at every dimension says random too.
+        Dimension 0 and verdict "stochastic" if no dimension reaches the threshold. Cao's E2 is informative only: near 1
+        at every dimension also indicates a random signal.
 
     Notes
     -----
-    Noise in a narrow band looks like a motion of few dimensions to both criteria; the divergence curve tells it apart,
+    To both criteria, narrow-band noise looks like a motion of few dimensions; the divergence curve distinguishes it,
     see `largest_lyapunov_exponent`.
 
     Raises
@@ -411,7 +412,7 @@ def _step(
 ) -> tuple[float, float, float]:
     """Return the share of false neighbours, Cao's E and E* at dimension d; x has a standard deviation of one.
 
-    Distances below the signal's resolution are taken as that: a coarse converter makes many points equal.
+    Distances below the signal's resolution are set to it, since a coarse converter makes many points equal.
     """
     vectors = delay_vectors(x, tau, d)
     steps = []

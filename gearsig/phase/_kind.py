@@ -30,15 +30,15 @@ class ChaosTest(Result, columns=("c_rad", "k_of_c")):
         Median of `k_of_c`: near 0 for regular motion, near 1 for chaos (and for noise: the test presumes determinism).
     k_of_c, c_rad : arrays, (n_frequencies,)
     damping : float
-        Weight of the term that keeps weak noise from being read as chaos; 0: the plain modified test.
+        Weight of the term that keeps weak noise from being mistaken for chaos; 0: the plain modified test.
     n_values : int
     verdict : str
-        "regular" (k < 0.2), "irregular" (k > 0.8), "undecided" between and where the values are oversampled.
+        "regular" (k < 0.2), "irregular" (k > 0.8), otherwise or if the values are oversampled "undecided".
     oversampled : bool
-        Whether neighbouring values are so close that the test would read chaos as regular motion.
+        Whether neighbouring values are so close that the test would mistake chaos for regular motion.
     source : str
     every : int
-        Every so-many-th value was used.
+        Stride: every `every`-th value was used.
     reason : str
         Why it is undecided; empty otherwise.
     """
@@ -68,29 +68,29 @@ def zero_one_test(
 ) -> ChaosTest:
     """Return the 0–1 test of a series: K near 0 for regular motion, near 1 for chaos.
 
-    z(n) = Σ_{j≤n} φ(j) e^{icj}; M(n) = mean over j ≤ N - n_cut of |z(j + n) - z(j)|², n = 1 … n_cut = N/10;
+    With z(n) = Σ_{j≤n} φ(j) e^{icj}: M(n) = mean over j ≤ N - n_cut of |z(j + n) - z(j)|², n = 1 … n_cut = N/10;
     D(n) = M(n) - ⟨φ⟩² (1 - cos nc)/(1 - cos c) (modified); D*(n) = D(n) + α σ² sin(√2 n) (damped);
     K(c) = correlation of D* with n; K = median over c in π/5 … 4π/5.
 
     Parameters
     ----------
     values : array, (n_values,)
-        At least 200. Best the points of a Poincaré section, or a map. Of more than 20 000 the first 20 000 are used.
+        At least 200, preferably the points of a Poincaré section, or a map; only the first 20 000 are used.
     damping : float
-        α, 0 and more. The term keeps a weakly growing M, from measurement noise on regular motion, from being read as
-        chaos; weak chaos is then missed as well. About 1 to 2.5 for noise of some percent.
+        α, not negative. The term keeps a slowly growing M, due to measurement noise on regular motion, from being
+        mistaken for chaos; weak chaos is then missed as well. About 1 to 2.5 for noise of a few percent.
     n_frequencies : int
-        Values of c, spread by the golden ratio so that few of them resonate with the motion.
+        Number of values of c, spread by the golden ratio so that few of them resonate with the motion.
     every : int or None
-        Every so-many-th value is used; None: the first minimum of the mutual information, 1 for a map, less where
-        fewer than 200 values would be left. Where the values used still lie too close to each other, the verdict is
+        Stride: every `every`-th value is used. None: the first minimum of the mutual information, 1 for a map, less if
+        fewer than 200 values would be left. If the values used are still too close to each other, the verdict is
         "undecided", and `ChaosTest.reason` says so.
     source : str
 
     Returns
     -------
     ChaosTest
-        "irregular" means chaos only where the motion is known to be deterministic: noise gives K near 1 as well.
+        "irregular" means chaos only if the motion is known to be deterministic: noise gives K near 1 as well.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def zero_one_test(
 
     Notes
     -----
-    In the damping term the original has ⟨φ⟩², which vanishes for vibration; the variance σ² takes its place here.
+    The damping term in the original has ⟨φ⟩², which vanishes for vibration; here it is replaced by the variance σ².
 
     Source: G. A. Gottwald, I. Melbourne, *On the implementation of the 0–1 test for chaos*, SIAM Journal on Applied
     Dynamical Systems 8 (2009); damping: J. H. P. Dawes, M. C. Freeland, *The '0–1 test for chaos' and strange
@@ -136,9 +136,9 @@ def zero_one_test(
 
 
 def zero_one_test_of_section(section: PoincareSection, *, axis: int = 0, damping: float = 0.0) -> ChaosTest:
-    """Return the 0–1 test of one coordinate of a Poincaré section; a section of one or few points is regular by itself.
+    """Return the 0–1 test of one coordinate of a Poincaré section.
 
-    Points that scatter by less than 1e-6 of the path's size are one point: K = 0.
+    Points that scatter by less than 1e-6 of the path's size count as one point, which is regular: K = 0.
     """
     values = section.points[:, axis]
     source = f"{section.source}, section {section.section}"
@@ -149,7 +149,7 @@ def zero_one_test_of_section(section: PoincareSection, *, axis: int = 0, damping
 
 
 def translation_walk(values: FloatArray, c_rad: float, *, every: int = 1) -> FloatArray:
-    """Return the walk (p, q) that the 0–1 test rests on, (n_values, 2): bounded for regular motion, Brownian for chaos.
+    """Return the walk (p, q) of the 0–1 test, (n_values, 2), which is bounded for regular motion, Brownian for chaos.
 
     p(n) + i q(n) = Σ_{j≤n} (φ(j) - ⟨φ⟩) e^{icj} / σ.
 
@@ -160,11 +160,11 @@ def translation_walk(values: FloatArray, c_rad: float, *, every: int = 1) -> Flo
     c_rad : float
         One of `ChaosTest.c_rad`.
     every : int
-        Every so-many-th value is used.
+        Stride: every `every`-th value is used.
 
     Notes
     -----
-    The mean is taken off: it would turn the walk round a circle that says nothing of the motion.
+    The mean is removed: it would add a rotation around a circle that says nothing about the motion.
     """
     x = checked_series(values, minimum=MIN_VALUES)
     phi = x[:: count(every, "every")][:MAX_VALUES]
@@ -182,7 +182,7 @@ def _k(phi: FloatArray, c: float, alpha: float) -> float:
 
 
 def mean_square_displacement(phi: FloatArray, c: float, n_cut: int) -> FloatArray:
-    """Return M(n) for n = 1 … n_cut, by one correlation instead of n_cut sums.
+    """Return M(n) for n = 1 … n_cut, (n_cut,), by one correlation instead of n_cut sums.
 
     Σ|z(j+n) - z(j)|² = Σ|z(j+n)|² + Σ|z(j)|² - 2 Re Σ z(j+n) z*(j), over the same N - n_cut values of j for all n.
     """
@@ -200,9 +200,9 @@ def mean_square_displacement(phi: FloatArray, c: float, n_cut: int) -> FloatArra
 
 
 def _oversampled(phi: FloatArray) -> bool:
-    """Whether the range is more than ten times the mean step: the rule of thumb in use with this test.
+    """Whether the range is more than ten times the mean step, the usual rule of thumb for this test.
 
-    The range is that of 98 of 100 values: impacts widen the whole one however far apart the values lie.
+    The range is that of the central 98 % of the values: impacts widen the full range at any spacing of the values.
     """
     low, high = np.quantile(phi, (0.01, 0.99))
     return float(high - low) > 10.0 * float(np.mean(np.abs(np.diff(phi))))
@@ -213,7 +213,7 @@ def _verdict(k: float, oversampled: bool, step: int) -> tuple[ChaosVerdict, str]
         sampling = "each value" if step == 1 else f"every {step}-th value"
         return "undecided", (
             f"with {sampling} taken, neighbours lie too close: chaos would look regular, and noise on regular motion "
-            "irregular; take fewer of them, or record longer"
+            "irregular; take fewer values, or record longer"
         )
     if k < REGULAR:
         return "regular", ""
@@ -230,10 +230,10 @@ class MotionKind(Result):
     Parameters
     ----------
     kind : str
-        "periodic": repeats each cycle of the lock; "subharmonic": after `period` cycles; "quasi-periodic", "chaotic",
-        "stochastic"; "undecided" where the measures disagree or cannot answer.
+        "periodic": repeats after each cycle of the lock; "subharmonic": after `period` cycles; "quasi-periodic",
+        "chaotic", "stochastic"; "undecided" if the measures disagree or give no answer.
     period : int
-        Cycles after which the motion repeats; 0 if it does not.
+        Number of cycles after which the motion repeats; 0 if it does not.
     evidence : tuple of str
         One sentence per measure.
     section : PoincareSection
@@ -252,10 +252,10 @@ class MotionKind(Result):
 def kind_of_motion(
     portrait: PhasePortrait, lock: CycleLock, *, tolerance: float = 0.05, noise_free: bool = False
 ) -> MotionKind:
-    """Return what kind of motion a path is, from its Poincaré section, its Lyapunov exponent and the 0–1 test.
+    """Return the kind of a motion from its Poincaré section, its Lyapunov exponent and the 0–1 test.
 
-    A section that repeats decides alone. Otherwise: no dimension unfolds the first axis → stochastic; neighbours part
-    and K > 0.8 → chaotic; they do not part and K < 0.2 → quasi-periodic; all else is undecided.
+    A section that repeats decides alone. Otherwise: no dimension unfolds the first axis → stochastic; neighbours
+    diverge and K > 0.8 → chaotic; they do not diverge and K < 0.2 → quasi-periodic; everything else is undecided.
 
     Parameters
     ----------
@@ -264,20 +264,20 @@ def kind_of_motion(
     tolerance : float
         Of the section, in standard deviations of the path; above its scatter from noise.
     noise_free : bool
-        Whether the path is known to be deterministic, as a model's: the 0–1 test then needs no damping, and a regular
-        one decides alone where the exponent cannot answer.
+        Whether the path is known to be deterministic, e.g. from a model: the 0–1 test then needs no damping, and
+        decides alone if it is regular and the exponent gives no answer.
 
     Raises
     ------
     RefusalError
-        If there is no section (see `poincare_section`). Measures that cannot answer are named in the evidence.
+        If there is no section (see `poincare_section`). Measures without an answer are named in the evidence.
 
     Notes
     -----
-    Measured gear vibration is periodic with noise and modulation in most cases; "undecided" is then the right answer.
+    Measured gear vibration is mostly periodic with noise and modulation; "undecided" is then the right answer.
 
-    "stochastic" says that the motion does not unfold. Clean chaos recorded over fewer than about a hundred cycles may
-    not unfold either: record longer, or state `noise_free` where it is a model's, which makes it "undecided".
+    "stochastic" means that the motion does not unfold. Clean chaos recorded over fewer than about a hundred cycles may
+    not unfold either: record longer, or for a model's motion set `noise_free`, which makes it "undecided".
     """
     check_lock(lock, needed=True)
     section = poincare_section(portrait, lock)
@@ -300,7 +300,7 @@ def kind_of_motion(
 
 
 def _exponent(portrait: PhasePortrait, evidence: list[str]) -> tuple[LyapunovExponent | None, bool]:
-    """Return the exponent, and whether no dimension unfolds the path; say either in the evidence."""
+    """Return the exponent, and whether no dimension unfolds the path; both are added to the evidence."""
     x, rate = np.ascontiguousarray(portrait.points[:, 0]), portrait.sampling_rate_hz
     dimension = answer_or_none(lambda: _dimension(x, rate), "embedding dimension", evidence)
     if dimension is None:
@@ -320,10 +320,11 @@ def _exponent(portrait: PhasePortrait, evidence: list[str]) -> tuple[LyapunovExp
 
 
 def _dimension(x: FloatArray, rate: float) -> EmbeddingDimension:
-    """Return the embedding dimension; where the usual delay unfolds nothing, that at a quarter of the mean period.
+    """Return the embedding dimension; if the usual delay does not unfold the path, at a quarter of the mean period.
 
-    The mutual information of chaos may fall for most of a cycle, in which neighbours part too far. A quarter of the
-    mean period leaves 5 % false neighbours or more of filtered noise; an eighth would make it look deterministic.
+    The mutual information of chaos may fall for most of a cycle, during which neighbours diverge too far. At a quarter
+    of the mean period, filtered noise still has at least 5 % false neighbours; at an eighth it would look
+    deterministic.
     """
     usual = embedding_dimension(x, rate)
     shorter = round(mean_period_samples(x) / 4)
@@ -336,7 +337,7 @@ def _decide(test: ChaosTest | None, exponent: LyapunovExponent | None, stochasti
     silent = exponent is None or exponent.verdict == "undecided"
     if noise_free and silent and test is not None and test.verdict == "regular":
         return "quasi-periodic"
-    # Irregular without neighbours that part is not chaos: teeth that differ repeat after the hunting period only.
+    # Irregular without diverging neighbours is not chaos: teeth that differ repeat only after the hunting-tooth period.
     if stochastic:
         return "undecided" if noise_free else "stochastic"
     if test is None or exponent is None:

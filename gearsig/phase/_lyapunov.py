@@ -1,4 +1,4 @@
-"""The largest Lyapunov exponent: the slope of a divergence curve, where a stated rule says."""
+"""The largest Lyapunov exponent: the slope of a divergence curve over a range set by a stated rule."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from gearsig.results import Result
 
 @dataclass(frozen=True)
 class LyapunovExponent(Result, columns=("times_s", "log_distance")):
-    """Largest Lyapunov exponent, with the divergence curve it was read from.
+    """Largest Lyapunov exponent and the divergence curve from which it was estimated.
 
     Parameters
     ----------
     exponent_per_s, uncertainty_per_s : float
-        Slope of the curve and one standard deviation of it: scatter between segments of the signal, and dependence on
-        where the line is fitted. Not numbers in what a `RefusalError` looked at.
+        Slope of the curve and its standard deviation, from the scatter between segments of the signal and the
+        dependence on the limits of the fit. nan in the `looked_at` of a `RefusalError`.
     log_distance : array, (n_steps,)
         Mean logarithm of the distance of neighbours after 0, 1, 2, … steps of `step_s`.
     step_s : float
     fit_s : (float, float)
-        Segment of the curve that was fitted.
+        Fitted segment of the curve.
     saturation_log_distance : float
-        Mean logarithm of the distance of points that have nothing to do with each other.
+        Mean logarithm of the distance of unrelated points.
     verdict : str
-        "diverging": the exponent is above twice its uncertainty and distances grow by e or more; "not diverging": they
+        "diverging": the exponent is above twice its uncertainty and distances grow by at least e; "not diverging": they
         do not, although there was room; "undecided".
     method : str
         "rosenstein", "transverse" or "kantz".
@@ -58,7 +58,7 @@ class LyapunovExponent(Result, columns=("times_s", "log_distance")):
 
     @property
     def times_s(self) -> FloatArray:
-        """Times of the divergence curve, (n_steps,)."""
+        """Times of the divergence curve in s, (n_steps,)."""
         return np.arange(len(self.log_distance)) * self.step_s
 
 
@@ -69,7 +69,7 @@ N_UNRELATED = 20_000
 
 @dataclass(frozen=True)
 class Divergence:
-    """Divergence curve, and the same from each segment of the signal.
+    """Divergence curve, overall and for each segment of the signal.
 
     Parameters
     ----------
@@ -87,10 +87,10 @@ class Divergence:
 
 
 def rosenstein(points: FloatArray, theiler: int, n_steps: int, *, across: bool = False) -> Divergence:
-    """Return S(k) = mean over i of ln |x(i + k) - x(j(i) + k)|, j(i) the nearest neighbour of i.
+    """Return S(k) = mean over i of ln |x(i + k) - x(j(i) + k)|, with j(i) the nearest neighbour of i.
 
-    With `across` the distance is taken across the path: along it nothing diverges, and where a coarsely sampled path
-    makes most of a neighbour's distance lie along it, the slope comes out too small.
+    With `across`, the distance is taken across the path. Nothing diverges along the path, so the slope is too small if
+    coarse sampling makes most of a neighbour's distance lie along it.
 
     Source: M. T. Rosenstein, J. J. Collins, C. J. De Luca, *A practical method for calculating largest Lyapunov
     exponents from small data sets*, Physica D 65 (1993).
@@ -105,9 +105,9 @@ def rosenstein(points: FloatArray, theiler: int, n_steps: int, *, across: bool =
 
 
 def kantz(points: FloatArray, theiler: int, n_steps: int) -> Divergence:
-    """Return S(k) = mean over i of ln of the mean over i's neighbourhood of |x(i + k) - x(j + k)|, last coordinate.
+    """Return S(k) = mean over i of ln(mean of |x(i + k) - x(j + k)| over i's neighbours j), for the last coordinate.
 
-    The neighbourhood holds the 10 nearest library points that are apart in time, so that the radius suits the density.
+    The neighbours are the 10 nearest library points that are apart in time, so that the radius adapts to the density.
 
     Source: H. Kantz, *A robust method to estimate the maximal Lyapunov exponent of a time series*, Physics Letters A
     185 (1994).
@@ -123,7 +123,7 @@ def kantz(points: FloatArray, theiler: int, n_steps: int) -> Divergence:
     per_reference = apart.sum(axis=1)
     used = per_reference >= MAX_NEIGHBOURS // 3
     if np.count_nonzero(used) < len(references) // 2:
-        raise RefusalError("the path hardly ever comes back to where it was", remedy="record longer")
+        raise RefusalError("the path hardly ever returns close to itself", remedy="record longer")
     starts = np.concatenate([[0], np.cumsum(per_reference[used])])
     block = _blocks(references[used], len(points))
     sums, counts = np.zeros((N_BLOCKS, n_steps)), np.zeros((N_BLOCKS, n_steps))
@@ -132,7 +132,7 @@ def kantz(points: FloatArray, theiler: int, n_steps: int) -> Divergence:
 
 
 def _library(points: FloatArray, n_steps: int) -> tuple[IndexArray, IndexArray]:
-    """Points that can be followed for all steps: a mean over ever fewer pairs would bend the curve."""
+    """Return library and reference points that can be followed for all steps, so that all means use the same pairs."""
     n = len(points) - n_steps - 2
     return 1 + evenly_spaced_indices(n, N_LIBRARY), 1 + evenly_spaced_indices(n, N_REFERENCES)
 
@@ -142,7 +142,7 @@ def _blocks(references: IndexArray, n: int) -> IndexArray:
 
 
 def _unrelated_log_distance(points: FloatArray, theiler: int, *, last_axis: bool) -> float:
-    """Mean logarithm of the distance of points far apart in time: pairs by the golden ratio, spread over all delays."""
+    """Return the mean log distance of points far apart in time, in pairs spread by the golden ratio over all delays."""
     n = len(points)
     firsts = evenly_spaced_indices(n, N_UNRELATED)
     seconds = (firsts + 1 + theiler + ((np.arange(len(firsts)) * GOLDEN) % 1.0 * (n - 2 * theiler - 2))) % n
@@ -166,10 +166,10 @@ def _curve(sums: FloatArray, counts: FloatArray, saturation: float, n_references
 Method = Literal["rosenstein", "transverse", "kantz"]
 
 ROOM = 2.0
-"""The fit ends where the mean logarithm of the distance comes this close to that of unrelated points: 14 % of it."""
+"""The fit ends where the mean log distance comes this close to that of unrelated points: 14 % of their distance."""
 
 FLAT, MIN_MISSING = 0.3, 0.7
-"""A curve is flat if it makes up for less than this share of what it lacks to saturation, where it lacks this much."""
+"""A curve is flat if it rises by less than `FLAT` of its gap to saturation, provided the gap exceeds `MIN_MISSING`."""
 
 PERIODS_FOLLOWED = 30.0
 MIN_STEPS = 4
@@ -183,28 +183,29 @@ def largest_lyapunov_exponent(
     n_steps: int | None = None,
     fit_s: tuple[float, float] | None = None,
 ) -> LyapunovExponent:
-    """Return the rate at which neighbouring segments of a path part: λ = dS/dt of the divergence curve S.
+    """Return the rate at which neighbouring segments of a path diverge, λ = dS/dt of the divergence curve S.
 
-    The fit goes from the embedding's length (d-1)τ, before which the segments still share values, to where S first
-    comes within 2 of its saturation, or to the last step. Saturation is the mean logarithm of the distance of unrelated
-    points, or the end of the curve where that lies lower and the curve has risen by 3 or more (phase-coherent motion
-    parts fully only much later). The uncertainty joins two parts: the jackknife over 12 segments of the signal, and
-    half the span of the slopes found in either half of the fit and with 1.5 and 2.5 in place of 2.
+    The fit extends from the embedding's length (d-1)τ, before which the segments still share values, to where S first
+    comes within 2 of its saturation, or to the last step. Saturation is the mean log distance of unrelated points, or
+    the end of the curve if that is lower and the curve has risen by more than 3 (phase-coherent motion diverges fully
+    only much later). The uncertainty combines the jackknife over 12 segments of the signal with half the span of the
+    slopes in either half of the fit and with 1.5 and 2.5 instead of 2.
 
     Parameters
     ----------
     portrait : PhasePortrait
-        Best a delay embedding, or states of a model. A phase plane of a driven machine is a projection: embed instead.
+        Preferably a delay embedding, or states of a model. The phase plane of a driven machine is only a projection:
+        use an embedding instead.
     method : str
-        "rosenstein": nearest neighbour, whole distance; "transverse": the same across the path, better for coarsely
+        "rosenstein": nearest neighbour, full distance; "transverse": the same across the path, better for coarsely
         sampled flows, meaningless for maps; "kantz": 10 neighbours, last coordinate, better for noisy data with many
         points.
     theiler_samples : int or None
-        Neighbours nearer in time do not count; None: one mean period, at least the embedding's length.
+        Neighbours closer in time do not count; None: one mean period, but at least the embedding's length.
     n_steps : int or None
-        Steps followed; None: 30 mean periods, at most a quarter of the path.
+        Number of steps followed; None: 30 mean periods, at most a quarter of the path.
     fit_s : (float, float) or None
-        Segment of the curve to be fitted instead of the one that the rule finds.
+        Segment of the curve to fit, overriding the rule.
 
     Returns
     -------
@@ -215,14 +216,14 @@ def largest_lyapunov_exponent(
     Raises
     ------
     RefusalError
-        If neighbours are as far apart as unrelated points at once (noise, or too few points), or the path does not
-        come back.
+        If neighbours are immediately as far apart as unrelated points (noise, or too few points), or the path does not
+        return close to itself.
 
     Notes
     -----
-    The estimate presumes determinism: check the signal with `embedding_dimension` first. Noise lifts the start of the
-    curve. With 1 % of the standard deviation the Lorenz system's exponent comes out 5 % low, with 2 % 12 % low; with
-    5 % no segment is left but across the path ("transverse", "undecided"); with 10 % there is no answer.
+    The estimate presumes determinism: check the signal with `embedding_dimension` first. Noise raises the start of the
+    curve. With noise of 1 % of the standard deviation, the Lorenz system's exponent is 5 % too low, with 2 % it is 12 %
+    too low; with 5 % a fit is possible only across the path ("transverse", "undecided"); with 10 % there is no answer.
 
     Source: M. T. Rosenstein, J. J. Collins, C. J. De Luca, Physica D 65 (1993); H. Kantz, Physics Letters A 185 (1994).
     """
@@ -273,10 +274,10 @@ def largest_lyapunov_exponent(
 
 
 def fit_limits(curve: Divergence, memory: int, n_min: int) -> tuple[int, int]:
-    """Return the first step of the fit and the one after its last.
+    """Return the first step of the fit and the step after its last.
 
-    A curve that starts within `ROOM` of saturation but stays there is noise on a motion that does not diverge: it is
-    fitted as a whole.
+    A flat curve, see `FLAT`, even within `ROOM` of saturation, is noise on a motion that does not diverge: it is fitted
+    as a whole.
     """
     s = curve.log_distance
     missing = curve.saturation - float(s[memory])
@@ -287,8 +288,8 @@ def fit_limits(curve: Divergence, memory: int, n_min: int) -> tuple[int, int]:
     if stop - memory >= n_min:
         return memory, stop
     raise RefusalError(
-        f"{memory} steps on, neighbours are {percent(np.exp(-missing))} as far apart as unrelated points: no "
-        "segment of exponential growth can be seen, as the signal is stochastic or too noisy",
+        f"after {memory} steps, neighbours are {percent(np.exp(-missing))} as far apart as unrelated points: no "
+        "segment of exponential growth is visible, as the signal is stochastic or too noisy",
         remedy="filter it, record longer, or embed it with fewer dimensions",
     )
 
@@ -305,14 +306,14 @@ def _requested_limits(fit_s: tuple[float, float], rate: float, n_steps: int) -> 
 
 
 def _saturation(curve: Divergence, memory: int) -> float:
-    """Mean logarithm of the distance that the curve ends at, if it has clearly risen, or that of unrelated points."""
+    """Return the log distance at the end of the curve if it has clearly risen, or that of unrelated points if lower."""
     s = curve.log_distance
     end = float(np.median(s[-max(1, (len(s) - memory) // 4) :]))
     return min(end, curve.saturation) if end - s[memory] > ROOM + 1.0 else curve.saturation
 
 
 def slope_of(curve: Divergence, first: int, stop: int) -> tuple[float, float]:
-    """Return the slope per step and its standard deviation."""
+    """Return the slope of the curve per step and its standard deviation."""
     s, k = curve.log_distance, np.arange(len(curve.log_distance), dtype=np.float64)
     slope = _slope(k[first:stop], s[first:stop])
     blocks = curve.by_block[:, first:stop]
@@ -355,14 +356,14 @@ def _steps(n_steps: int | None, period: float, memory: int, n_points: int, windo
     )
     if n_points - steps < 4 * window + 100 or steps < memory + MIN_STEPS:
         raise RefusalError(
-            f"{n_points} points are too few: {steps} steps are followed, and neighbours lie {window} samples apart",
+            f"{n_points} points are too few: {steps} steps are followed, and neighbours must be {window} samples apart",
             remedy=f"record at least {4 * (memory + window) + steps + 200} points or follow fewer steps",
         )
     return steps
 
 
 def _comparable(portrait: PhasePortrait) -> FloatArray:
-    """Points in standard deviations of their axes where these have different units."""
+    """Return the points, in standard deviations of their axes unless all axes are the same quantity."""
     if portrait.kind == "delay embedding":
         return portrait.points
     return np.ascontiguousarray(portrait.points / np.where(portrait.extent > 0.0, portrait.extent, 1.0))
@@ -370,14 +371,14 @@ def _comparable(portrait: PhasePortrait) -> FloatArray:
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def mean_log_distance(points, firsts, seconds, block, across, sums, counts):  # type: ignore[no-untyped-def]
-    """Add ln|x(i + k) - x(j + k)| for all pairs i, j and steps k to sums[block, k]; distances of zero are left out.
+    """Add ln|x(i + k) - x(j + k)| for all pairs i, j and steps k to sums[block, k], omitting zero distances.
 
     Points are the path in time, (n, d); `firsts` and `seconds` hold the pairs, with a sample before and after each
-    step. With `across` only the part of the distance across the path counts: the part along
-    x(i + k + 1) - x(i + k - 1) is taken off.
+    step. With `across`, only the distance across the path counts: the component along x(i + k + 1) - x(i + k - 1) is
+    removed.
     """
     d = points.shape[1]
-    # One logarithm for the product of many squares, as long as that is a normal number.
+    # One logarithm for the product of many squares, as long as the product is a normal number.
     products = np.ones(sums.shape)
     for r in range(firsts.shape[0]):
         i, j, b = firsts[r], seconds[r], block[r]
@@ -404,7 +405,7 @@ def mean_log_distance(points, firsts, seconds, block, across, sums, counts):  # 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def log_mean_distance(points, references, starts, near, block, sums, counts):  # type: ignore[no-untyped-def]
-    """Add ln of the mean distance of a neighbourhood, Kantz's mean, to sums[block, k].
+    """Add ln of the mean distance of a neighbourhood (Kantz) to sums[block, k].
 
     Neighbours of reference r are near[starts[r] : starts[r + 1]]; the distance is that of the last coordinate.
     """

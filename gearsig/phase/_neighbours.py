@@ -16,7 +16,7 @@ _LARGEST_LOOK = 1500
 
 
 GOLDEN = 0.6180339887498949
-"""Fractional part of the golden ratio: k times it, modulo one, is spread evenly whatever the number of k."""
+"""Fractional part of the golden ratio: its multiples modulo one are evenly spread for any number of them."""
 
 
 def evenly_spaced_indices(n: int, n_max: int) -> IndexArray:
@@ -35,9 +35,9 @@ def nearest_beyond_theiler_window(
 ) -> tuple[FloatArray, IndexArray]:
     """Return distance and index of each reference's nearest library point more than `theiler` samples away.
 
-    Neighbours in time are close because the path is smooth, not because it returned: they are passed over. The k-d tree
-    is asked for a few neighbours; where all of those are neighbours in time, for more, up to 1500. Equal points are
-    passed over too unless `equal_counts`: a distance of zero has no logarithm.
+    Neighbours in time are close because the path is smooth, not because it returned: they are skipped. The k-d tree is
+    queried for a few neighbours, and for more, up to 1500, if all of these are neighbours in time. Equal points are
+    also skipped unless `equal_counts`, as a distance of zero has no logarithm.
 
     Parameters
     ----------
@@ -48,17 +48,17 @@ def nearest_beyond_theiler_window(
     norm : float
         2: Euclidean, inf: largest coordinate.
     equal_counts : bool
-        Whether a point at distance 0 is a neighbour.
+        Whether a point at distance 0 counts as a neighbour.
 
     Returns
     -------
     distance, index : arrays, (n_references,)
-        inf and -1 where a reference has none among its nearest 1500.
+        inf and -1 if a reference has none among its nearest 1500.
 
     Raises
     ------
     RefusalError
-        If fewer than half of the references have one: the path hardly ever comes back to where it was, or exactly.
+        If fewer than half of the references have one: the path hardly ever returns close to itself, or returns exactly.
 
     Source of the window: J. Theiler, *Spurious dimension from correlation algorithms applied to limited time-series
     data*, Physical Review A 34 (1986).
@@ -66,7 +66,7 @@ def nearest_beyond_theiler_window(
     from scipy.spatial import cKDTree
 
     tree = cKDTree(np.ascontiguousarray(points[library]), balanced_tree=False, compact_nodes=False)
-    # So many neighbours in time there can be; one more is apart.
+    # Maximum number of neighbours in time; one more must lie outside the window.
     n_near = int(2 * theiler * len(library) / max(1, int(library[-1]) - int(library[0]) + 1)) + 3
     largest = min(max(n_near, _FIRST_LOOK), _LARGEST_LOOK, len(library))
     distance = np.full(len(references), np.inf)
@@ -95,11 +95,11 @@ def nearest_beyond_theiler_window(
 def _no_neighbour_error(share: float, theiler: int, *, exact: bool) -> RefusalError:
     if exact:
         return RefusalError(
-            "the path comes back to exactly the same points: it is periodic, or its resolution is too coarse",
-            remedy="look at its Poincaré section: no neighbours can part here",
+            "the path returns to exactly the same points: it is periodic, or its resolution is too coarse",
+            remedy="look at its Poincaré section: no neighbours can diverge here",
         )
     return RefusalError(
-        f"{percent(share)} of the points have no neighbour but those within {theiler} samples in time: the path "
-        "does not come back to where it was",
-        remedy="record longer, take the trend out of the signal, or lower the Theiler window",
+        f"{percent(share)} of the points have only neighbours within {theiler} samples in time: the path does not "
+        "return close to itself",
+        remedy="record longer, remove the trend from the signal, or lower the Theiler window",
     )

@@ -1,4 +1,4 @@
-"""Portraits of motion in phase space, what is asked of any of them, and the phase plane."""
+"""Portraits of motion in phase space, checks on them, and the phase plane by integration within a band."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ class PhasePortrait(Result, matrix=("points", "times_s", "axis_names")):
     axis_names, units : tuples of str
         One per axis.
     kind : str
-        "phase plane": displacement and velocity; "delay embedding": x(t), x(t + τ), …; "states": as a model gave them.
+        "phase plane": displacement and velocity; "delay embedding": x(t), x(t + τ), …; "states": states of a model.
     source : str
-        Channel, and what was done to it.
+        The channel and its processing.
     start_s : float
     band_hz : (float, float)
-        Frequencies that the axes hold in full; (0, half the sampling rate) where nothing was filtered.
+        Band that the axes contain without attenuation; (0, inf) if nothing was filtered.
     delay_samples : int
-        Of a delay embedding; 0 otherwise.
+        Delay of a delay embedding; 0 otherwise.
     """
 
     points: FloatArray
@@ -60,7 +60,7 @@ class PhasePortrait(Result, matrix=("points", "times_s", "axis_names")):
 
     @property
     def n_points(self) -> int:
-        """Samples of the path."""
+        """Number of samples of the path."""
         return int(self.points.shape[0])
 
     @property
@@ -70,17 +70,17 @@ class PhasePortrait(Result, matrix=("points", "times_s", "axis_names")):
 
     @property
     def times_s(self) -> FloatArray:
-        """Time of each sample, (n_points,)."""
+        """Time of each sample in s, (n_points,)."""
         return self.start_s + np.arange(self.n_points) / self.sampling_rate_hz
 
     @property
     def end_s(self) -> float:
-        """Time of the last sample."""
+        """Time of the last sample, in s."""
         return self.start_s + (self.n_points - 1) / self.sampling_rate_hz
 
     @property
     def extent(self) -> FloatArray:
-        """Standard deviation along each axis, (n_axes,): the size that distances are compared with."""
+        """Standard deviation along each axis, (n_axes,): the size to which distances are compared."""
         deviation: FloatArray = np.std(self.points, axis=0, dtype=np.float64)
         return deviation
 
@@ -90,7 +90,7 @@ class PhasePortrait(Result, matrix=("points", "times_s", "axis_names")):
         Raises
         ------
         InputError
-            If fewer than two lie there.
+            If there are fewer than two.
         """
         first = max(0, ceil((start_s - self.start_s) * self.sampling_rate_hz - 1e-6))
         last = min(self.n_points - 1, floor((end_s - self.start_s) * self.sampling_rate_hz + 1e-6))
@@ -116,14 +116,14 @@ def checked_series(values: FloatArray, *, minimum: int, name: str = "values") ->
     InputError
         On NaN, a wrong shape, or too few samples.
     RefusalError
-        If the series is constant: there is no motion to look at.
+        If the series is constant: there is no motion to analyse.
     """
     x = frozen_array(values, name, ndim=1)
     if len(x) < minimum:
         raise InputError(
             f"{name} has {counted(len(x), 'sample')}",
             allowed=f"at least {minimum}",
-            remedy="record longer or ask for less",
+            remedy="record longer or request less",
         )
     low, high = float(x.min()), float(x.max())
     if high - low <= 8.0 * np.finfo(x.dtype).eps * max(abs(low), abs(high)):
@@ -135,9 +135,9 @@ def checked_series(values: FloatArray, *, minimum: int, name: str = "values") ->
 
 
 def mean_period_samples(x: FloatArray) -> float:
-    """Return one over the mean frequency of the power spectrum, in samples; at least 2.
+    """Return the reciprocal of the power spectrum's mean frequency, in samples; at least 2.
 
-    T = Σ|X(f)|² / Σ f |X(f)|², the mean taken off before.
+    T = Σ|X(f)|² / Σ f |X(f)|², with the mean of the signal removed.
 
     Source: M. T. Rosenstein, J. J. Collins, C. J. De Luca, *A practical method for calculating largest Lyapunov
     exponents from small data sets*, Physica D 65 (1993).
@@ -152,16 +152,16 @@ def mean_period_samples(x: FloatArray) -> float:
 
 
 SETTLING_PERIODS, MIN_PERIODS = 5.0, 4.0
-"""Periods of the low cut after which the result has settled at either end, and that must be left between the ends."""
+"""Periods of the low cut that settling takes at either end, and periods that must be left between the ends."""
 
 
 def lowest_low_cut_hz(duration_s: float) -> float:
-    """Return the lowest low cut for which a signal is long enough: both ends settle, four periods remain."""
+    """Return the lowest low cut for which a signal is long enough, i.e. both ends settle and four periods remain."""
     return (2.0 * SETTLING_PERIODS + MIN_PERIODS) / positive(duration_s, "duration_s", "s")
 
 
 def n_unsettled(sampling_rate_hz: float, low_cut_hz: float) -> int:
-    """Return how many samples at either end of an integrated signal rest on what is not known beyond it."""
+    """Return the number of samples at either end of an integrated signal that depend on unknown values beyond it."""
     return ceil(SETTLING_PERIODS * sampling_rate_hz / low_cut_hz) if low_cut_hz > 0.0 else 256
 
 
@@ -171,9 +171,9 @@ def integrate_band(
     """Return the signal integrated `n_times` (negative: differentiated) within a band.
 
     Y(f) = X(f) W(f) / (2πi f)ⁿ, with W = 1 from `low` to `high`, rising smoothly from zero at low/4 and falling to zero
-    half way between `high` and half the sampling rate. No phase is added. Both ends are faded first: an abrupt end
-    would put slow parts into the signal, which integration magnifies. Before that the mean is taken off, or, without a
-    low cut, the straight line between both ends, which is put back afterwards.
+    halfway between `high` and half the sampling rate. No phase shift is added. Both ends are faded first, as an abrupt
+    end would add slow components, which integration amplifies. Before that, the mean is removed or, without a low cut,
+    the straight line between both ends, which is restored afterwards.
 
     Parameters
     ----------
@@ -183,17 +183,17 @@ def integrate_band(
     n_times : int
         -2 to 2.
     band_hz : (float, float)
-        low = 0 keeps the mean, possible for n_times <= 0 only.
+        low = 0 keeps the mean, which is possible only for n_times <= 0.
 
     Returns
     -------
     array, (n_samples,)
-        Within `n_unsettled` samples of either end the result is disturbed; the caller leaves that out. Beyond, the
-        error is below 5e-4 of the amplitude of displacement for a line anywhere between the low cut and 75 times it.
+        Within `n_unsettled` samples of either end the result is disturbed; the caller must discard these. Elsewhere,
+        the error is below 5e-4 of the displacement amplitude for a line between the low cut and 75 times it.
 
     Notes
     -----
-    What lies below the low cut is gone: a slow drift of displacement cannot be had from an accelerometer.
+    Content below the low cut is lost: a slow drift of displacement cannot be obtained from an accelerometer.
     """
     from scipy import fft
 
@@ -217,7 +217,7 @@ def integrate_band(
 
 
 def _gain(f: FloatArray, rate: float, n_times: int, low: float, high: float) -> np.ndarray:
-    """W(f) / (2πi f)ⁿ on the lines of the transform."""
+    """Return W(f) / (2πi f)ⁿ at the lines of the transform."""
     weight = np.ones(len(f))
     if low > 0.0:
         weight *= _smooth_step((f - 0.25 * low) / (0.75 * low))
@@ -235,7 +235,7 @@ def _gain(f: FloatArray, rate: float, n_times: int, low: float, high: float) -> 
 
 
 def _smooth_step(u: FloatArray) -> FloatArray:
-    """Rise from 0 at u = 0 to 1 at u = 1 with three continuous derivatives, so that ringing dies out fast."""
+    """Return a rise from 0 at u = 0 to 1 at u = 1 with three continuous derivatives, so that ringing decays fast."""
     v = np.clip(u, 0.0, 1.0)
     step: FloatArray = v**4 * (35.0 - 84.0 * v + 70.0 * v**2 - 20.0 * v**3)
     return step
@@ -243,7 +243,7 @@ def _smooth_step(u: FloatArray) -> FloatArray:
 
 MotionQuantity = Literal["acceleration", "velocity", "displacement"]
 
-# Integrations from the measured quantity to displacement; velocity takes one less.
+# Number of integrations from the measured quantity to displacement; velocity needs one less.
 _INTEGRATIONS = {"acceleration": 2, "velocity": 1, "displacement": 0, "transmission_error": 0}
 
 
@@ -259,46 +259,47 @@ def phase_plane(
 ) -> PhasePortrait:
     """Return displacement and velocity of a signal that measures acceleration, velocity or displacement.
 
-    Acceleration is integrated twice and once, velocity once and not at all; displacement (and transmission error) is
-    differentiated. All within the band from `low_cut_hz` to `high_cut_hz`, in the frequency domain, with no phase
-    shift.
+    Displacement and velocity follow from acceleration by two integrations and one, from velocity by one and none, and
+    from displacement (or transmission error) by none and one differentiation. All operate in the frequency domain,
+    within the band from `low_cut_hz` to `high_cut_hz`, without phase shift.
 
     Parameters
     ----------
     signal : Recording or array, (n_samples,)
     channel_or_rate_hz : str or float
-        The channel of a recording; of an array its sampling rate in Hz.
+        A recording's channel, or an array's sampling rate in Hz.
     low_cut_hz : float or None
-        Lowest frequency kept in full; a quarter of it and less is gone. Needed for acceleration and velocity:
-        integration magnifies whatever is slow. None for a displacement keeps everything slow, the mean included.
+        Lowest frequency kept without attenuation; a quarter of it and below is removed. Needed for acceleration and
+        velocity, as integration amplifies slow content. None for a displacement keeps all slow content, including the
+        mean.
     high_cut_hz : float or None
-        Highest frequency kept in full; None: 0.4 of the sampling rate.
+        Highest frequency kept without attenuation; None: 0.4 of the sampling rate.
     quantity : str or None
-        What the signal measures; needed for an array, and where the recording does not know.
+        The measured quantity; needed for an array, or if the recording does not state it.
     unit, source : str
         Of the signal; default: the channel's.
 
     Returns
     -------
     PhasePortrait
-        Axes displacement (m where the unit is known) and velocity. Starts 5/low_cut after the recording's start and
-        ends as much before its end (256 samples without a low cut), as the integral near the ends rests on what is not
-        known; the error is below 5e-4 of the amplitude of displacement.
+        Axes displacement (in m if the unit is known) and velocity. It starts 5/low_cut after the recording's start and
+        ends as much before its end (256 samples without a low cut), as the integral near the ends depends on unknown
+        values beyond them; the error is below 5e-4 of the displacement amplitude.
 
     Raises
     ------
     InputError
-        If the quantity is not one of motion, the low cut is missing, or the band does not lie in the signal's.
+        If the quantity is not one of motion, the low cut is missing, or the band exceeds that of the signal.
     RefusalError
         If the channel is constant or too short for the low cut.
 
     Notes
     -----
-    Not for judging slow motion: below the low cut nothing is left. A low cut that is too low turns sensor noise into
-    drift; one too high bends the portrait of slow motion.
+    Not for assessing slow motion: below the low cut nothing is left. A low cut that is too low turns sensor noise into
+    drift; one that is too high distorts the portrait of slow motion.
 
-    Source: L. Meirovitch, *Elements of Vibration Analysis* (1986), for the phase plane; integration: the property of
-    the Fourier transform.
+    Source: L. Meirovitch, *Elements of Vibration Analysis* (1986), for the phase plane; integration follows from the
+    property of the Fourier transform.
     """
     instance_of(quantity, str | None, "quantity")
     if isinstance(signal, Recording) and quantity is None:
@@ -310,7 +311,7 @@ def phase_plane(
         raise InputError(
             f"channel {source!r} measures {measured}: displacement and velocity do not follow from it",
             allowed="acceleration, velocity, displacement",
-            remedy="say quantity='acceleration' if it is one, or embed the channel with delays instead",
+            remedy="give quantity='acceleration' if it is one, or use a delay embedding of the channel instead",
         )
     n_times = _INTEGRATIONS[measured]
     x = checked_series(values, minimum=16)
@@ -346,7 +347,7 @@ def _band(low_cut_hz: float | None, high_cut_hz: float | None, rate: float, n_ti
         raise InputError(
             "low_cut_hz is not given",
             allowed="> 0 Hz",
-            remedy="integration magnifies what is slow: give half of the lowest frequency you want to see",
+            remedy="integration amplifies slow content: give half of the lowest frequency you want to see",
         )
     high = 0.4 * rate if high_cut_hz is None else within(high_cut_hz, "high_cut_hz", 0.0, 0.5 * rate, "Hz")
     low = 0.0 if low_cut_hz is None else positive(low_cut_hz, "low_cut_hz", "Hz")
@@ -356,7 +357,7 @@ def _band(low_cut_hz: float | None, high_cut_hz: float | None, rate: float, n_ti
 
 
 def _length_unit(unit: str, measured: str) -> tuple[float, str]:
-    """Return the factor to metres and "m", or 1 and the unit as it follows from the channel's own."""
+    """Return the factor to metres and "m", or 1 and the unit of displacement that follows from the channel's unit."""
     factor = si_factor(measured, unit)
     if factor is not None:
         return factor, "m"

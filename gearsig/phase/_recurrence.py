@@ -1,4 +1,4 @@
-"""Recurrence plots and their quantification, bounded in time and memory."""
+"""Recurrence plots and their quantification, with bounded time and memory."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ BoolArray = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class RecurrencePlot(Result, matrix=("recurrent", "times_s", "times_s")):
-    """Which points of a path lie close to which.
+    """Which pairs of points of a path are close to each other.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ class RecurrencePlot(Result, matrix=("recurrent", "times_s", "times_s")):
     radius : float
         Points closer than this are recurrent; in standard deviations of the axes.
     stride : int
-        Every so-many-th point of the portrait was taken.
+        Every `stride`-th point of the portrait was used.
     source : str
     """
 
@@ -53,19 +53,19 @@ class RecurrenceMeasures(Result):
     recurrence_rate : float
         RR: share of recurrent pairs.
     determinism : float
-        DET: share of the recurrent points that lie on diagonal lines of `shortest_line` points or more.
+        DET: share of the recurrent points on diagonal lines of at least `shortest_line` points.
     mean_line_s, longest_line_s : float
-        L and Lmax of these lines.
+        L and Lmax: mean and maximum length of these lines.
     entropy_nats : float
         ENTR: Shannon entropy of their lengths.
     laminarity : float
-        LAM: share of the recurrent points on vertical lines of `shortest_line` points or more.
+        LAM: share of the recurrent points on vertical lines of at least `shortest_line` points.
     trapping_time_s : float
         TT: mean length of these.
     radius : float
         In standard deviations of the axes.
     shortest_line, theiler_points, stride, n_points : int
-        In points taken; every `stride`-th sample was.
+        In points used, i.e. every `stride`-th sample.
     duration_s : float
         Length of the segment.
     source : str
@@ -105,14 +105,14 @@ def recurrence_plot(
     ----------
     portrait : PhasePortrait
     recurrence_rate : float
-        Share of pairs that the radius is chosen for, 0.001 to 0.5.
+        Share of recurrent pairs for which the radius is chosen, 0.001 to 0.5.
     radius : float or None
-        In standard deviations of the axes; wins over `recurrence_rate`.
+        In standard deviations of the axes; overrides `recurrence_rate`.
     n_points : int
-        At most so many points from the start of the path (2 to 3000): the matrix never grows with the signal. For
-        another segment see `PhasePortrait.between`.
+        Maximum number of points from the start of the path (2 to 3000), so that the matrix does not grow with the
+        signal. For another segment see `PhasePortrait.between`.
     stride : int or None
-        Every so-many-th point is taken; None: as many as leave 16 in a mean period.
+        Every `stride`-th point is used; None leaves 16 points per mean period.
 
     Raises
     ------
@@ -147,8 +147,8 @@ def recurrence_measures(
     """Return recurrence rate, determinism, line lengths, entropy, laminarity and trapping time.
 
     With P(l) the number of diagonal lines of length l: DET = Σ_{l≥l_min} l P(l) / Σ l P(l), L = Σ l P / Σ P,
-    ENTR = -Σ p ln p with p = P / Σ P over l ≥ l_min; LAM and TT the same from vertical lines. Pairs near in time
-    (Theiler) count nowhere. Lines that end at the border count as they are.
+    ENTR = -Σ p ln p with p = P / Σ P over l ≥ l_min; LAM and TT are the same for vertical lines. Pairs close in time
+    (Theiler window) are not counted. Lines cut off at the border count with their remaining length.
 
     Parameters
     ----------
@@ -156,14 +156,14 @@ def recurrence_measures(
     recurrence_rate, radius
         As in `recurrence_plot`.
     shortest_line : int
-        l_min, at least 2, in points taken.
+        l_min, at least 2, in points used.
     theiler_samples : int or None
-        None: one mean period, and at least one point taken.
+        None: one mean period, but at least one point.
     n_points : int
-        At most so many points from the start of the path (100 to 20 000). Time grows with its square, memory does not:
-        the matrix is never held. For another segment see `PhasePortrait.between`.
+        Maximum number of points from the start of the path (100 to 20 000). Time grows with its square, but memory does
+        not, as the matrix is never stored. For another segment see `PhasePortrait.between`.
     stride : int or None
-        Every so-many-th point is taken; None: as many as leave 16 in a mean period. A coarser one loses lines.
+        Every `stride`-th point is used; None leaves 16 points per mean period. A larger stride loses lines.
 
     Returns
     -------
@@ -173,11 +173,11 @@ def recurrence_measures(
     Raises
     ------
     RefusalError
-        If the path does not move, or is shorter than the Theiler window asks for.
+        If the path does not move, or is too short for the Theiler window.
 
     Notes
     -----
-    High determinism is no proof: a narrow-band noise has it as well.
+    High determinism is not a proof: narrow-band noise has it as well.
 
     Source: N. Marwan, M. C. Romano, M. Thiel, J. Kurths, *Recurrence plots for the analysis of complex systems*,
     Physics Reports 438 (2007).
@@ -217,7 +217,7 @@ def recurrence_measures(
 
 
 def _lines(counts: np.ndarray, shortest: int) -> tuple[float, float, float, float]:
-    """Return the share of points on lines, their mean and longest length, and the entropy of the lengths."""
+    """Return the share of points on lines, the lines' mean and maximum length, and the entropy of the lengths."""
     lengths = np.arange(len(counts))
     total = float(np.dot(lengths, counts))
     long, n_long = lengths[shortest:], counts[shortest:].astype(np.float64)
@@ -230,7 +230,7 @@ def _lines(counts: np.ndarray, shortest: int) -> tuple[float, float, float, floa
 
 
 def _thinned_points(portrait: PhasePortrait, n_points: int, stride: int | None) -> tuple[FloatArray, int]:
-    """Return the first points at the stride, in standard deviations of the axes, and the stride."""
+    """Return the first points at a stride, in standard deviations of the axes, and the stride."""
     check_portrait(portrait)
     extent = portrait.extent
     if not bool((extent > 0.0).any()):
@@ -247,13 +247,13 @@ def _theiler(portrait: PhasePortrait, n_samples: int | None, stride: int) -> int
 
 
 def _period(portrait: PhasePortrait) -> float:
-    """Mean period along the first axis that moves, in samples."""
+    """Return the mean period along the first axis that moves, in samples."""
     axis = int(np.argmax(portrait.extent > 0.0))
     return mean_period_samples(np.ascontiguousarray(portrait.points[:, axis], dtype=np.float64))
 
 
 def _radius(points: FloatArray, rate: float, radius: float | None, theiler: int) -> float:
-    """Return the radius asked for, or the quantile of distances of pairs that are spread evenly over all delays."""
+    """Return the given radius, or the `rate` quantile of the distances of pairs spread evenly over all delays."""
     if radius is not None:
         return positive(radius, "radius", "standard deviations")
     within(rate, "recurrence_rate", 0.001, 0.5)
@@ -261,7 +261,7 @@ def _radius(points: FloatArray, rate: float, radius: float | None, theiler: int)
     lowest = theiler + 1
     if n <= lowest + 1:
         raise InputError(f"the portrait has {n} points", allowed=f"more than {lowest + 1}")
-    # A pair (i, j) is drawn with the weight that the triangle j - i > theiler gives it.
+    # Pairs (i, j) are spread uniformly over the triangle j - i > theiler.
     u, v = (np.arange(N_PAIRS) + 0.5) / N_PAIRS, (np.arange(N_PAIRS) * GOLDEN) % 1.0
     lag = lowest + np.minimum(((n - lowest) * (1.0 - np.sqrt(1.0 - u))).astype(np.intp), n - lowest - 1)
     starts = (v * (n - lag)).astype(np.intp)
@@ -272,10 +272,10 @@ def _radius(points: FloatArray, rate: float, radius: float | None, theiler: int)
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def line_lengths(points, radius, theiler, diagonal, vertical):  # type: ignore[no-untyped-def]
-    """Count lines by length: diagonal[l] in the upper triangle, vertical[l] in all columns; index 0 holds no line.
+    """Count lines by length: diagonal[l] in the upper triangle, vertical[l] in all columns; index 0 is not a line.
 
     Pairs within `theiler` points in time count as not recurrent. The matrix is symmetric: a column below the excluded
-    band is a row above it, so one pass over the upper triangle finds the vertical lines of both halves.
+    band equals a row above it, so one pass over the upper triangle finds the vertical lines of both halves.
     """
     n, d = points.shape
     limit = radius * radius

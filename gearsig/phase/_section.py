@@ -1,4 +1,4 @@
-"""Poincaré sections: the path once per cycle, or where it crosses a plane; bifurcation diagrams of their points."""
+"""Poincaré sections, once per cycle or where the path crosses a plane, and bifurcation diagrams of their points."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class PoincareSection(Result, matrix=("points", "times_s", "axis_names")):
     Parameters
     ----------
     points : array, (n_points, n_axes)
-        Interpolated between the samples, in the order of time.
+        Interpolated between the samples, in chronological order.
     times_s : array, (n_points,)
     axis_names, units : tuples of str
     extent : array, (n_axes,)
@@ -41,7 +41,7 @@ class PoincareSection(Result, matrix=("points", "times_s", "axis_names")):
     kind : str
         "locked": once per cycle of a mesh or a shaft; "geometric": where the path crosses a plane.
     section : str
-        What it is locked to, or the plane.
+        The cycle it is locked to, or the plane.
     source : str
     """
 
@@ -62,13 +62,13 @@ class PoincareSection(Result, matrix=("points", "times_s", "axis_names")):
 
     @property
     def n_points(self) -> int:
-        """Crossings."""
+        """Number of points."""
         return int(self.points.shape[0])
 
 
 @dataclass(frozen=True)
 class CycleLock:
-    """A shaft angle, and how many cycles make one of its revolutions.
+    """A shaft angle and the number of cycles per revolution.
 
     Parameters
     ----------
@@ -87,14 +87,14 @@ class CycleLock:
         positive(self.cycles_per_revolution, "cycles_per_revolution")
 
     def times_s(self, start_s: float, end_s: float, phase_cycles: float = 0.0) -> FloatArray:
-        """Return the times between `start_s` and `end_s` at which a cycle is `phase_cycles` old, (n,).
+        """Return the times in s between `start_s` and `end_s` at which the cycle's phase is `phase_cycles`, (n,).
 
         The angle's piecewise cubic is inverted exactly.
 
         Raises
         ------
         RefusalError
-            If the angle is known in no part of that time.
+            If the angle is not known at any time in this range.
         """
         part = self.angle.between(start_s, end_s)
         first = np.ceil(part.revolutions[0] * self.cycles_per_revolution - phase_cycles)
@@ -112,19 +112,19 @@ def find_lock(
     ----------
     recording : Recording
     pair, shaft : str
-        One of them; neither: the reference shaft.
+        Give at most one; without either, the reference shaft is used.
     rig : Rig, optional
-        Default: the recording's own.
+        Default: the recording's rig.
     angle : ShaftAngle, optional
         Of the rig's reference shaft; default: found from the recording, see `find_shaft_angle`.
 
     Raises
     ------
     InputError
-        If both are named, or one that the rig does not have.
+        If both are named, or the rig does not have it.
     RefusalError
         If there is no shaft angle, or the teeth that lead to the pair or shaft are not known: a section without a
-        period means nothing.
+        period is meaningless.
     """
     check_recording(recording)
     check_rig(rig)
@@ -143,7 +143,7 @@ def find_lock(
 
 
 def constant_period_lock(period_s: float, end_s: float, name: str = "period") -> CycleLock:
-    """Return the lock to a constant, known period, from time zero to `end_s`."""
+    """Return the lock to a known constant period, from time zero to `end_s`."""
     rate = 1.0 / positive(period_s, "period_s", "s")
     ends = np.array([0.0, positive(end_s, "end_s", "s")])
     angle = ShaftAngle(name, ends, ends * rate, np.full(2, rate), "constant")
@@ -168,7 +168,7 @@ def _cycles(rig: Rig | None, pair: str, shaft: str) -> tuple[float, str]:
 
 
 def check_lock(value: object, *, needed: bool = False) -> None:
-    """Raise unless the value is a lock, or None where none is needed."""
+    """Raise unless the value is a lock, or None if none is needed."""
     remedy = "gearsig.phase.find_lock(recording) finds one"
     instance_of(value, CycleLock if needed else CycleLock | None, "lock", remedy=remedy)
 
@@ -184,21 +184,22 @@ def poincare_section(
 ) -> PoincareSection:
     """Return the points of a path once per cycle of a mesh or a shaft, or where it crosses the plane n·x = offset.
 
-    With a lock, values between the samples are interpolated band-limited (error below 5e-6 of full scale up to 0.4 of
-    the sampling rate), at times from the exact inverse of the shaft angle: speed may vary. Without, the crossing is the
-    root of the cubic through the four samples around it.
+    With a lock, band-limited interpolation gives the values between samples (error below 5e-6 of full scale up to 0.4
+    of the sampling rate), at times from the exact inverse of the shaft angle, so the speed may vary. Without a lock,
+    the crossing is the root of the cubic through the four samples around it.
 
     Parameters
     ----------
     portrait : PhasePortrait
-        A periodic motion with the lock's period gives one point, one with twice the period two; a quasi-periodic one a
-        closed curve.
+        A periodic motion with the lock's period gives one point, one with twice the period two points; a quasi-periodic
+        motion gives a closed curve.
     lock : CycleLock or None
-        See `find_lock`; None: the plane.
+        See `find_lock`; None uses the plane.
     phase_cycles : float
-        Where in the lock's cycle the path is looked at.
+        Phase of the lock's cycle at which points are taken.
     normal : array, (n_axes,), or None
-        Of the plane; None: the last axis; in a phase plane, velocity zero upwards: the lowest displacements.
+        Normal of the plane. None: the last axis; in a phase plane this is velocity rising through zero, i.e. the
+        minimum displacements.
     offset : float
         In the unit of n·x.
     direction : int
@@ -207,13 +208,13 @@ def poincare_section(
     Raises
     ------
     InputError
-        On a normal of another length or of zero, or one beside a lock.
+        On a normal of wrong length or zero, or a normal given together with a lock.
     RefusalError
         If no whole cycle lies in the portrait, its samples are too coarse for the cycle, or it never crosses the plane.
 
     Notes
     -----
-    A lock is not for discontinuous states: an interpolated jump overshoots.
+    Do not use a lock with discontinuous states: an interpolated jump overshoots.
 
     Source: F. C. Moon, *Chaotic Vibrations* (1987), ch. 2 (Poincaré maps of forced motion).
     """
@@ -257,7 +258,7 @@ def _geometric_section(
     if len(n) != portrait.n_axes or not n.any():
         raise InputError(f"normal is {n.tolist()}", allowed=f"{portrait.n_axes} numbers, not all zero")
     distance = np.asarray(portrait.points @ n, dtype=np.float64) - number(offset, "offset")
-    # The samples before a change of sign that have one more on either side.
+    # Samples before a change of sign, with one more sample on either side.
     change = np.diff((distance >= 0.0).astype(np.int8))
     before = np.flatnonzero(change != 0 if direction == 0 else change == direction)
     before = before[(before >= 1) & (before + 2 < len(distance))]
@@ -265,7 +266,7 @@ def _geometric_section(
         raise RefusalError(
             f"the path never crosses the plane {n.tolist()}·x = {offset:g}; n·x runs from "
             f"{distance.min() + offset:.4g} to {distance.max() + offset:.4g}",
-            remedy="put the plane through the path",
+            remedy="choose a plane that the path crosses",
         )
     u = _cubic_roots(distance, before)
     weights = _lagrange(u)
@@ -277,18 +278,18 @@ def _geometric_section(
 
 
 def section_period(section: PoincareSection, *, longest: int = 16, tolerance: float = 0.05) -> int:
-    """Return after how many crossings the section repeats itself; 0 if it does not within `longest`.
+    """Return the number of points after which the section repeats; 0 if it does not repeat within `longest`.
 
-    The smallest p with median |xᵢ₊ₚ - xᵢ| / size ≤ tolerance, distances in standard deviations of the path's axes, that
-    holds over half of the section as well: quasi-periodic motion that nearly closes creeps.
+    It is the smallest p with median |xᵢ₊ₚ - xᵢ| ≤ tolerance, in standard deviations of the path's axes, that also holds
+    at a lag of about half the section, since quasi-periodic motion that nearly closes drifts slowly.
 
     Parameters
     ----------
     section : PoincareSection
-        Of a steady operating condition; at least 2·longest points, or fewer for a shorter search.
+        At a steady operating condition, with at least 2·longest points; with fewer, the search is shorter.
     longest : int
     tolerance : float
-        Above the scatter from noise, below the distance of the branches that are to be told apart.
+        Above the scatter from noise, below the distance of the branches to be distinguished.
     """
     instance_of(section, PoincareSection, "section", remedy="gearsig.poincare_section(portrait) makes one")
     count(longest, "longest")
@@ -305,19 +306,19 @@ def _return_distance(x: FloatArray, lag: int) -> float:
 
 
 def points_between(points: FloatArray, positions: FloatArray) -> FloatArray:
-    """Return the points of a path of limited band between its samples, (n, n_axes).
+    """Return points of a band-limited path between its samples, (n, n_axes).
 
     Parameters
     ----------
     points : array, (n_points, n_axes)
-        Its band ends below 0.4 of the sampling rate.
+        Band-limited to below 0.4 of the sampling rate.
     positions : array, (n,)
         In samples, sorted, at least `gearsig.angle.REACH` from either end.
     """
     points_at = np.empty((len(positions), points.shape[1]))
     for axis in range(points.shape[1]):
         x = np.ascontiguousarray(points[:, axis], dtype=np.float64)
-        # The mean is kept apart: what is left is interpolated with an error relative to the motion, not to the mean.
+        # The mean is treated separately, so that the interpolation error is relative to the motion, not to the mean.
         mean = float(x.mean())
         values = np.empty(len(positions))
         interpolate(read_only(x - mean), positions, doubling_filter(), delay_table(), values)
@@ -326,7 +327,7 @@ def points_between(points: FloatArray, positions: FloatArray) -> FloatArray:
 
 
 def _cubic_roots(distance: FloatArray, before: np.ndarray) -> FloatArray:
-    """Where between the two middle samples the cubic through four is zero, by bisection."""
+    """Return the zero, between 0 and 1, of the cubic through four samples between the middle two, by bisection."""
     d = distance[before[:, None] + np.arange(-1, 3)]
     low, high = np.zeros(len(before)), np.ones(len(before))
     rising = d[:, 2] > d[:, 1]
@@ -339,7 +340,7 @@ def _cubic_roots(distance: FloatArray, before: np.ndarray) -> FloatArray:
 
 
 def _lagrange(u: FloatArray) -> FloatArray:
-    """Weights of the samples at -1, 0, 1, 2 for the value at u, (n, 4)."""
+    """Return the weights of the samples at -1, 0, 1, 2 for the value at u, (n, 4)."""
     return np.column_stack(
         [
             -u * (u - 1.0) * (u - 2.0) / 6.0,
@@ -351,7 +352,7 @@ def _lagrange(u: FloatArray) -> FloatArray:
 
 
 # --------------------
-# Bifurcation diagrams: the points over speed, load, roughness, backlash, or anything else that is varied.
+# Bifurcation diagrams: points over speed, load, roughness, backlash, or any other varied parameter.
 # --------------------
 
 
@@ -368,10 +369,10 @@ class BifurcationDiagram(Result, columns=("parameter", "points")):
     values : array, (n_values,)
         The parameter values that have points, ascending.
     periods : tuple of int, (n_values,)
-        Cycles after which the section repeats at each value; 0 where it does not repeat within the longest looked for.
+        Cycles after which the section repeats at each value; 0 if it does not repeat within the longest tested.
     section : str
     extents : array, (n_values,)
-        Standard deviation of the whole path along the drawn axis at each value; empty where it is not known.
+        Standard deviation of the whole path along the plotted axis at each value; empty if not known.
     """
 
     parameter: FloatArray
@@ -394,7 +395,7 @@ class BifurcationDiagram(Result, columns=("parameter", "points")):
 
 
 DIFFERS = 0.1
-"""Two branches are apart where their sizes differ by more than this share."""
+"""Two branches are distinct if their sizes differ by more than this share."""
 
 
 def bifurcation_diagram(
@@ -406,18 +407,18 @@ def bifurcation_diagram(
     max_points: int = 400,
     tolerance: float = 0.05,
 ) -> BifurcationDiagram:
-    """Return the diagram of one coordinate of Poincaré sections over the parameter they were taken at.
+    """Return the bifurcation diagram of one coordinate of Poincaré sections over a parameter.
 
     Parameters
     ----------
     sections : iterable of (value, PoincareSection)
-        In any order, consumed one by one: nothing but the points is kept. The same axis must mean the same in all.
+        In any order, consumed one by one; only the points are kept. Axes must have the same meaning in all.
     parameter, unit : str
         E.g. "speed", "rpm".
     axis : int
-        Coordinate that is drawn.
+        Coordinate to plot.
     max_points : int
-        The last so many points of each section are kept: what comes first may still be a transient.
+        Only the last `max_points` points of each section are kept, as the first may still be a transient.
     tolerance : float
         See `section_period`.
 
@@ -461,21 +462,22 @@ def bifurcation_diagram(
 
 
 def coexistence_values(up: BifurcationDiagram, down: BifurcationDiagram, *, differs: float = DIFFERS) -> FloatArray:
-    """Return the values at which two branches hold different motions, (n,): coexisting attractors, hysteresis.
+    """Return the parameter values at which two branches differ, (n,): coexisting attractors, hysteresis.
 
-    |s_up − s_down| > 0.1 max(s_up, s_down), with s the standard deviation of the path along the drawn axis.
+    They differ if |s_up − s_down| > `differs` max(s_up, s_down), with s the standard deviation of the path along the
+    plotted axis.
 
     Parameters
     ----------
     up, down : BifurcationDiagram
-        Of the same parameter; values that only one of them has are passed over.
+        Of the same parameter; values in only one of them are skipped.
     differs : float
-        The share.
+        Relative difference above which two motions count as different.
 
     Raises
     ------
     InputError
-        If the extents are not known, or the diagrams are of different things.
+        If the extents are not known, or the diagrams show different quantities.
     """
     if (up.parameter_name, up.axis_name, up.unit) != (down.parameter_name, down.axis_name, down.unit):
         raise InputError(f"diagrams of {up.axis_name} and {down.axis_name}", allowed="two of the same quantity")
@@ -489,16 +491,16 @@ def coexistence_values(up: BifurcationDiagram, down: BifurcationDiagram, *, diff
 
 @dataclass(frozen=True)
 class TwoMotions:
-    """Neighbouring values at which two branches are apart.
+    """A range of neighbouring parameter values at which two branches differ.
 
     Parameters
     ----------
     first, last : float
-        The lowest and the highest of them, out of the values tried.
+        The lowest and highest of these values.
     low, high : float
-        Half way to the values where the branches agree, never more than half a step of the sweep.
+        Halfway to the values where the branches agree, at most half a step of the sweep further.
     begins_with_sweep, ends_with_sweep : bool
-        Whether it reaches an end of the values tried: it may go on beyond.
+        Whether the range reaches an end of the sweep, and so may continue beyond it.
     """
 
     first: float
@@ -512,10 +514,10 @@ class TwoMotions:
 def coexistence_ranges(
     up: BifurcationDiagram, down: BifurcationDiagram, *, differs: float = DIFFERS
 ) -> tuple[TwoMotions, ...]:
-    """Return the ranges in which two motions coexist, ascending; see `coexistence_values` for when they do.
+    """Return the ranges in which two motions coexist, ascending; see `coexistence_values` for the criterion.
 
-    Where a range begins and ends is known to half a step only, and how wide it is depends on the sweep: a jump back
-    needs a sweep that goes far enough to lose each motion.
+    The limits of a range are known only to half a step, and its width depends on the sweep, which must go far enough
+    for each motion to be lost.
 
     Raises
     ------
@@ -537,6 +539,6 @@ def coexistence_ranges(
 
 
 def step_of(up: BifurcationDiagram, down: BifurcationDiagram) -> float:
-    """Return the step between the values that both branches have, the median one; 0 for a single value."""
+    """Return the median step between the values common to both branches; 0 for a single value."""
     values = np.intersect1d(up.values, down.values)
     return float(np.median(np.diff(values))) if len(values) > 1 else 0.0

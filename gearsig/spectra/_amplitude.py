@@ -40,16 +40,16 @@ def amplitude_spectrum(
     overlap: float = 0.5,
     transform: ComplexArray | None = None,
 ) -> Spectrum:
-    """Return the amplitude or power spectrum of a signal, of one block or as the rms mean over blocks.
+    """Return the amplitude or power spectrum of a signal, over one block or as the rms mean over blocks.
 
     A_k = 2 |Σ x[n] w[n] exp(-2πi k n/N)| / Σ w[n]; half of that at DC and at Nyquist.
 
     Parameters
     ----------
     signal : Recording or array, (n_samples,)
-        The mean is not removed: it stands at line 0.
+        The mean is not removed: it appears at line 0.
     channel_or_rate_hz : str or float
-        The channel of a recording; of an array its sampling rate in Hz.
+        A recording's channel, or an array's sampling rate in Hz.
     unit, source : str
         Of the signal; default: the channel's.
     window : str
@@ -59,15 +59,15 @@ def amplitude_spectrum(
     n_per_block : int or None
         Block length; None takes the whole signal as one block, with the finest resolution and no averaging.
     overlap : float
-        0 to 0.95, the part of a block that the next one repeats.
+        Fraction of a block shared with the next, 0 to 0.95.
     transform : array, (n_samples // 2 + 1,), or None
-        The signal's `rfft`, where it is known; of use to a single block.
+        The signal's `rfft`, if known; used only for a single block.
 
     Returns
     -------
     Spectrum
-        Over frequency. Parseval: with a rectangular window and one block, the sum of "power" is the mean square;
-        with another window, the sum over the noise bandwidth in lines is the mean square of x·w over that of w.
+        Over frequency. Parseval: with a rectangular window and one block, the "power" lines add up to the mean square;
+        with another window, the sum divided by the noise bandwidth in lines is the mean square of x·w over that of w.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def amplitude_spectrum(
 
     Notes
     -----
-    Not for noise levels: they depend on the window and the block length here. Use `power_density`.
+    Not for noise levels, which depend on the window and the block length here: use `power_density`.
     Not for a speed that changes by more than a line over the block: use an order spectrum.
 
     Examples
@@ -104,14 +104,14 @@ def power_density(
 ) -> Spectrum:
     """Return the one-sided power spectral density, averaged over windowed overlapping blocks.
 
-    S_k = c_k mean |Σ x[n] w[n] exp(-2πi k n/N)|² / (fs Σ w[n]²), c_k = 2 but at DC and Nyquist 1.
+    S_k = c_k mean |Σ x[n] w[n] exp(-2πi k n/N)|² / (fs Σ w[n]²); c_k = 2, but 1 at DC and Nyquist.
 
     Parameters
     ----------
     signal : Recording or array, (n_samples,)
         The mean is not removed.
     channel_or_rate_hz : str or float
-        The channel of a recording; of an array its sampling rate in Hz.
+        A recording's channel, or an array's sampling rate in Hz.
     unit, source : str
         Of the signal; default: the channel's.
     window : str
@@ -133,7 +133,7 @@ def power_density(
 
     Notes
     -----
-    Not for the level of a tone: its density grows with the block length. Use `amplitude_spectrum`.
+    Not for the level of a tone, whose density grows with the block length: use `amplitude_spectrum`.
 
     References
     ----------
@@ -157,7 +157,7 @@ def spectrum_of_blocks(
     shaft: str = "",
     transform: ComplexArray | None = None,
 ) -> Spectrum:
-    """Return the mean power over blocks in a scaling, up to `highest`; rate in Hz, or samples per revolution."""
+    """Return the spectrum of a block plan, averaged in power, up to `highest`; rate in Hz or samples per revolution."""
     resolution = rate / plan.n_per_block
     bandwidth = plan.window.noise_bandwidth_bins * resolution
     values = scaled(mean_power(x, plan, transform), scaling, bandwidth, plan.n_per_block)
@@ -179,37 +179,37 @@ def spectrum_of_blocks(
 
 
 MIN_LINES = 16
-"""Fewer lines than that per block make a floor's quantile too uncertain (35 % with one average)."""
+"""Minimum lines per block for a floor: with fewer, the quantile is too uncertain (35 % with one average)."""
 
 
 def noise_floor(
     spectrum: Spectrum, *, width: float | None = None, quantile: float = 0.5, highest: float | None = None
 ) -> Spectrum:
-    """Return the mean noise at each line of a spectrum, estimated from a quantile of its neighbourhood.
+    """Return the mean noise level at each line of a spectrum, estimated from a quantile of its neighbourhood.
 
     Under Gaussian noise of smooth density, the power of a line averaged K times follows a gamma distribution of
-    shape K (K = 1: exponential; the amplitude's is Rayleigh). Its quantile q is mean · G⁻¹(q; K)/K, so that
-    floor = Q_q / (G⁻¹(q; K)/K) is the mean noise power; for K = 1 and the median the divisor is ln 2. Lines of tones
-    only shift the quantile by their share of the neighbourhood, whatever their height. Block quantiles every half
-    width are joined by straight lines over log power; towards either end the blocks get shorter.
+    shape K (K = 1: exponential; the amplitude is then Rayleigh). Its quantile q is mean · G⁻¹(q; K)/K, so that
+    floor = Q_q / (G⁻¹(q; K)/K) is the mean noise power; for K = 1 and the median the divisor is ln 2. Tones shift
+    the quantile only by their share of the neighbourhood, whatever their height. Block quantiles every half width are
+    interpolated linearly in log power; the blocks get shorter towards either end.
 
     Parameters
     ----------
     spectrum : Spectrum
         Of any scaling but "dimensionless".
     width : float or None
-        Of the neighbourhood, in the axis' unit; at least 16 lines. It should hold many more noise lines than
+        Width of the neighbourhood in the axis' unit, at least 16 lines. It should hold many more noise lines than
         tones, and the density should change little over it. None takes 1/200 of the lines, but at least 256 lines
-        (fewer, down to 48, where the spectrum is an average).
+        (fewer, down to 48, for an averaged spectrum).
     quantile : float
-        0.05 to 0.95. Lower ones bear more tones (at 0.25, three in four lines may be tones) but scatter more.
+        0.05 to 0.95. Lower ones tolerate more tones (at 0.25, three in four lines may be tones) but scatter more.
     highest : float or None
-        Lines above it are left out, which spares the time for them; the floor of the others is the same.
+        Lines above it are left out, which saves time; the floor of the others stays the same.
 
     Returns
     -------
     Spectrum
-        Same axis and scaling. For amplitudes, it is the root of the mean squared amplitude, so that
+        Same axis and scaling. For amplitudes, the floor is the root mean square amplitude, so that
         20 lg(amplitude/floor) = 10 lg(power/mean noise power).
 
     Raises
@@ -221,8 +221,8 @@ def noise_floor(
 
     Notes
     -----
-    Not for a spectrum without noise (a simulation's): the floor is then its rounding or leakage. DC and the window's
-    leakage around it count as lines do.
+    Not for a noise-free spectrum, as of a simulation: the floor is then rounding or leakage. DC and the window's
+    leakage around it count like any other lines.
 
     References
     ----------
@@ -237,7 +237,7 @@ def noise_floor(
     q = within(quantile, "quantile", 0.05, 0.95)
     block = _block_lines(spectrum, width)
     n_kept = n_lines if highest is None else spectrum.index_of(highest) + 1
-    power = line_powers(spectrum.head(n_kept + 2 * block))  # so far the blocks at the end reach
+    power = line_powers(spectrum.head(n_kept + 2 * block))  # reach of the last blocks
     floor = _running_quantile(power, block, q)[:n_kept] / gamma_quantile(q, spectrum.n_averages)
     is_amplitude = spectrum.scaling in ("amplitude peak", "amplitude rms")
     return replace(
@@ -248,19 +248,19 @@ def noise_floor(
 
 
 def floor_of_powers(power: FloatArray) -> FloatArray:
-    """Return the floor that `noise_floor` finds by default under the powers of a single block's lines."""
+    """Return the noise power at each line of a single block's power spectrum, from `noise_floor` with its defaults."""
     positions = np.arange(float(len(power)))
     return noise_floor(Spectrum(power, positions, "frequency", "power", "", 1.0, 1.0, "rectangular", 1, "")).values
 
 
 def line_powers(spectrum: Spectrum) -> FloatArray:
-    """Return the values, squared if they are amplitudes."""
+    """Return the power of each line: the values, squared if they are amplitudes."""
     values: FloatArray = np.asarray(spectrum.values, dtype=np.float64)
     return values**2 if spectrum.scaling in ("amplitude peak", "amplitude rms") else values
 
 
 def gamma_quantile(q: float, n_averages: int) -> float:
-    """Return the quantile q of a line's power over its mean, for n independent averages; ln 2 for the median and one.
+    """Return the quantile q of a noise line's power relative to its mean, for n independent averages.
 
     Examples
     --------
@@ -275,7 +275,7 @@ def gamma_quantile(q: float, n_averages: int) -> float:
 def _block_lines(spectrum: Spectrum, width: float | None) -> int:
     n_lines = len(spectrum.values)
     if width is None:
-        # The floor's own scatter multiplies the false-alarm rate of a search above it; so many lines keep that small.
+        # Scatter of the floor raises the false-alarm rate of a search above it; this many lines keep it small.
         return min(n_lines, max(48, 256 // spectrum.n_averages, n_lines // 200))
     block = round(positive(width, "width") / spectrum.resolution)
     if block < MIN_LINES:
@@ -288,7 +288,7 @@ def _block_lines(spectrum: Spectrum, width: float | None) -> int:
 
 
 def _running_quantile(power: FloatArray, block: int, q: float) -> FloatArray:
-    """Return block quantiles every half block, interpolated over log power at every line."""
+    """Return quantiles of blocks every half block, interpolated in log power to every line."""
     n = len(power)
     half = block // 2
     blocks = np.lib.stride_tricks.sliding_window_view(power, block)[::half]
@@ -302,7 +302,7 @@ def _running_quantile(power: FloatArray, block: int, q: float) -> FloatArray:
         above.insert(0, last)
     x = np.concatenate([[c for _, c in below], centres, [c for _, c in above]])
     y = np.concatenate([[v for v, _ in below], levels, [v for v, _ in above]])
-    # Zeros (a dead segment of a simulated spectrum) have no logarithm; the smallest positive double stands for them.
+    # Zeros (a dead segment of a simulated spectrum) have no logarithm; the smallest positive double replaces them.
     order = np.argsort(x, kind="stable")
     result = np.empty(n)
     _join_levels(x[order], np.log(np.maximum(y, np.finfo(np.float64).tiny))[order], result)
@@ -311,10 +311,10 @@ def _running_quantile(power: FloatArray, block: int, q: float) -> FloatArray:
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _join_levels(x, logs, levels):  # type: ignore[no-untyped-def]
-    """`exp(interp(…))` at 0, 1, … of straight lines between ascending points; level beyond either end.
+    """Evaluate exp of the linear interpolation between ascending points at 0, 1, …; constant beyond either end.
 
-    Between two points each level is the one before times a factor; from the start of every 64 by `exp` itself, so that
-    rounding errors do not add up.
+    Between two points, each level is the previous one times a factor; every 64th is computed by `exp` itself, so that
+    rounding errors do not accumulate.
     """
     begin, last = 0, len(x) - 1
     for i in range(-1, len(x)):
@@ -332,7 +332,7 @@ def _join_levels(x, logs, levels):  # type: ignore[no-untyped-def]
 
 
 def _quantiles(rows: FloatArray, q: float) -> FloatArray:
-    """Return `np.quantile(rows, q, axis=1)`, six times as fast: a single place is sought in each row."""
+    """Return `np.quantile(rows, q, axis=1)`, six times as fast: it only partitions each row at one index."""
     at = q * (rows.shape[1] - 1)
     below = int(at)
     parted = np.partition(rows, below, axis=1)
@@ -342,23 +342,23 @@ def _quantiles(rows: FloatArray, q: float) -> FloatArray:
 
 
 SKIRT_BINS = 200
-"""How far a strong line's leakage is followed."""
+"""Distance in lines up to which a strong line's leakage is considered."""
 
 
 @dataclass(frozen=True)
 class Line:
-    """A line that stands above the noise floor.
+    """A spectral line above the noise floor.
 
     Parameters
     ----------
     position : float
         Frequency or order, interpolated between the spectrum's lines.
     value : float
-        In the spectrum's scaling, corrected for the loss between two lines; a density's is that of its line.
+        In the spectrum's scaling, corrected for scalloping loss; for a density, the uncorrected value of the line.
     floor : float
-        Mean noise there, in the same scaling.
+        Mean noise level there, in the same scaling.
     ratio_db : float
-        20 lg of the amplitude ratio, 10 lg of the power ratio, of the highest line to the floor.
+        Highest line over the floor: 20 lg of the amplitude ratio or 10 lg of the power ratio.
     """
 
     position: float
@@ -372,17 +372,17 @@ def find_lines(
 ) -> tuple[Line, ...]:
     """Return the lines above the noise floor, in order of position.
 
-    A line is a local maximum above floor + threshold that is not leakage of a stronger one. Without `threshold_db`,
-    the threshold holds the probability of any false line in the whole spectrum at `false_alarm`: under Gaussian noise
-    the power of one of n lines, averaged K times, exceeds t times its mean with probability Q(K, K t) (for K = 1,
-    exp(-t)), so that Q(K, K t) = false_alarm/n.
+    A line is a local maximum that exceeds the floor by the threshold and is not leakage of a stronger one. Without
+    `threshold_db`, the threshold keeps the probability of any false line in the whole spectrum at `false_alarm`: under
+    Gaussian noise, the power of one of n lines, averaged K times, exceeds t times its mean with probability Q(K, K t)
+    (for K = 1, exp(-t)), so that Q(K, K t) = false_alarm/n.
 
     Parameters
     ----------
     spectrum : Spectrum
         Over frequency or order.
     floor : Spectrum or None
-        From `noise_floor` of the same spectrum; None takes its defaults.
+        From `noise_floor` of the same spectrum; None computes it with the defaults.
     false_alarm : float
         1e-12 to 0.5, for the whole spectrum.
     threshold_db : float or None
@@ -391,8 +391,8 @@ def find_lines(
     Returns
     -------
     tuple of Line
-        Positions are exact for a single steady tone without noise. They come from the ratio of the two highest lines
-        and the window's transform; so does the correction of the value.
+        Positions and values are interpolated from the ratio of the two highest lines and the window's transform;
+        positions are exact for a single steady tone without noise.
 
     Raises
     ------
@@ -401,9 +401,9 @@ def find_lines(
 
     Notes
     -----
-    The rate holds for Gaussian noise with a floor that follows its density; impulses and a modulated carrier's skirts
-    are neither. A floor from few lines scatters and raises the rate: 256 lines about 1.3 times, 64 lines 2.5 times.
-    The lines at DC and Nyquist and the window's main lobe around DC are left out.
+    The false-alarm rate holds for Gaussian noise and a floor that follows its density, so not for impulses or the
+    skirts of a modulated carrier. A floor from few lines scatters and raises the rate: with 256 lines about 1.3 times,
+    with 64 lines 2.5 times. DC, the window's main lobe around it, and Nyquist are left out.
 
     References
     ----------
@@ -428,7 +428,7 @@ def find_lines(
     else:
         rate = within(false_alarm, "false_alarm", 1e-12, 0.5)
         threshold = false_alarm_ratio(rate / max(1, len(power) - first - 1), spectrum.n_averages)
-    with np.errstate(divide="ignore", invalid="ignore"):  # a floor of zero: only what is above zero is infinite
+    with np.errstate(divide="ignore", invalid="ignore"):  # over a zero floor, only lines above zero are infinite
         ratio = np.where(power > 0, power / mean_noise, 0.0)
     peaks = _local_maxima(power, first)
     peaks = peaks[ratio[peaks] > threshold]
@@ -437,7 +437,7 @@ def find_lines(
 
 
 def false_alarm_ratio(probability: float, n_averages: int) -> float:
-    """Return the ratio to its mean that a noise line's power exceeds with the given probability.
+    """Return the ratio of a noise line's power to its mean that is exceeded with the given probability.
 
     Examples
     --------
@@ -450,7 +450,7 @@ def false_alarm_ratio(probability: float, n_averages: int) -> float:
 
 
 def _local_maxima(power: FloatArray, first: int) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
-    """Return indices of lines above both neighbours, from `first` to the last but one."""
+    """Return indices of lines above both neighbours, from `first` to the second last."""
     inner = power[1:-1]
     peaks = np.flatnonzero((inner > power[:-2]) & (inner >= power[2:])) + 1
     return peaks[peaks >= first]
@@ -459,7 +459,7 @@ def _local_maxima(power: FloatArray, first: int) -> np.ndarray[tuple[int], np.dt
 def _without_leakage(
     peaks: np.ndarray[tuple[int], np.dtype[np.intp]], power: FloatArray, mean_noise: FloatArray, window: str
 ) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
-    """Drop peaks that a stronger one's leakage explains: power below margin² · envelope² · that peak's power."""
+    """Drop peaks explained by leakage of a stronger one: power below margin² · envelope² · that peak's power."""
     envelope = (2.0 * _leakage_envelope(window)) ** 2  # noise on top of a skirt is not a line
     explained = np.zeros_like(power)
     strong = peaks[power[peaks] * envelope[2] > mean_noise[peaks]]  # others leak less than the noise
@@ -496,7 +496,7 @@ def _interpolate(three: FloatArray, window: str) -> tuple[float, float]:
 
 @lru_cache(maxsize=8)
 def _ratio_table(window: str) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return offsets 0 … 0.5 of a tone from its highest line, neighbour-to-highest ratio, response at the highest."""
+    """Return a tone's offsets 0 … 0.5 from its highest line, neighbour-to-highest ratios, responses at the highest."""
     offsets = np.linspace(0.0, 0.5, 501)
     line, neighbour = window_response(window, offsets), window_response(window, 1.0 - offsets)
     return offsets, neighbour / line, line
@@ -506,7 +506,7 @@ def _ratio_table(window: str) -> tuple[FloatArray, FloatArray, FloatArray]:
 def _leakage_envelope(window: str) -> FloatArray:
     """Return the largest response at or beyond each distance in lines, for a tone anywhere between two lines.
 
-    Relative to the tone's highest line, which is up to half a line off.
+    It is relative to the tone's highest line, which is up to half a line away.
     """
     fine = window_response(window, np.arange(0, 8 * (SKIRT_BINS + 9)) / 8.0)
     beyond = np.maximum.accumulate(fine[::-1])[::-1]
@@ -522,33 +522,34 @@ def _half_lobe(window: str) -> float:
 
 
 # --------------------
-# A signal without its steady tones, or with all lines equally strong.
+# Removal of steady tones, and whitening.
 # --------------------
 
 Preparation = Literal["none", "tones removed", "whitened"]
 
 
 def prepared_signal(values: FloatArray, sampling_rate_hz: float, preparation: Preparation) -> FloatArray:
-    """Return a signal without its steady tones, or with all lines equally strong.
+    """Return a signal with its steady tones removed, or whitened to equally strong lines.
 
     Parameters
     ----------
     values : array, (n_samples,)
     sampling_rate_hz : float
     preparation : str
-        "none"; "tones removed": lines of the whole signal's spectrum more than 13 dB above the floor are cut down to
-        the floor, phases kept, which takes out mesh and shaft harmonics of a steady speed; "whitened": every line is
-        divided by its magnitude (cepstral prewhitening), which takes out tones and resonances alike.
+        "none"; "tones removed": lines of the whole signal's spectrum more than 13 dB above the floor are reduced to
+        the floor with their phases kept, which removes mesh and shaft harmonics at steady speed; "whitened": every
+        line is divided by its magnitude (cepstral prewhitening), which removes tones and resonances alike.
 
     Returns
     -------
     array, (n_samples,)
-        In the signal's unit; dimensionless with a mean square of 1 where whitened. Without mean.
+        In the signal's unit, or dimensionless with a mean square of 1 if whitened; unless "none", without the mean.
 
     Notes
     -----
-    Impulses that repeat exactly are lines themselves and go with the tones; a bearing's slip keeps them. Where the
-    speed drifts by more than a line, harmonics are no lines: average over the shaft angle, and take the residual.
+    Impulses that repeat exactly are lines themselves and are removed with the tones; a bearing's impulses survive
+    because of slip. If the speed drifts by more than a line, harmonics are not lines: use the residual of an average
+    over the shaft angle.
 
     References
     ----------
@@ -565,18 +566,18 @@ def prepared_signal(values: FloatArray, sampling_rate_hz: float, preparation: Pr
 
 
 def prepared_lines(transform: ComplexArray, preparation: Preparation) -> ComplexArray:
-    """Return the `rfft` of what `prepared_signal` makes of a signal, from the signal's own.
+    """Return the `rfft` of the prepared signal (see `prepared_signal`) from that of the signal itself.
 
     Parameters
     ----------
     transform : array, (n_samples // 2 + 1,)
     preparation : str
-        As of `prepared_signal`.
+        As in `prepared_signal`.
 
     Returns
     -------
     array, (n_samples // 2 + 1,)
-        Another array, in the transform's precision.
+        A new array, in the transform's precision.
     """
     lines = transform.copy()
     if preparation == "none":
@@ -585,7 +586,7 @@ def prepared_lines(transform: ComplexArray, preparation: Preparation) -> Complex
     power = lines.real**2 + lines.imag**2
     if preparation == "tones removed":
         floor = floor_of_powers(power)
-        tones = power > 20.0 * floor  # of noise, one line in e²⁰, half a billion, gets there
+        tones = power > 20.0 * floor  # one noise line in e²⁰, half a billion, exceeds this
         lines[tones] *= np.sqrt(floor[tones] / power[tones])
     else:
         level = np.sqrt(2.0 * (len(lines) - 1.0))  # gives a mean square of about 1

@@ -1,4 +1,4 @@
-"""Real and power cepstrum, and what editing a cepstrum does to families of harmonics and sidebands."""
+"""Real and power cepstrum, and editing of a cepstrum to keep or remove families of harmonics and sidebands."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gearsig.recording import Recording
 from gearsig.spectra._types import ComplexArray, Spectrum, checked_signal, named_signal
 
 LOWEST_RELATIVE_MAGNITUDE = 1e-12
-"""Lines of zero have no logarithm: magnitudes are kept above this part of the largest."""
+"""Lower limit of magnitudes, relative to the largest: lines of zero have no logarithm."""
 
 
 def cepstrum(
@@ -24,14 +24,14 @@ def cepstrum(
 ) -> Spectrum:
     """Return the cepstrum of a signal: the inverse transform of its log spectrum, over quefrency.
 
-    Real: c(τ) = F⁻¹{ln|X(f)|}. Power: |F⁻¹{ln|X(f)|²}|² = 4 c(τ)². A family of harmonics or sidebands Δf apart,
-    however many, shows as peaks at 1/Δf and its multiples (rahmonics).
+    Real: c(τ) = F⁻¹{ln|X(f)|}. Power: |F⁻¹{ln|X(f)|²}|² = 4 c(τ)². A whole family of harmonics or sidebands Δf apart
+    appears as peaks at 1/Δf and its multiples (rahmonics).
 
     Parameters
     ----------
     signal : Recording or array, (n_samples,)
     channel_or_rate_hz : str or float
-        The channel of a recording; of an array its sampling rate in Hz.
+        A recording's channel, or an array's sampling rate in Hz.
     kind : str
         "real" (signed) or "power".
     source : str
@@ -50,9 +50,9 @@ def cepstrum(
 
     Notes
     -----
-    Not for levels: a transfer path only adds to low quefrencies, but so does any change of the floor's shape. The
-    speed must not change by more than a line of the spectrum at the highest harmonic; use an angle signal otherwise
-    (quefrency then counts revolutions).
+    Not for levels: a transfer path adds only to low quefrencies, but so does any change in the shape of the noise
+    floor. At the highest harmonic, the speed must not change by more than one line of the spectrum; otherwise use an
+    angle signal (quefrency is then in revolutions).
 
     References
     ----------
@@ -92,11 +92,11 @@ def lifter_families(
     n_rahmonics: int | None = None,
     half_width_s: float | None = None,
 ) -> FloatArray:
-    """Return a signal in which families of lines `spacing_hz` apart are all that is kept, or are removed.
+    """Keep only, or remove, the families of lines `spacing_hz` apart from a signal.
 
-    The real cepstrum is set to zero at (or, for `keep`, outside of) the rahmonics k/Δf ± half width; the edited log
-    magnitude goes back to time with the original phase. Removal levels the family's lines with their neighbourhood
-    whether or not they are exactly periodic.
+    The real cepstrum is set to zero at (or, for `keep`, outside) the rahmonics k/Δf ± half width; the edited log
+    magnitude is transformed back to time with the original phase. Removal reduces the family's lines to the level of
+    their neighbourhood even if they are not exactly periodic.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def lifter_families(
     n_rahmonics : int or None
         None takes all up to half the signal's length.
     half_width_s : float or None
-        Around each rahmonic; None is one sample at the first, growing in proportion (the speed's uncertainty does).
+        Half width around each rahmonic. None is k samples at the k-th, as the uncertainty of the speed grows with k.
 
     Returns
     -------
@@ -141,7 +141,7 @@ def lifter_families(
 
 
 def real_cepstrum(lines: ComplexArray, n: int) -> FloatArray:
-    """Return F⁻¹{ln|X|} of a one-sided transform, (n,)."""
+    """Return the real cepstrum F⁻¹{ln|X|} of a one-sided transform, (n,)."""
     from scipy.fft import irfft
 
     magnitude = np.abs(lines)
@@ -161,7 +161,7 @@ def _transform(x: FloatArray) -> ComplexArray:
 def _rahmonic_mask(
     n: int, period: float, n_rahmonics: int | None, half_width: float | None
 ) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """Mark the rahmonics on both sides of a cepstrum of n samples, symmetric as the cepstrum is."""
+    """Mark the rahmonics on both sides of a cepstrum of n samples, symmetric like the cepstrum."""
     n_max = int(n / 2 / period)
     k = np.arange(1, (n_max if n_rahmonics is None else min(n_max, count(n_rahmonics, "n_rahmonics"))) + 1)
     widths = k.astype(np.float64) if half_width is None else np.full(len(k), max(half_width, 0.5))

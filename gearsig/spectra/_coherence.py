@@ -17,11 +17,11 @@ from gearsig.spectra._amplitude import Preparation, prepared_signal
 from gearsig.spectra._types import ComplexArray, Spectrum, checked_signal, make_window, named_signal, scaled_unit
 
 MAX_CELLS = 1 << 26
-"""1.6 GB of results; beyond it a typing error is likelier than a wish."""
+"""1.6 GB of results; more is more likely a mistyped parameter than intended."""
 MIN_PRODUCTS = 8
-"""Fewer independent products than that leave coherence near 1 to chance."""
+"""Minimum independent products per cell: with fewer, coherence near 1 occurs by chance."""
 FIRST_LINE = 4
-"""Of α: below it, Hann's main lobe makes neighbouring lines coherent by itself."""
+"""First line of α: below it, the main lobe of the Hann window alone makes neighbouring lines coherent."""
 
 
 @dataclass(frozen=True)
@@ -47,15 +47,15 @@ class CarrierBands:
 
     @property
     def products_per_band(self) -> float:
-        """Lines that would average as well with equal weights: (ΣG)²/ΣG²."""
+        """Equivalent number of equally weighted lines: (ΣG)²/ΣG²."""
         return float(self.weight.sum() ** 2 / np.dot(self.weight, self.weight))
 
 
 def lay_bands(n_lines: int, n_bands: int, n_highest: float, inflation: float, n_alphas: int) -> CarrierBands:
-    """Cut `n_lines` lines into `n_bands` spacings and keep the bands that cyclic shifts of `n_highest` lines allow.
+    """Divide `n_lines` lines into `n_bands` spacings and keep the bands that cyclic shifts of `n_highest` lines allow.
 
-    Bands below half the highest shift are left out: there, a real signal's lines and their shifted ones are each
-    other's mirror images, and cells repeat or correlate with themselves.
+    Bands below half the highest shift are left out: there, the lines of a real signal and their shifted counterparts
+    are mirror images of each other, and cells repeat or correlate with themselves.
     """
     half = (n_lines - 1) // count(n_bands, "n_bands", minimum=2)
     weight = 0.5 + 0.5 * np.cos(np.pi * np.arange(1 - half, half) / max(half, 1))
@@ -98,11 +98,11 @@ class SpectralCoherence(Result, matrix=("coherence_squared", "alpha", "frequency
     alpha_axis : str
         "frequency" or "order".
     frequency_hz : array, (n_bands,)
-        Middles of the carrier bands, equally spaced; each is two spacings wide, with a raised-cosine weight.
+        Centres of the carrier bands, equally spaced; each is two spacings wide, with a raised-cosine weight.
     n_independent : float
         Independent products averaged in a cell.
     alpha_resolution : float
-        Spacing of `alpha`: one over the length.
+        Spacing of `alpha`: the reciprocal of the length.
     unit : str
         Of the correlation, e.g. "(m/s^2)^2/Hz".
     source, shaft : str
@@ -129,7 +129,7 @@ class SpectralCoherence(Result, matrix=("coherence_squared", "alpha", "frequency
 
     @property
     def alpha_label(self) -> str:
-        """Axis of α with unit."""
+        """Label of the α axis, with its unit."""
         if self.alpha_axis == "frequency":
             return "cyclic frequency (Hz)"
         return f"cyclic order (per revolution of {self.shaft or 'the shaft'})"
@@ -145,17 +145,17 @@ class SpectralCoherence(Result, matrix=("coherence_squared", "alpha", "frequency
 
 @dataclass(frozen=True)
 class EnhancedEnvelope(Result):
-    """Squared coherence averaged over a range of carriers: an envelope spectrum in which all bands count alike.
+    """Squared coherence averaged over a range of carriers: an envelope spectrum in which all bands count equally.
 
     Parameters
     ----------
     spectrum : Spectrum
         Dimensionless, over cyclic frequency or order; its first line is not at zero.
     level : float
-        What stationary noise exceeds in a line with `probability`.
+        Value that stationary noise exceeds in one line with `probability`.
     probability : float
     band_hz : (float, float)
-        Middles of the first and last carrier band.
+        Centres of the first and last carrier band.
     """
 
     spectrum: Spectrum
@@ -167,18 +167,18 @@ class EnhancedEnvelope(Result):
 def enhanced_envelope(
     coherence: SpectralCoherence, band_hz: tuple[float, float] | None = None, *, probability: float = 0.05
 ) -> EnhancedEnvelope:
-    """Return the mean of the squared coherence over the carriers of a band, and noise's level of it.
+    """Return the mean of the squared coherence over the carriers of a band, and the level that noise reaches.
 
-    E(α) = (1/n) Σ_f γ²(α, f). Under stationary noise, each γ² has mean 1/M and nearly an exponential distribution, the
-    mean over n bands nearly a gamma distribution of shape n/(1 + 2/36), neighbouring bands overlapping by half.
+    E(α) = (1/n) Σ_f γ²(α, f). Under stationary noise, each γ² is nearly exponentially distributed with mean 1/M; the
+    mean over n bands nearly follows a gamma distribution of shape n/(1 + 2/36), as neighbouring bands half overlap.
 
     Parameters
     ----------
     coherence : SpectralCoherence
     band_hz : (float, float) or None
-        Carriers whose middles lie in it; None takes all (the "enhanced" spectrum), a band the "improved" one.
+        Carriers whose centres lie in it: the "improved" spectrum. None takes all, the "enhanced" one.
     probability : float
-        Of the level, for one line. For all lines at once divide it by their number.
+        Probability that noise exceeds the level in one line. For all lines at once, divide it by their number.
 
     Raises
     ------
@@ -231,20 +231,20 @@ def spectral_coherence(
 ) -> SpectralCoherence:
     """Return the spectral correlation and coherence up to a cyclic frequency.
 
-    S(α, f) = Σ_ν G(ν - f) X(ν) X*(ν - α) / ΣG: the cyclic periodogram of the whole signal (Hann's window), averaged
-    over the carriers of a band. γ² divides |S|² by the same averages of |X(ν)|² and |X(ν - α)|², so that γ² ≤ 1. All α
-    of a band come from one correlation of lines by the fast Fourier transform.
+    S(α, f) = Σ_ν G(ν - f) X(ν) X*(ν - α) / ΣG: the cyclic periodogram of the whole signal (Hann window), averaged over
+    the carriers of a band. γ² is |S|² divided by the same averages of |X(ν)|² and |X(ν - α)|², so that γ² ≤ 1. One
+    FFT correlation of the lines gives all α of a band.
 
     Parameters
     ----------
     signal : Recording or array, (n_samples,)
     channel_or_rate_hz : str or float
-        The channel of a recording; of an array its sampling rate in Hz.
+        A recording's channel, or an array's sampling rate in Hz.
     highest_alpha_hz : float
-        The highest cyclic frequency: a few times the fastest modulation sought.
+        The highest cyclic frequency: a few times the fastest modulation of interest.
     n_bands : int
-        Carrier bands from 0 to half the sampling rate. Fewer bands average more and find weaker modulation; more show
-        better where its carrier is. Bands below half of `highest_alpha_hz` are left out.
+        Carrier bands from 0 to half the sampling rate. Fewer bands average more and reveal weaker modulation; more
+        bands locate its carrier better. Bands below half of `highest_alpha_hz` are left out.
     preparation : str
         "none", "tones removed" (gears) or "whitened", see `prepared_signal`.
     unit, source : str
@@ -253,7 +253,7 @@ def spectral_coherence(
     Returns
     -------
     SpectralCoherence
-        α every 1/length, from 4/length on. A modulation between two lines of α loses up to 7 % of γ.
+        α in steps of 1/length, from 4/length on. A modulation between two lines of α loses up to 7 % of γ.
 
     Raises
     ------
@@ -264,9 +264,9 @@ def spectral_coherence(
 
     Notes
     -----
-    The level of noise is that of a stationary signal: one strong modulation raises the cells of all other α a little.
-    A steady tone is coherent with every other tone: remove synchronous parts first, see `prepared_signal`. For a speed
-    that changes by more than one part in α times length, use `order_coherence`.
+    The noise level assumes a stationary signal: one strong modulation slightly raises the cells of all other α.
+    A steady tone is coherent with every other tone: remove synchronous parts first, see `prepared_signal`. If the
+    speed changes by more than one part in α times length, use `order_coherence`.
 
     References
     ----------
@@ -287,7 +287,7 @@ def spectral_coherence(
         )
     window = make_window("hann", len(x)).values
     energy = float(np.dot(window, window))
-    # Σ|R(d)|² of the window's own correlation between lines d apart.
+    # Σ|R(d)|² of the correlation that the window causes between lines d apart.
     inflation = len(x) * float(np.sum(window**4)) / energy**2
     n_lines = (len(x) + 1) // 2  # without Nyquist
     bands = lay_bands(n_lines, n_bands, n_alphas, inflation, n_alphas - FIRST_LINE + 1)
@@ -308,7 +308,7 @@ def spectral_coherence(
 
 
 def transform_of(x: FloatArray, window: FloatArray) -> ComplexArray:
-    """Return the windowed signal's lines from 0 to below half the rate, its mean removed."""
+    """Return the Fourier lines of the windowed signal, mean removed, from 0 to below half the sampling rate."""
     from scipy.fft import rfft
 
     y = x.astype(np.float64)
@@ -355,9 +355,9 @@ _SPREAD = 8
 
 
 class NonuniformTransform:
-    """c[k] = Σ_j p_j exp(-2πi k θ_j) for k = 0 … n, with θ in parts of the whole angle, 0 ≤ θ < 1.
+    """c[k] = Σ_j p_j exp(-2πi k θ_j) for k = 0 … n, with θ as a fraction of the whole angle, 0 ≤ θ < 1.
 
-    Samples are spread over an equal grid by a Gaussian, transformed, and the Gaussian's transform divided out.
+    Samples are spread over a uniform grid by a Gaussian and transformed; the Gaussian's transform is divided out.
 
     References
     ----------
@@ -402,16 +402,16 @@ def order_coherence(
     """Return the order–frequency spectral correlation and coherence of a channel.
 
     S(α, f) = ∫ y_f(t) x*(t) exp(-2πi α θ(t)) w(θ) θ̇ dt / ∫ w(θ) θ̇ dt, with y_f the signal's part in the carrier band
-    around f (Hz), θ the shaft's angle in revolutions and w the square of Hann's window over the angle. Modulation that
-    is locked to the shaft stays on one line while resonances stay in their band. γ² = |S(α, f)|²/S(0, f)², computed
-    on the signal whitened by its mean density over time.
+    around f (Hz), θ the shaft angle in revolutions and w the squared Hann window over the angle. Modulation locked to
+    the shaft stays on one line, while resonances stay in their band. γ² = |S(α, f)|²/S(0, f)², computed from the
+    signal whitened by its mean density over time.
 
     Parameters
     ----------
     recording : Recording
     channel : str
     shaft_angle : ShaftAngle
-        On the recording's time axis; only the part it covers is used.
+        On the recording's time axis; only the part of the recording that it covers is used.
     highest_order : float
         Cycles per revolution of the angle's shaft.
     n_bands : int
@@ -421,7 +421,7 @@ def order_coherence(
     Returns
     -------
     SpectralCoherence
-        Over order, every 1/revolutions from 4/revolutions on.
+        Over order, in steps of 1/revolutions from 4/revolutions on.
 
     Raises
     ------
@@ -430,9 +430,9 @@ def order_coherence(
 
     Notes
     -----
-    Since the power at f - α is taken from the whitened signal's mean, γ² may pass 1 by chance where few products are
-    averaged. The level of noise holds for a level that is steady over the run; a level that rises with speed
-    averages over fewer independent products than stated, and its slow change shows as coherence at the lowest orders.
+    Since the power at f - α is taken from the whitened signal's mean, γ² may exceed 1 by chance where few products are
+    averaged. The noise level assumes a signal level that is steady over the run; a level that rises with speed
+    averages over fewer independent products than stated, and its slow change appears as coherence at the lowest orders.
 
     References
     ----------
@@ -457,7 +457,7 @@ def order_coherence(
         )
     seconds = np.arange(len(values)) / fs + start_s
     weight = _weight(angle, seconds)
-    # By so much the weight over time reduces the independent products: T ∫W²/(∫W)².
+    # Factor by which the weight over time reduces the independent products: T ∫W²/(∫W)².
     inflation = float(len(weight) * np.dot(weight, weight) / weight.sum() ** 2)
     bands = lay_bands(n_lines, n_bands, n_shift, inflation, n_alphas - FIRST_LINE + 1)
     lines = transform_of(values, np.ones(len(values)))
@@ -479,7 +479,7 @@ def order_coherence(
 
 
 def _covered(recording: Recording, channel: str, shaft_angle: ShaftAngle) -> tuple[FloatArray, ShaftAngle, float]:
-    """Return the samples that the angle covers, the angle over them and the time of the first."""
+    """Return the samples that the angle covers, the angle over them, and the time of the first sample in seconds."""
     fs = recording.sampling_rate_hz
     x = recording.values(channel)
     angle = shaft_angle.between(0.0, (len(x) - 1) / fs)
@@ -493,7 +493,7 @@ def _covered(recording: Recording, channel: str, shaft_angle: ShaftAngle) -> tup
 
 
 def _weight(angle: ShaftAngle, seconds: FloatArray) -> FloatArray:
-    """Return Hann's window over the angle, squared, times the speed in rev/s; zero outside of the angle."""
+    """Return the squared Hann window over the angle times the speed in rev/s; zero outside the angle."""
     turn = (angle.revolutions_at(seconds) - float(angle.revolutions[0])) / angle.n_revolutions
     window = np.where((turn >= 0) & (turn < 1), 0.5 - 0.5 * np.cos(2 * np.pi * turn), 0.0)
     result: FloatArray = window**2 * (angle.speed_rpm_at(seconds) / 60.0)
@@ -520,13 +520,13 @@ def _correlate_over_angle(
     n_shift: int,
     n_alphas: int,
 ) -> tuple[ComplexArray, FloatArray]:
-    """Return the whitened signal's S and γ², (n_alphas, n_bands) each; envelopes are sampled at a rate of their own.
+    """Return S and γ² of the whitened signal, (n_alphas, n_bands) each; envelopes have their own sampling rate.
 
-    The weight is Hann's window over the angle, squared, times the speed over the mean speed.
+    The weight is the squared Hann window over the angle times the speed over the mean speed.
     """
     from scipy.fft import next_fast_len
 
-    # Products reach from -(2 half + shift) to as much; what aliases at this rate falls beyond the shift.
+    # Products extend to ±(2 half + shift); at this rate, aliases fall beyond the shift.
     n_envelope = next_fast_len(2 * (bands.half + n_shift) + 8)
     if n_envelope > 1 << 22:  # spreading them over the angles would take more than 2 GB
         raise InputError(

@@ -1,4 +1,4 @@
-"""Blind deconvolution: filters that undo the path between impacts and a sensor, and make the impacts sharp again."""
+"""Blind deconvolution: filters that undo the path between impacts and a sensor and sharpen the impacts again."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gearsig.recording import Recording
 from gearsig.spectra._types import named_signal
 
 LOADING = 1e-9
-"""Of the correlation matrix's mean diagonal, added to it: a signal of few lines leaves it singular."""
+"""Diagonal loading, relative to the correlation matrix's mean diagonal: a signal of few lines leaves it singular."""
 
 CONVERGED = 1e-4
 """Relative change of the kurtosis at which the iteration ends."""
@@ -25,12 +25,12 @@ class Deconvolved:
     Parameters
     ----------
     values : array, (n_samples - n_taps + 1,)
-        y_n = Σ_l f_l x_{n + n_taps - 1 - l}: only where the whole filter lies within the signal.
+        y_n = Σ_l f_l x_{n + n_taps - 1 - l}, only where the whole filter lies within the signal.
     sampling_rate_hz : float
     taps : array, (n_taps,)
         f, of unit norm.
     score : float
-        What was maximised: the kurtosis Σy⁴ n/(Σy²)² (3 for Gaussian noise), or the multipoint norm (0 to 1).
+        The maximised quantity: the kurtosis Σy⁴ n/(Σy²)² (3 for Gaussian noise), or the multipoint norm (0 to 1).
     unit, source : str
     """
 
@@ -57,23 +57,23 @@ def minimum_entropy_deconvolution(
     unit: str = "",
     source: str = "",
 ) -> Deconvolved:
-    r"""Return the signal after the filter that makes it most impulsive (MED).
+    r"""Return the signal filtered to maximum kurtosis, hence most impulsive (MED).
 
     .. math:: \max_f \; \frac{n \sum y^4}{(\sum y^2)^2}, \qquad
        f \leftarrow (X X^T)^{-1} X y^3 \frac{\sum y^2}{\sum y^4}, \qquad y = X^T f
 
-    X holds the signal at all delays of the filter; only samples where the whole filter lies within the signal count,
-    so that no jump at the start is taken for an impact.
+    X holds the signal at all delays of the filter. Only samples where the whole filter lies within the signal are
+    used, so that no jump at the start is mistaken for an impact.
 
     Parameters
     ----------
     signal : Recording or array, (n_samples,)
     channel_or_rate_hz : str or float
-        The channel of a recording; of an array its sampling rate in Hz.
+        A recording's channel, or an array's sampling rate in Hz.
     n_taps : int
-        Length of the filter: as long as an impact rings, 30 to 500.
+        Length of the filter: about the ringing time of an impact, 30 to 500.
     n_iterations : int
-        At most; it ends when the kurtosis changes by less than 10⁻⁴ of itself.
+        Maximum; the iteration ends when the kurtosis changes by less than 10⁻⁴ of itself.
     unit, source : str
         Default: the channel's.
 
@@ -91,8 +91,8 @@ def minimum_entropy_deconvolution(
 
     Notes
     -----
-    It sharpens whatever is most impulsive: one single shock wins over many small ones. Where the period of the impacts
-    is known, `multipoint_deconvolution` does not fall for that. Remove tones first, see `prepared_signal`.
+    It sharpens whatever is most impulsive: a single shock wins over many small ones. If the period of the impacts is
+    known, `multipoint_deconvolution` avoids this. Remove tones first, see `prepared_signal`.
 
     References
     ----------
@@ -129,36 +129,37 @@ def multipoint_deconvolution(
     unit: str = "",
     source: str = "",
 ) -> Deconvolved:
-    r"""Return the signal after the filter that brings it nearest to a train of impacts of a known period (MOMEDA).
+    r"""Return the signal filtered to be as close as possible to a train of impacts of known period (MOMEDA).
 
     .. math:: \max_f \; \frac{t^T y}{\lVert t \rVert \lVert y \rVert}, \qquad f = (X X^T)^{-1} X t
 
-    t is the train: an exact solution, without iterations, and of the whole train at once, where minimum entropy or
-    maximum correlated kurtosis deconvolution (McDonald, Zhao and Zuo 2012) climb to a shock, or to a few periods.
+    t is the train. The solution is exact, without iterations, and for the whole train at once, whereas minimum entropy
+    or maximum correlated kurtosis deconvolution (McDonald, Zhao and Zuo 2012) converge to one shock or a few periods.
 
     Parameters
     ----------
     signal, channel_or_rate_hz, n_taps, unit, source
         As in `minimum_entropy_deconvolution`.
     period_s : float
-        Between two impacts; it need not be a whole number of samples.
+        Time between two impacts; it need not be a whole number of samples.
     width_s : float
-        Each impact of t is that wide: the drift of the impacts' phase over the record that is borne. 0 is one sample.
+        Width of each impact in t: the timing drift of the impacts over the record that is tolerated. 0 is one sample.
 
     Returns
     -------
     Deconvolved
-        With the cosine between y and t as score: of white noise about sqrt(n_taps/n_samples), 1 for a train itself.
+        With the cosine between y and t as score: about sqrt(n_taps/n_samples) for white noise, 1 for the train itself.
 
     Raises
     ------
     InputError, RefusalError
-        As there; also on a period that is shorter than two samples or has fewer than three in the signal.
+        As there; also if the period is shorter than two samples or fits fewer than three times into the signal.
 
     Notes
     -----
-    Any signal shows some of any period: compare the score with those of other periods, see `multipoint_norms`. Over
-    long records a bearing's slip takes the train out of step: resample to the angle, take a segment, or a width.
+    Any signal has some content at any period: compare the score with those of other periods, see `multipoint_norms`.
+    Over long records a bearing's slip puts the train out of step: resample to the angle, take a segment, or set a
+    width.
 
     References
     ----------
@@ -193,7 +194,7 @@ def multipoint_norms(
     n_taps: int = 100,
     width_s: float = 0.0,
 ) -> FloatArray:
-    r"""Return how near `multipoint_deconvolution` brings a signal to a train of impacts, for each of several periods.
+    r"""Return the score of `multipoint_deconvolution` for each of several periods.
 
     .. math:: \sqrt{b^T (X X^T)^{-1} b} / \lVert t \rVert, \qquad b = X t
 
@@ -206,7 +207,7 @@ def multipoint_norms(
     Returns
     -------
     array, (n_periods,)
-        Cosines, 0 to 1. They fall on multiples of the true period, too; the shortest that stands out is it.
+        Cosines, 0 to 1. Multiples of the true period stand out, too; the true one is the shortest that does.
     """
     x, fs, _, _ = _checked(signal, channel_or_rate_hz, "", "", n_taps)
     solve = _Normal(x, n_taps)
@@ -236,10 +237,10 @@ class _Normal:
         from scipy.linalg import cho_factor
 
         n = len(x)
-        first = _correlated(x, x[n_taps - 1 :])  # row 0: delay 0 with all others
+        first = _correlated(x, x[n_taps - 1 :])  # row 0: delay 0 against all others
         matrix = np.empty((n_taps, n_taps))
         for lag in range(n_taps):
-            # Along a diagonal one product leaves at the end of the signal, one comes in at its start.
+            # Along a diagonal, one product drops out at the signal's end and one enters at its start.
             i = np.arange(1, n_taps - lag)
             change = x[n_taps - 1 - i] * x[n_taps - 1 - i - lag] - x[n - i] * x[n - i - lag]
             diagonal = first[lag] + np.concatenate([[0.0], np.cumsum(change)])
@@ -272,7 +273,7 @@ def _correlated(x: FloatArray, y: FloatArray) -> FloatArray:
 
 
 def _train(n: int, period_s: float, fs: float, width_s: float) -> FloatArray:
-    """Return impacts of height 1 every period, each spread over the two samples it lies between, or over the width."""
+    """Return impacts of height 1, one per period, each spread over its two adjacent samples or over the width."""
     period = positive(period_s, "period_s", "s") * fs
     if not 2.0 <= period <= n / 3:
         raise InputError(f"period_s is {period_s:g}", allowed=f"{2 / fs:g} to {n / 3 / fs:g} s for this signal")

@@ -1,4 +1,4 @@
-"""Envelope of a frequency band, decimated, and its spectrum; in a given band or in the one that a kurtogram chooses."""
+"""Decimated envelope of a frequency band, and its spectrum; the band is given or chosen by a kurtogram."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ EnvelopeKind = Literal["magnitude", "squared"]
 
 @dataclass(frozen=True)
 class Envelope(Result, columns=("time_s", "values")):
-    """Envelope of a band as a time series of its own, lower sampling rate; sample 0 is at time 0.
+    """Envelope of a band as a time series with its own, lower sampling rate; sample 0 is at time 0.
 
     Parameters
     ----------
     values : array, (n_samples,)
-        Magnitude of the band's analytic signal ("magnitude": the amplitude of a sine), or its square.
+        Magnitude of the band's analytic signal ("magnitude": for a sine, its amplitude), or the magnitude squared.
     sampling_rate_hz : float
     band_hz : (float, float)
     kind : str
@@ -66,31 +66,31 @@ def band_envelope(
     highest_hz: float | None = None,
     continued: bool = False,
 ) -> Envelope:
-    """Return the envelope of a frequency band, decimated to what the band needs.
+    """Return the envelope of a frequency band, decimated to the lowest rate that the band allows.
 
-    The band's lines of the Fourier transform, doubled, shifted to zero and transformed back give the complex
-    envelope z; the result is |z| or |z|². The band is cut without phase shift; raised-cosine edges inside it keep
-    ringing short. |z|² fits the new rate exactly; |z| is not band-limited and is sampled twice as densely.
+    The band's Fourier lines are doubled, shifted to zero and transformed back, which gives the complex envelope z; the
+    result is |z| or |z|². The filter has no phase shift; raised-cosine edges inside the band keep its ringing short.
+    |z|² is represented exactly at the new rate; |z| is not band-limited and is sampled twice as densely.
 
     Parameters
     ----------
     signal : Recording or array, (n_samples,)
     channel_or_rate_hz : str or float
-        The channel of a recording; of an array its sampling rate in Hz.
+        A recording's channel, or an array's sampling rate in Hz.
     band_hz : (float, float)
         Lower and upper limit, 0 ≤ lower < upper ≤ half the sampling rate.
     kind : str
         "squared" (its spectrum is exact, best for detection) or "magnitude" (in the signal's unit).
     edge_fraction : float
-        0 (brick wall) to 0.5: part of the band that each edge takes.
+        Fraction of the band that each edge occupies, 0 (brick wall) to 0.5.
     unit, source : str
     transform : array or None
-        The `rfft` of `with_continuous_ends` of the signal, where several bands of one signal are wanted.
+        The `rfft` of `with_continuous_ends` of the signal, to reuse it for several bands of one signal.
     highest_hz : float or None
-        Highest modulation of interest: a magnitude that is sampled much faster than that needs may come at three times
-        this frequency, without what is faster.
+        Highest modulation frequency of interest. A magnitude that would be sampled much faster may be low-passed and
+        returned at three times this frequency.
     continued : bool
-        Whether the signal is continued at its ends also where these meet, so that envelopes of several have one length.
+        Whether to continue the signal even if its ends meet, so that the envelopes of several signals have one length.
 
     Returns
     -------
@@ -103,9 +103,9 @@ def band_envelope(
 
     Notes
     -----
-    The transform takes the signal as periodic: within about 1/bandwidth of either end the envelope mixes both ends, or
-    where these do not meet, each with its reflection, see `with_continuous_ends`. The band must be wider than the
-    modulation sought.
+    The transform treats the signal as periodic: within about 1/bandwidth of either end, the envelope mixes both ends
+    or, where they do not meet, each end with its reflection, see `with_continuous_ends`. The band must be wider than
+    the highest modulation frequency of interest.
 
     References
     ----------
@@ -151,18 +151,18 @@ def envelope_spectrum(
     scaling: Scaling = "amplitude peak",
     highest_hz: float | None = None,
 ) -> Spectrum:
-    """Return the spectrum of an envelope over frequency, its mean removed.
+    """Return the spectrum of an envelope over modulation frequency, with its mean removed.
 
     Parameters
     ----------
     signal : Envelope, Recording or array, (n_samples,)
     channel_or_rate_hz : str or float
-        The channel of a recording; of an array its sampling rate in Hz.
+        A recording's channel, or an array's sampling rate in Hz.
     band_hz : (float, float) or None
-        Of a recording or an array: the band whose envelope is taken; None takes the most impulsive one of the signal's
-        kurtogram, at least three times as wide as `highest_hz`.
+        For a recording or an array: the band whose envelope is taken. None takes the band with the largest kurtosis in
+        the kurtogram, at least three times as wide as `highest_hz`.
     kind : str
-        Of that envelope, see `band_envelope`.
+        Kind of that envelope, see `band_envelope`.
     window, scaling : str
         As in `amplitude_spectrum`.
     highest_hz : float or None
@@ -206,12 +206,12 @@ def envelope_recording(
     transforms: Mapping[str, ComplexArray] | None = None,
     highest_hz: float | None = None,
 ) -> Recording:
-    """Return a recording whose channels are the band envelopes of the given one's vibration channels.
+    """Return a recording whose channels are the band envelopes of the given recording's vibration channels.
 
-    It is what angular resampling takes to give an envelope spectrum over order. The speed source is dropped, since
-    pulses do not survive the lower rate: find the shaft angle on the original. `transforms` holds the `rfft` of each
-    channel's `with_continuous_ends`, all or none of them continued, where several bands of one recording are wanted;
-    `highest_hz` is as of `band_envelope`.
+    Resample it to the shaft angle for an envelope spectrum over order. The speed source is dropped, since pulses do
+    not survive the lower rate: find the shaft angle on the original. `transforms` holds the `rfft` of each channel's
+    `with_continuous_ends`, all or none of them continued, to reuse them for several bands; `highest_hz` is as in
+    `band_envelope`.
     """
     names = tuple(channels) if channels is not None else recording.vibration_names()
     if not names:
@@ -281,15 +281,15 @@ def _complex_envelope(
 
 
 BEYOND_THE_ENDS = 2048
-"""Samples by which a record is continued at either end."""
+"""Number of samples by which a record is continued at either end."""
 
 
 def reflected_ends(values: FloatArray, n_beyond: int = BEYOND_THE_ENDS) -> tuple[FloatArray, FloatArray]:
-    """Return what a record is taken for before its beginning and after its end: its reflections there, which fade.
+    """Return continuations of a record before its start and after its end: reflections there, which fade out.
 
     The reflections are odd, 2 x₀ - x₋ₖ, so that neither value nor slope has a step. A transform of the record alone
-    takes its end for what comes before its beginning. Where a strong slow line, such as hum, or a drift differs in the
-    two, that step is a click in every band: impulsive noise that nobody recorded.
+    joins its end to its start. If a strong slow component, such as hum, or a drift differs between the two, the step
+    is a click in every band: impulsive noise that is not in the recording.
 
     Parameters
     ----------
@@ -300,7 +300,7 @@ def reflected_ends(values: FloatArray, n_beyond: int = BEYOND_THE_ENDS) -> tuple
     Returns
     -------
     (array, array)
-        Each (n_beyond,), in the order of time.
+        Each (n_beyond,), in chronological order.
     """
     rise = np.sin(0.5 * np.pi * np.arange(1, n_beyond + 1) / (n_beyond + 1)) ** 2
     before = (2.0 * values[0] - values[n_beyond:0:-1]) * rise
@@ -309,22 +309,22 @@ def reflected_ends(values: FloatArray, n_beyond: int = BEYOND_THE_ENDS) -> tuple
 
 
 def ends_meet(values: FloatArray) -> bool:
-    """Whether the step from a record's end to its beginning is no larger than the largest within it."""
+    """Whether the step from a record's end to its start is no larger than the largest step within it."""
     return not abs(values[0] - values[-1]) > np.abs(np.diff(values)).max(initial=0.0)
 
 
 def with_continuous_ends(values: FloatArray, *, continued: bool = False) -> FloatArray:
-    """Return a record whose end meets its beginning, as a transform takes it: itself, or with its continuations.
+    """Return a record whose end meets its start, as a transform assumes: unchanged, or with its continuations.
 
-    Itself where they meet of themselves, see `ends_meet`: what is periodic stays so. Else the continuation follows it,
-    and at last comes that before it; sample 0 stays where it is. The length, then `joined_length`, is one that
-    transforms fast.
+    A record whose ends already meet (see `ends_meet`) is returned unchanged: what is periodic stays periodic. Otherwise
+    the continuation after the end is appended, and the one before the start comes last; sample 0 keeps its index. The
+    length, `joined_length`, then suits a fast transform.
 
     Parameters
     ----------
     values : array, (n_samples,)
     continued : bool
-        Whether it is continued also where its ends meet.
+        Whether to continue the record even if its ends meet.
 
     Returns
     -------
@@ -353,20 +353,20 @@ def _continued_length(n_samples: int) -> int:
 
 
 PERIODS_OF_EDGE = 50
-"""Of the width of a raised-cosine edge, which the filter's response reaches: it falls as 1/n³, to 1e-5 then."""
+"""Length of the filter's ringing, in periods of the edge width: it decays as 1/n³ for a raised-cosine edge, to 1e-5."""
 
 
 def edged_band(
     frequency_hz: FloatArray, band_hz: tuple[float, float], edge_hz: float
 ) -> tuple[NDArray[np.intp], FloatArray]:
-    """Return the numbers of a band's lines, and its response there: 1 between raised-cosine edges that lie inside it.
+    """Return the indices of a band's lines and its response there: 1 between raised-cosine edges inside the band.
 
     Parameters
     ----------
     frequency_hz : array, (n_lines,)
     band_hz : (float, float)
     edge_hz : float
-        Width of either edge.
+        Width of each edge.
     """
     inside = np.clip(np.minimum(frequency_hz - band_hz[0], band_hz[1] - frequency_hz) / edge_hz, 0.0, 1.0)
     lines = np.flatnonzero(inside)
@@ -375,20 +375,20 @@ def edged_band(
 
 @dataclass(frozen=True)
 class _Blocks:
-    """Blocks of a long signal that overlap by what its filters ring: they stay near the processor.
+    """Blocks of a long signal that fit the processor's cache and overlap by the ringing of the filters.
 
-    Each is cut to the band and transformed back at four times the bandwidth; its magnitude is low-passed and thinned
-    out by a second pair of transforms. The ends of the signal are joined, as by a transform of all of it.
+    Each block is filtered to the band and transformed back at four times the bandwidth; a second pair of transforms
+    low-passes and decimates its magnitude. The signal's ends are joined, as in a transform of the whole signal.
 
     Parameters
     ----------
     n, n_band, n_out : int
-        Samples of a block, of its complex envelope, and of what is left of its magnitude; multiples of eight. An eighth
-        at either end overlaps.
+        Samples of a block, of its complex envelope and of its decimated magnitude; multiples of eight. An eighth
+        overlaps at either end.
     first : int
         Line at the band's lower end.
     response, low_pass : arrays
-        Of the lines from there on, and of the magnitude's lines.
+        Responses of the band filter from that line on, and of the low-pass at the magnitude's lines.
     """
 
     n: int
@@ -402,7 +402,7 @@ class _Blocks:
     def of(
         cls, band_hz: tuple[float, float], fs: float, edge_fraction: float, highest_hz: float, n_samples: int
     ) -> _Blocks | None:
-        """Return None where fewer than eight blocks make the signal; of a slow machine, one may be longer than that."""
+        """Return the blocks, or None for fewer than eight; at low frequencies a block may exceed the whole signal."""
         edge_hz = edge_fraction * (band_hz[1] - band_hz[0])
         ringing = PERIODS_OF_EDGE * fs * (1.0 / edge_hz + 1.0 / highest_hz)
         n = 1 << max(13, int(np.ceil(np.log2(8 * ringing))))
@@ -411,18 +411,18 @@ class _Blocks:
         hertz = np.arange(n // 2) * fs / n
         lines, response = edged_band(hertz, band_hz, edge_hz)
         n_band, n_out = (_multiple_of_eight(k) for k in (4 * len(lines) + 1, 3 * highest_hz * n / fs))
-        # Full up to the highest modulation, nothing from twice that on, which would be mirrored to it.
+        # 1 up to the highest modulation, 0 from twice that on, which would alias onto it.
         slow = np.clip(2.0 - hertz[: n_out // 2 + 1] / highest_hz, 0.0, 1.0)
         return cls(n, n_band, n_out, int(lines[0]), response, np.sin(np.pi / 2 * slow) ** 2)
 
     def pay(self, *, has_transform: bool) -> bool:
-        """Whether blocks cost less than transforms of all samples; a narrow band of a known transform does not."""
+        """Whether blocks cost less than transforms of all samples; not for a narrow band of a known transform."""
         return self.n_band > (2 if has_transform else 1) * self.n_out and 2 * self.n_out <= self.n
 
     def magnitude(self, x: FloatArray) -> FloatArray:
         """Return the low-passed magnitude, `n_out` samples for `n` of the signal, computed in the signal's precision.
 
-        Single precision adds noise 2e-7 of the signal's rms, a few times what its samples were rounded by.
+        Single precision adds noise of 2e-7 of the signal's rms, a few times the rounding of its samples.
         """
         from scipy.fft import ifft, irfft, rfft
 
@@ -456,7 +456,7 @@ def _multiple_of_eight(n: float) -> int:
 
 
 def band_taper(n_lines: int, edge_fraction: float) -> FloatArray:
-    """Return ones with raised-cosine edges of `edge_fraction` of the band each."""
+    """Return a taper of ones with raised-cosine edges, each `edge_fraction` of the band, (n_lines,)."""
     n_edge = round(edge_fraction * n_lines)
     taper = np.ones(n_lines)
     if n_edge:
@@ -472,7 +472,7 @@ def band_taper(n_lines: int, edge_fraction: float) -> FloatArray:
 
 @dataclass(frozen=True)
 class ChosenBand:
-    """A band with the kurtogram that chose it, and the envelope and its spectrum there.
+    """A band, the kurtogram that chose it, and the band's envelope and envelope spectrum.
 
     Parameters
     ----------
@@ -482,7 +482,7 @@ class ChosenBand:
     spectrum : Spectrum
         Of the envelope, over modulation frequency.
     warnings : tuple of str
-        What speaks against the choice; empty if nothing does.
+        Reasons to distrust the choice, if any.
     reason : str
         Why the band was chosen; empty if it was given.
     """
@@ -508,14 +508,14 @@ def kurtogram_envelope(
     kind: EnvelopeKind = "squared",
     band_hz: tuple[float, float] | None = None,
 ) -> ChosenBand:
-    """Return the envelope spectrum in the band that the channel's own kurtogram chooses, or in a given one.
+    """Return the envelope spectrum in the band that the channel's kurtogram chooses, or in a given band.
 
     Parameters
     ----------
     recording : Recording
     channel : str
     n_levels, preparation
-        As in `kurtogram`. The envelope is that of the prepared signal.
+        As in `kurtogram`. The envelope is taken of the prepared signal.
     narrowest_hz, lowest_hz, highest_hz : float
         As in `Kurtogram.best_band`.
     highest_modulation_hz : float or None
@@ -523,8 +523,8 @@ def kurtogram_envelope(
     kind : str
         Of the envelope, "squared" or "magnitude".
     band_hz : (float, float) or None
-        Overrides the choice, which is the whole spectrum only where no part of it fits; `narrowest_hz`, `lowest_hz` and
-        `highest_hz` then mean nothing.
+        Overrides the choice; `narrowest_hz`, `lowest_hz` and `highest_hz` are then ignored. The whole spectrum is
+        chosen only if no part of it fits.
 
     Returns
     -------
@@ -533,8 +533,8 @@ def kurtogram_envelope(
     Raises
     ------
     InputError
-        As `kurtogram`; also if `band_hz` lies outside of the spectrum, or `highest_modulation_hz` outside of 8 over
-        the length to a sixth of the sampling rate.
+        As `kurtogram`; also if `band_hz` lies outside the spectrum, or `highest_modulation_hz` outside the range from
+        8/duration to a sixth of the sampling rate.
     RefusalError
         As `kurtogram`; also if no band is allowed.
     """
@@ -553,7 +553,7 @@ def kurtogram_envelope(
     if band_hz is None:
         best = partial(grid.best_band, narrowest_hz=narrowest_hz, lowest_hz=lowest_hz, highest_hz=highest_hz)
         band = best()
-        if band.level == 0:  # the envelope of everything mixes in low lines: the best part, if one fits
+        if band.level == 0:  # the full-band envelope mixes in low-frequency lines: take the best part, if one fits
             with suppress(RefusalError):
                 band = best(with_whole=False)
         reason = _reason(grid, band, narrowest_hz, of_modulation=highest_modulation_hz is not None)
@@ -566,7 +566,7 @@ def kurtogram_envelope(
 
 
 def _reason(grid: Kurtogram, band: BandCandidate, narrowest_hz: float, *, of_modulation: bool) -> str:
-    """Return why a band was chosen, above all where others have more kurtosis."""
+    """Return why a band was chosen, in particular where others have a larger kurtosis."""
     if band.level == 0:
         return "It is the whole spectrum: no part of it is wide enough."
     text = "It has the largest kurtosis"
@@ -585,14 +585,14 @@ def _reason(grid: Kurtogram, band: BandCandidate, narrowest_hz: float, *, of_mod
 
 
 def _given_band(values: FloatArray, sampling_rate_hz: float, band_hz: tuple[float, float]) -> BandCandidate:
-    """Return the kurtosis of a band that was not chosen from the tree, see `Kurtogram` for its definition.
+    """Return a given band with its kurtosis as defined in `Kurtogram`.
 
     Raises
     ------
     InputError
-        If the band lies outside of the spectrum or holds fewer than three lines.
+        If the band lies outside the spectrum or holds fewer than three lines.
     RefusalError
-        If there is nothing in the band.
+        If there is no signal in the band.
     """
     square = band_envelope(values, sampling_rate_hz, band_hz, kind="squared").values
     mean = float(np.mean(square))
@@ -605,28 +605,29 @@ def _given_band(values: FloatArray, sampling_rate_hz: float, band_hz: tuple[floa
 
 
 # --------------------
-# Which band's envelope shows a modulation best: kurtogram, spectral coherence and plain envelopes compared.
+# Which band's envelope shows a modulation best: comparison of kurtogram, spectral coherence and plain envelope.
 # --------------------
 
 
 LARGEST_SLIP = 0.02
-"""Relative distance at which a modulation's lines are sought: bearings turn that far from their kinematic orders."""
+"""Relative search range for a modulation's lines: slip moves bearing orders this far from their kinematic values."""
 
 
 @dataclass(frozen=True)
 class BandChoice:
-    """A way to look at a modulation, and how clearly it shows there.
+    """A method and band for observing a modulation, and how clearly it shows there.
 
     Parameters
     ----------
     method : str
-        "plain": the envelope of all above the lowest carrier; "kurtogram": of its band; "coherence band": of the band
-        in which the coherence at the modulation stands out; "enhanced": the mean squared coherence over all carriers.
+        "plain": the envelope of everything above the lowest carrier; "kurtogram": the envelope of its band; "coherence
+        band": the envelope of the band in which the coherence at the modulation stands out; "enhanced": the mean
+        squared coherence over all carriers.
     band_hz : (float, float)
     clarity_db : float
-        Mean over the harmonics of the line's height over the floor around it.
+        Height of the harmonics' lines above the floor around them, averaged over the harmonics.
     modulation_hz : float
-        The modulation frequency as it was found, within the slip.
+        The modulation frequency found within the slip.
     spectrum : Spectrum
         Over modulation frequency.
     """
@@ -652,21 +653,21 @@ def compare_bands(
     slip: float = LARGEST_SLIP,
     preparation: Preparation = "tones removed",
 ) -> tuple[BandChoice, ...]:
-    r"""Return the ways to look at a modulation of known frequency, the clearest first.
+    r"""Return the methods and bands that show a modulation of known frequency, the clearest first.
 
-    Clarity is :math:`\frac{1}{K} \sum_k 20 \lg (A(k\alpha)/F(k\alpha))` over the first K harmonics, A the line and F
-    the floor of the same spectrum; of the squared coherence, a power, 10 lg.
+    Clarity is :math:`\frac{1}{K} \sum_k 20 \lg (A(k\alpha)/F(k\alpha))` over the first K harmonics, with A the line and
+    F the floor of the same spectrum; for the squared coherence, a power, 10 lg.
 
     Parameters
     ----------
     signal : Recording or array, (n_samples,)
     channel_or_rate_hz : str or float
-        The channel of a recording; of an array its sampling rate in Hz.
+        A recording's channel, or an array's sampling rate in Hz.
     modulation_hz : float
-        The modulation frequency, e.g. how often elements pass a race.
+        The modulation frequency, e.g. a bearing's ball pass frequency.
     n_harmonics : int
     slip : float
-        Relative range about it.
+        Relative search range around it.
     preparation : str
         See `prepared_signal`.
 
@@ -677,12 +678,12 @@ def compare_bands(
     Raises
     ------
     InputError, RefusalError
-        As of the spectra compared: on wrong shapes, constant or too short signals.
+        As for the spectra compared: on wrong shapes and on constant or too short signals.
 
     Notes
     -----
-    The band is chosen for the modulation that is looked for, so that some of its clarity is chance: noise alone reaches
-    some 6 dB. The kurtogram knows nothing of the modulation, and takes the band of a few strong shocks where there are.
+    The coherence band is chosen for this very modulation, so part of its clarity is chance: noise alone reaches about
+    6 dB. The kurtogram ignores the modulation; where there are a few strong shocks, it chooses their band.
 
     References
     ----------
@@ -714,25 +715,25 @@ def compare_bands(
 def coherence_band(
     coherence: SpectralCoherence, modulation_hz: float, *, n_harmonics: int = 3, slip: float = LARGEST_SLIP
 ) -> tuple[float, float]:
-    r"""Return the band of carriers in which the coherence at a modulation frequency's harmonics stands out most.
+    r"""Return the carrier band in which the coherence at a modulation's harmonics stands out most, in Hz.
 
     .. math:: \max_{a, b} \; \frac{1}{\sqrt{b - a}} \sum_{i=a}^{b} \Big( \sum_k \gamma^2(k\alpha, f_i) - K/M \Big)
 
-    the sum's signal-to-noise ratio, each carrier's squared coherence having mean and scatter 1/M under noise.
+    This is the signal-to-noise ratio of the sum: under noise, each squared coherence has mean and scatter 1/M.
 
     Parameters
     ----------
     coherence : SpectralCoherence
     modulation_hz : float
-        In the unit of its cyclic axis: Hz or orders.
+        In the unit of the coherence's cyclic axis: Hz or orders.
     n_harmonics : int
     slip : float
-        Relative range about it, from which the clearest is taken.
+        Relative range around it from which the clearest frequency is taken.
 
     Returns
     -------
     (float, float)
-        From edge to edge of the bands, which are two spacings wide.
+        Outer edges of the first and last carrier band; each is two spacings wide.
     """
     alpha, f = coherence.alpha, coherence.frequency_hz
     spacing = coherence.alpha_resolution
@@ -761,7 +762,7 @@ def coherence_band(
 def _choice(
     method: str, band_hz: tuple[float, float], x: FloatArray, fs: float, alpha: float, n: int, slip: float
 ) -> BandChoice:
-    width = max(band_hz[1] - band_hz[0], 2.5 * (n + 0.5) * alpha)  # an envelope moves no faster than its band is wide
+    width = max(band_hz[1] - band_hz[0], 2.5 * (n + 0.5) * alpha)  # an envelope cannot vary faster than its bandwidth
     middle = min(max(sum(band_hz) / 2, width / 2), fs / 2 - width / 2)
     band_hz = (max(middle - width / 2, 0.0), min(middle + width / 2, fs / 2))
     spectrum = envelope_spectrum(x, fs, band_hz=band_hz, highest_hz=(n + 0.5) * alpha)

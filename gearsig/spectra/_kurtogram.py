@@ -1,4 +1,4 @@
-"""Fast kurtogram, and the band it chooses."""
+"""Fast kurtogram and the choice of a band from it."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from gearsig.spectra._amplitude import Preparation, prepared_signal
 from gearsig.spectra._types import named_signal
 
 OVERLAP = 1.66
-"""Σ|ρ(m)|⁴ over the envelope's lags for the tree's filters (1.60 to 1.75 by path): samples per independent one."""
+"""Envelope samples per independent one: Σ|ρ(m)|⁴ over the lags for the tree's filters (1.60 to 1.75 by path)."""
 
 
 def kurtosis_error(n_bands: int, n_samples: int) -> float:
     """Return the standard error of the kurtosis of white Gaussian noise.
 
-    The influence function of ⟨|z|⁴⟩/⟨|z|²⟩² is 2 L₂(|z|²), Laguerre's polynomial, whose covariance is 4|ρ(m)|⁴, hence
-    Var K = (4/n) Σ|ρ(m)|⁴. The whole real band has Hermite's H₄ instead: Var K = 24/n.
+    The influence function of ⟨|z|⁴⟩/⟨|z|²⟩² is 2 L₂(|z|²), a Laguerre polynomial, whose covariance is 4|ρ(m)|⁴, hence
+    Var K = (4/n) Σ|ρ(m)|⁴. For the whole real band it is the Hermite polynomial H₄: Var K = 24/n.
     """
     return float(np.sqrt((24.0 if n_bands == 1 else 4.0 * OVERLAP) / n_samples))
 
@@ -37,7 +37,7 @@ class BandCandidate:
     ----------
     low_hz, high_hz : float
     level : float
-        The spectrum is cut into 2^level bands; thirds stand at log2(3), 1 + log2(3), …
+        The spectrum is cut into 2^level bands; thirds are at log2(3), 1 + log2(3), …
     kurtosis : float
         Of the complex envelope, E|z|⁴/(E|z|²)² - 2: 0 for Gaussian noise, -1 for a tone.
     standard_error : float
@@ -61,7 +61,7 @@ class Kurtogram(Result):
     """Spectral kurtosis over the bands of a tree of halves and thirds.
 
     K = ⟨|z|⁴⟩/⟨|z|²⟩² - 2 of a band's complex envelope z; 0 for stationary Gaussian noise, -1 for a steady sine. For
-    the whole band (level 0), x being real, K = ⟨x⁴⟩/⟨x²⟩² - 3.
+    the whole band (level 0), which is real, K = ⟨x⁴⟩/⟨x²⟩² - 3.
 
     Parameters
     ----------
@@ -72,11 +72,11 @@ class Kurtogram(Result):
     standard_error : array, (n_bands,)
         Of the kurtosis under Gaussian noise, white within the band.
     largest_share : array, (n_bands,)
-        Share of Σ|z|⁴ that the largest envelope sample has: 1 if all the kurtosis is one event.
+        Share of the largest envelope sample in Σ|z|⁴: 1 if a single event makes up the whole kurtosis.
     n_envelope_samples : array, (n_bands,)
-        Samples of z that the kurtosis rests on, about twice the number of independent ones.
+        Samples of z used for the kurtosis, about twice the number of independent ones.
     preparation : str
-        What was done to the signal first.
+        Preparation of the signal before the analysis.
     source : str
     """
 
@@ -103,10 +103,10 @@ class Kurtogram(Result):
 
     @property
     def noise_limit(self) -> FloatArray:
-        """Kurtosis that stationary Gaussian noise exceeds in any band at all in one kurtogram of 20.
+        """Kurtosis that stationary Gaussian noise exceeds in at least one band in one of 20 kurtograms.
 
-        Bonferroni's quantile q of the normal distribution, bent by the third and fourth moments of 2 L₂: skewness 10/√m
-        and excess 294/m for m independent samples (Cornish and Fisher's expansion).
+        Bonferroni quantile q of the normal distribution, corrected for the third and fourth moments of 2 L₂: skewness
+        10/√m and excess kurtosis 294/m for m independent samples (Cornish–Fisher expansion).
         """
         from scipy.special import ndtri
 
@@ -114,12 +114,12 @@ class Kurtogram(Result):
         q, m = float(-ndtri(0.05 / len(n))), n / OVERLAP
         skewness = 10.0 / np.sqrt(m)
         bent = q + skewness * (q**2 - 1) / 6 + 294.0 / m * (q**3 - 3 * q) / 24 - skewness**2 * (2 * q**3 - 5 * q) / 36
-        # A real signal's bands at 0 and half the rate show a little more: the mirror image is close.
+        # A real signal's bands next to 0 and Nyquist show a little more: the mirror image is close.
         return np.asarray(bent * self.standard_error + 0.01)
 
     @property
     def levels(self) -> FloatArray:
-        """The levels, each once, ascending."""
+        """Distinct levels, ascending."""
         return np.unique(self.level)
 
     def best_band(
@@ -130,16 +130,16 @@ class Kurtogram(Result):
         highest_hz: float | None = None,
         with_whole: bool = True,
     ) -> BandCandidate:
-        """Return the band of the largest kurtosis among those allowed; of equals, the widest.
+        """Return the allowed band with the largest kurtosis; among equals, the widest.
 
         Parameters
         ----------
         narrowest_hz : float
-            Bands are at least that wide: three times the highest modulation frequency sought, or more.
+            Minimum bandwidth: three times the highest modulation frequency of interest, or more.
         lowest_hz, highest_hz : float
             Bands lie between these; None is half the sampling rate.
         with_whole : bool
-            Whether the whole spectrum (level 0) is a band among them.
+            Whether the whole spectrum (level 0) is allowed as a band.
 
         Raises
         ------
@@ -164,7 +164,7 @@ class Kurtogram(Result):
         return BandCandidate(*numbers)
 
     def warnings(self, band: BandCandidate) -> tuple[str, ...]:
-        """Return what speaks against trusting a band's kurtosis: chance, few samples, a single event."""
+        """Return reasons to distrust a band's kurtosis: chance, few samples, a single event."""
         i = int(np.argmin(np.abs(self.low_hz - band.low_hz) + np.abs(self.high_hz - band.high_hz)))
         n, share = int(self.n_envelope_samples[i]), float(self.largest_share[i])
         warnings = []
@@ -174,7 +174,7 @@ class Kurtogram(Result):
                 f"kurtosis {band.kurtosis:.2g} is what noise alone reaches ({limit:.2g} in one kurtogram of 20): "
                 "no band stands out"
             )
-        elif band.kurtosis <= max(2.0 * limit, 0.3):  # slow changes of level do as much in long signals
+        elif band.kurtosis <= max(2.0 * limit, 0.3):  # slow level changes in long signals reach as much
             warnings.append(f"kurtosis {band.kurtosis:.2g} is small: the band hardly stands out from noise")
         if band.standard_error > 0.1:
             warnings.append(
@@ -191,17 +191,17 @@ class Kurtogram(Result):
 
 @dataclass(frozen=True)
 class Splitter:
-    """A low-pass turned to the middle of each part of the band 0 to 1/2 (cycles per sample).
+    """A low-pass filter shifted to the centre of each part of the band 0 to 1/2 (cycles per sample).
 
-    The parts' middles lie symmetrically about 1/4, so that the products with the cosines and sines of the first part
-    serve the last one too, with the signs of the odd taps reversed; the middle of three lies at 1/4 itself.
+    The centres of the parts lie symmetrically about 1/4, so that the products with the cosines and sines of the first
+    part serve the last one too, with the signs of the odd taps reversed. The middle of three parts is centred on 1/4.
 
     Parameters
     ----------
     n_parts : int
-        2 or 3; also the factor by which the rate falls.
+        2 or 3; also the decimation factor.
     cosine, sine : arrays, (n_side + 1,)
-        Taps 0 … n_side of the first part's filter; the cosine continues evenly to negative ones, the sine oddly.
+        Taps 0 … n_side of the first part's filter; for negative indices the cosine is even, the sine odd.
     middle : array, (n_side + 1,)
         Taps of the middle part: even ones real, odd ones imaginary. Zero for halves.
     """
@@ -219,9 +219,9 @@ class Splitter:
 
 @lru_cache(maxsize=2)
 def splitting_filters(n_parts: int) -> Splitter:
-    """Return the filters for halves or thirds.
+    """Return the filters that split a band into halves or thirds.
 
-    h(k) = w(k) sin(2π f_c k)/(πk), f_c = 1/(4 n_parts), w Hamming's window up to the sine's third zero on either
+    h(k) = w(k) sin(2π f_c k)/(πk), f_c = 1/(4 n_parts), with w a Hamming window up to the sine's third zero on either
     side. The response is 1/2 at a part's borders and below 0.3 % from 0.35 of its width beyond them; sampled at twice
     its width, it does not alias.
     """
@@ -237,7 +237,7 @@ def splitting_filters(n_parts: int) -> Splitter:
 
 
 class Stage:
-    """All bands of one level, each split into parts; keeps what the next piece's filters still need."""
+    """All bands of one level, each split into parts; keeps the samples that the next piece's filters still need."""
 
     def __init__(self, n_bands: int, n_parts: int, *, keep: bool) -> None:
         self.split: Splitter = splitting_filters(n_parts)
@@ -247,7 +247,7 @@ class Stage:
         self._keep = keep
 
     def push(self, x: FloatArray) -> FloatArray:
-        """Take a piece of the bands, (n_bands, 2, n), and return that of the parts, (n_bands·n_parts, 2, n_out)."""
+        """Filter a piece of the bands, (n_bands, 2, n), into the parts, (n_bands·n_parts, 2, n_out)."""
         s = self.split
         joined = np.concatenate([self._tail, x], axis=2)
         n_out = max(0, (joined.shape[2] - s.n_taps) // s.n_parts + 1)
@@ -262,8 +262,8 @@ class Stage:
 def tree_moments(x: FloatArray, n_levels: int, mean: float, scale: float) -> list[tuple[int, FloatArray, int]]:
     """Return (number of bands, their moments Σ|z|², Σ|z|⁴, max|z|², number of samples) for each row of the tree.
 
-    Row 0 is the real signal itself, then 2, 3, 4, 6 … 2^L, 3·2^(L-1) bands. Outputs are only taken where a filter lies
-    within the signal. Moments are those of (x - mean)/scale.
+    Row 0 is the real signal itself, followed by 2, 3, 4, 6 … 2^L, 3·2^(L-1) bands. Outputs are used only if the whole
+    filter lies within the signal. The moments are those of (x - mean)/scale.
     """
     halves = [Stage(2**k, 2, keep=k < n_levels - 1) for k in range(n_levels)]
     thirds = [Stage(2**k, 3, keep=False) for k in range(n_levels)]
@@ -287,7 +287,7 @@ def tree_moments(x: FloatArray, n_levels: int, mean: float, scale: float) -> lis
 
 
 MIN_SAMPLES = 512
-"""Of a finest band's envelope: below it the kurtosis of noise alone scatters by more than 0.1."""
+"""Minimum envelope samples in the finest band: with fewer, the kurtosis of noise alone scatters by more than 0.1."""
 
 
 def kurtogram(
@@ -301,23 +301,23 @@ def kurtogram(
 ) -> Kurtogram:
     """Return the fast kurtogram: the spectral kurtosis of 1, 2, 3, 4, 6 … 2^L, 3·2^(L-1) bands.
 
-    K = ⟨|z|⁴⟩/⟨|z|²⟩² - 2, z the complex envelope from a tree of filters that halve the band and the rate, each node
-    also cut into thirds. The mean is removed first.
+    K = ⟨|z|⁴⟩/⟨|z|²⟩² - 2, with z the complex envelope from a tree of filters that halve the band and the rate; each
+    node is also split into thirds. The mean is removed first.
 
     Parameters
     ----------
     signal : Recording or array, (n_samples,)
     channel_or_rate_hz : str or float
-        The channel of a recording; of an array its sampling rate in Hz.
+        A recording's channel, or an array's sampling rate in Hz.
     n_levels : int or None
-        L, the number of halvings. None is 7 (128 and 192 bands), or what the length allows: envelopes have at
-        least 512 samples.
+        L, the number of halvings. None is 7 (128 and 192 bands), or as many as the length allows with at least 512
+        samples per envelope.
     narrowest_hz : float
-        Where the number of halvings is None: none that leaves narrower bands is made.
+        Minimum width of the halved bands; used only if `n_levels` is None.
     preparation : str
         "none", "tones removed" or "whitened", see `prepared_signal`.
     source : str
-        Default: the channel.
+        Default: the channel's name.
 
     Returns
     -------
@@ -332,9 +332,9 @@ def kurtogram(
 
     Notes
     -----
-    Not for few strong shocks among many small impulses: the shocks choose the band. Read `warnings`.
-    Borders between bands are half-amplitude points of filters with a skirt of a third of a band on either side. The
-    memory needed does not grow with the length unless the signal is prepared.
+    Not for a few strong shocks among many small impulses: the shocks determine the band. Read `warnings`.
+    Borders between bands are the half-amplitude points of filters whose skirts extend a third of a band on either
+    side. Memory use does not grow with the signal's length unless the signal is prepared.
 
     References
     ----------
@@ -378,7 +378,7 @@ def _checked_levels(n_samples: int, n_levels: int | None) -> int:
 
 
 def _row_of_bands(fs: float, n_bands: int, moments: FloatArray, n: int) -> tuple[FloatArray, ...]:
-    """Return low, high, level, kurtosis, standard error, share of the largest, samples; each (n_bands,)."""
+    """Return low, high, level, kurtosis, standard error, share of the largest sample, samples; each (n_bands,)."""
     second, fourth, largest = moments.T
     gaussian = 3.0 if n_bands == 1 else 2.0
     nothing = second <= 0.0
@@ -392,7 +392,7 @@ def _row_of_bands(fs: float, n_bands: int, moments: FloatArray, n: int) -> tuple
 # Reordering sums lets the compiler use vector instructions.
 _REORDER = {"contract", "reassoc", "nsz"}
 _TILE = 256
-"""Outputs at a time: all of a tile's sums stay in the nearest cache."""
+"""Outputs at a time: all sums of a tile stay in the L1 cache."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
@@ -401,7 +401,7 @@ def split(x, cosine, sine, middle, n_parts, n_out, first_is_odd, parts, moments)
 
     Row r of `x` (n_rows, 2, n: real and imaginary parts) gives rows n_parts·r … of `parts`, lowest band first, each
     again a signal on 0 to 1/2 of its own rate; `parts` of no rows keeps nothing. `moments` (n_rows·n_parts, 3)
-    gathers Σ|z|², Σ|z|⁴ and the largest |z|². `first_is_odd` tells the parity of the first output's number.
+    accumulates Σ|z|², Σ|z|⁴ and the largest |z|². `first_is_odd` is the parity of the first output's index.
     """
     n_side = len(cosine) - 1
     turned = np.empty((n_parts, 2, _TILE + (2 * n_side) // n_parts + 1))
@@ -423,7 +423,7 @@ def split(x, cosine, sine, middle, n_parts, n_out, first_is_odd, parts, moments)
 
 @njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
 def _take_phases(x, start, n, n_parts, turned):  # type: ignore[no-untyped-def]
-    """Deal the samples from `start` on out to n_parts phases: neighbouring outputs then read neighbouring samples."""
+    """Split the samples from `start` on into n_parts phases, so that adjacent outputs read adjacent samples."""
     available = min(n, x.shape[1] - start)
     for component in range(2):
         for phase in range(n_parts):
@@ -433,7 +433,7 @@ def _take_phases(x, start, n, n_parts, turned):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, fastmath=_REORDER, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
 def _filter(turned, cosine, sine, middle, n_parts, n, sums):  # type: ignore[no-untyped-def]
-    """Sum the products with cosine and sine taps, even and odd ones apart (0 to 3), and the middle's (4, 5)."""
+    """Sum the products with cosine and sine taps, separately for even and odd (0 to 3), and the middle's (4, 5)."""
     n_side = len(cosine) - 1
     sums[:, :, :n] = 0.0
     for component in range(2):
@@ -504,7 +504,7 @@ def _add_moments(z, n, moments):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
 def _store(z, n, alternating, starts_odd, part, start):  # type: ignore[no-untyped-def]
-    """Write z; where it alternates, times (-1)^m, which shifts the band by half the rate to 0."""
+    """Write z, times (-1)^m if alternating, which shifts the band by half the rate to 0."""
     for component in range(2):
         if not alternating:
             for m in range(n):

@@ -49,7 +49,7 @@ class Spectrum(Result, columns=("positions", "values")):
         "amplitude peak": a bin-centred sine of amplitude 1 reads 1; "amplitude rms": it reads 1/√2; "power": 1/2 (mean
         square); "power density": mean square per unit of the axis; "dimensionless" for cepstra.
     unit : str
-        Of the values, written out with the scaling, e.g. "m/s^2", "(m/s^2)^2/Hz".
+        Unit of the values, including the scaling, e.g. "m/s^2", "(m/s^2)^2/Hz".
     resolution : float
         Spacing of the lines.
     noise_bandwidth : float
@@ -57,9 +57,9 @@ class Spectrum(Result, columns=("positions", "values")):
     window : str
     n_averages : int
     source : str
-        The signal it was computed on: channel, and what was done to it.
+        The signal it was computed from: the channel and its processing.
     shaft : str
-        The shaft that orders are counted on; empty for frequencies.
+        The shaft that orders refer to; empty for frequencies.
     """
 
     values: FloatArray
@@ -95,7 +95,7 @@ class Spectrum(Result, columns=("positions", "values")):
         return min(max(nearest, 0), len(self.values) - 1)
 
     def head(self, n_lines: int) -> Spectrum:
-        """Return the first lines alone; itself where there are no more."""
+        """Return the spectrum's first `n_lines` lines; the spectrum itself if it has no more."""
         if n_lines >= len(self.values):
             return self
         return replace(self, values=self.values[:n_lines], positions=self.positions[:n_lines])
@@ -133,12 +133,12 @@ class Window:
 
     @cached_property
     def values(self) -> FloatArray:
-        """Its samples, (n_samples,)."""
+        """Samples of the window, (n_samples,)."""
         return frozen_array(_window_values(self.name, self.n_samples), "window", ndim=1)
 
     @property
     def coefficients(self) -> tuple[float, ...]:
-        """The a_m of `COSINE_SUMS`; empty for other windows, and for so few samples that cosines are not orthogonal."""
+        """The a_m of `COSINE_SUMS`; empty for other windows, or if too few samples make the cosines non-orthogonal."""
         sums = COSINE_SUMS.get(self.name, ())
         return sums if self.n_samples > 2 * len(sums) else ()
 
@@ -155,8 +155,8 @@ class Window:
 def make_window(name: str, n_samples: int) -> Window:
     """Return the window called `name` with `n_samples` samples.
 
-    Rectangular for what repeats exactly in the block, Hann for all else, flat top to read levels off a spectrum
-    without interpolation, Blackman–Harris or Kaiser for a weak line beside a strong one.
+    Use rectangular for signals that repeat exactly within the block, Hann for general use, flat top to read levels
+    without interpolation, Blackman–Harris or Kaiser for a weak line near a strong one.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def make_window(name: str, n_samples: int) -> Window:
 
 
 def checked_window_name(name: str) -> str:
-    """Return `name` if there is such a window."""
+    """Return `name` if it is a known window; raise InputError otherwise."""
     hint = ""
     if isinstance(name, str):
         if name in COSINE_SUMS:
@@ -209,7 +209,7 @@ def _window_values(name: str, n: int) -> FloatArray:
 
 
 def _cosine_sum(coefficients: tuple[float, ...], n: int) -> FloatArray:
-    """Return Σ (-1)^m a_m cos(2π m k/n), by Chebyshev's recurrence so that one cosine is enough."""
+    """Return Σ (-1)^m a_m cos(2π m k/n), by Chebyshev's recurrence, which needs only one cosine."""
     w = np.full(n, coefficients[0])
     if len(coefficients) == 1:
         return w
@@ -231,8 +231,8 @@ def _kaiser_beta(name: str) -> float:
 def window_response(name: str, offset_bins: FloatArray) -> FloatArray:
     """Return the window's transform at `offset_bins` lines from its centre, relative to the centre.
 
-    W(d) = |Σ w[n] exp(-2πi d n/N)| / Σ w[n]. It is what a sine between two lines loses (scalloping), and what it
-    leaks elsewhere. The response hardly depends on N; it is evaluated at N = 512.
+    W(d) = |Σ w[n] exp(-2πi d n/N)| / Σ w[n]. It gives the loss of a sine between two lines (scalloping) and its
+    leakage elsewhere. The response hardly depends on N; it is evaluated at N = 512.
     """
     n = 512
     w = _window_values(checked_window_name(name), n)
@@ -245,14 +245,14 @@ def window_response(name: str, offset_bins: FloatArray) -> FloatArray:
 ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
 BATCH_SAMPLES = 1 << 19
-"""Samples transformed at once: 4 MB of float64, which stays near the caches and bounds the memory."""
+"""Samples transformed at once: 4 MB of float64, which suits the caches and bounds the memory."""
 
 
 @lru_cache(maxsize=64)
 def fast_length(n: int) -> int:
-    """Return the largest number up to n without prime factors above 31: its transform is up to ten times quicker.
+    """Return the largest number up to n without prime factors above 31: its transform is up to ten times faster.
 
-    Of 500 and more, 1.2 % less at most; of a quarter of a million and more, some 0.01 %.
+    From n = 500 it is at most 1.2 % smaller than n; from a quarter of a million, about 0.01 %.
 
     Examples
     --------
@@ -273,7 +273,7 @@ def fast_length(n: int) -> int:
 class BlockPlan:
     """How a signal is cut into blocks.
 
-    `n_averages` is the number of *independent* blocks: overlapping ones share data, see `independent_averages`.
+    `n_averages` is the number of *independent* blocks: overlapping blocks share data, see `independent_averages`.
     """
 
     window: Window
@@ -296,7 +296,7 @@ def checked_signal(values: FloatArray, *, minimum: int = 2) -> FloatArray:
 def named_signal(
     signal: FloatArray | Recording, channel_or_rate_hz: str | float, unit: str, source: str, *, minimum: int = 2
 ) -> tuple[FloatArray, float, str, str]:
-    """Return (values, sampling rate in Hz, unit, source) of a recording's channel, or of an array with its rate."""
+    """Return (values, sampling rate in Hz, unit, source) of a recording's channel, or of an array and its rate."""
     check_signal(signal)
     instance_of(unit, str, "unit")
     instance_of(source, str, "source")
@@ -317,19 +317,19 @@ def named_signal(
 
 
 def check_signal(signal: object, kinds: type | UnionType = Recording) -> None:
-    """Raise unless the value is a recording, or of other kinds that do, or may be an array of numbers."""
+    """Raise unless the value is a recording, one of the other accepted kinds, or array-like."""
     if not (isinstance(signal, list | tuple) or hasattr(signal, "__array__")):
         check_recording(signal, "signal", kinds | np.ndarray)
 
 
 def array_rate_hz(channel: str | float, parameter: str) -> float:
-    """Return an array's sampling rate in Hz, which stands where a recording's channel would be named.
+    """Return an array's sampling rate in Hz, which is given in place of a recording's channel name.
 
     Parameters
     ----------
     channel : str or float
     parameter : str
-        Under which the caller gave it, for the errors.
+        The caller's name for it, used in error messages.
 
     Raises
     ------
@@ -342,7 +342,7 @@ def array_rate_hz(channel: str | float, parameter: str) -> float:
 
 
 def plan_blocks(n_samples: int, n_per_block: int | None, overlap: float, window: str) -> BlockPlan:
-    """Lay blocks of `n_per_block` samples over the signal; None is one block of everything."""
+    """Divide the signal into blocks of `n_per_block` samples; None makes the whole signal one block."""
     n = n_samples if n_per_block is None else count(n_per_block, "n_per_block", minimum=2)
     if n > n_samples:
         raise InputError(
@@ -356,7 +356,7 @@ def plan_blocks(n_samples: int, n_per_block: int | None, overlap: float, window:
 
 
 def independent_averages(w: FloatArray, step: int, n_blocks: int) -> int:
-    """Return how many independent blocks would average noise as well as `n_blocks` overlapping ones, rounded down.
+    """Return the number of independent blocks that average noise as well as `n_blocks` overlapping ones, rounded down.
 
     K_eff = K / (1 + 2 Σ_m (1 - m/K) ρ²(m)), with ρ(m) = Σ w[n] w[n + m·step] / Σ w².
 
@@ -375,8 +375,8 @@ def independent_averages(w: FloatArray, step: int, n_blocks: int) -> int:
 def mean_power(x: FloatArray, plan: BlockPlan, transform: ComplexArray | None = None) -> FloatArray:
     """Return the one-sided mean power per line, averaged over the blocks: a bin-centred sine reads A²/2.
 
-    P_k = c_k |X_k|² / (Σw)², c_k = 2 but for DC and, where the block length is even, Nyquist, which have no mirror
-    image. Computed in double precision whatever the input. `transform` is x's `rfft`, where it is known.
+    P_k = c_k |X_k|² / (Σw)²; c_k = 2, but 1 at DC and, for an even block length, at Nyquist, which have no mirror
+    image. Always computed in double precision. `transform` is the `rfft` of x, if known.
     """
     coefficients = plan.window.coefficients
     if plan.n_blocks == 1 and coefficients:
@@ -396,9 +396,9 @@ def mean_power(x: FloatArray, plan: BlockPlan, transform: ComplexArray | None = 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _windowed_power(lines, a, n, power):  # type: ignore[no-untyped-def]
-    """One-sided power per line of a signal under a cosine sum, of the lines without it.
+    """Compute the one-sided power per line under a cosine-sum window from the lines without a window.
 
-    w[j] = Σ (-1)^m a_m cos(2πmj/n) makes X_k into Σ (-1)^m a_m (X_{k-m} + X_{k+m})/2: a window costs neither its own
+    w[j] = Σ (-1)^m a_m cos(2πmj/n) turns X_k into Σ (-1)^m a_m (X_{k-m} + X_{k+m})/2: the window needs neither
     cosines nor a transform of its own.
     """
     n_lines, n_side = lines.shape[0], a.shape[0] - 1
@@ -419,7 +419,7 @@ def _windowed_power(lines, a, n, power):  # type: ignore[no-untyped-def]
 
 
 def block_powers(x: FloatArray, plan: BlockPlan, n_lines: int | None = None) -> Iterator[FloatArray]:
-    """Yield the one-sided power of some blocks after the other, (n_blocks_in_batch, n_lines)."""
+    """Yield the one-sided power per line of successive batches of blocks, (n_blocks_in_batch, n_lines)."""
     from scipy.fft import rfft
 
     w = plan.window.values
@@ -438,9 +438,9 @@ def block_powers(x: FloatArray, plan: BlockPlan, n_lines: int | None = None) -> 
 
 
 def scaled(power: FloatArray, scaling: Scaling, noise_bandwidth: float, n_per_block: int) -> FloatArray:
-    """Return one-sided mean power in another scaling.
+    """Convert one-sided mean power to another scaling.
 
-    Peak amplitude is √2 times the rms amplitude, but at DC and Nyquist, where both are the value itself.
+    Peak amplitude is √2 times the rms amplitude, except at DC and Nyquist, where both equal the value itself.
     """
     if scaling == "power":
         return power
@@ -453,7 +453,7 @@ def scaled(power: FloatArray, scaling: Scaling, noise_bandwidth: float, n_per_bl
 
 
 def scaled_unit(unit: str, scaling: Scaling, per: str = "Hz") -> str:
-    """Return the unit of a spectrum written out, e.g. "(m/s^2)^2/Hz".
+    """Return the unit of a spectrum for a signal's unit and a scaling, e.g. "(m/s^2)^2/Hz".
 
     Examples
     --------
@@ -467,5 +467,5 @@ def scaled_unit(unit: str, scaling: Scaling, per: str = "Hz") -> str:
 
 
 def squared_unit(unit: str) -> str:
-    """Return the square of a unit, in brackets where it is compound; nothing for no unit."""
+    """Return the square of a unit, in brackets if the unit is compound; empty for no unit."""
     return f"({unit})^2" if any(c in unit for c in "/*^ ") else unit and f"{unit}^2"

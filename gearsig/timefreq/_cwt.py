@@ -1,4 +1,4 @@
-"""Continuous wavelet transform over time or shaft angle, plain and synchrosqueezed, and the way back from it."""
+"""Continuous wavelet transform over time or shaft angle, plain and synchrosqueezed, and its inverse."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ from gearsig.timefreq._wavelets import (
     workspace,
 )
 
-_GUARD = 1e-3  # response at which a wavelet no longer adds to a squeezed line
+_GUARD = 1e-3  # response below which a wavelet does not contribute to a squeezed line
 
 
 def cwt(
@@ -70,27 +70,28 @@ def cwt(
     step: int = 1,
     edges: Edges = "reflect",
 ) -> Coefficients:
-    """Return the complex wavelet coefficients of every `step`-th sample.
+    """Return the complex wavelet coefficients at every `step`-th sample.
 
     W(f, t) = (1/2π) ∫ X(ω) Ψ(ω / 2πf) e^{iωt} dω with max Ψ = 2, so that |W| of a unit sine is 1 on its line.
 
     Parameters
     ----------
     signal : Recording, AngleSignal, UniformSignal or array, (n_samples,)
-        Over time, lines are frequencies; over angle, orders.
+        Lines are frequencies for a signal over time, orders for one over angle.
     channel : str, float or None
-        None: the only channel there is. Of an array its sampling rate in Hz.
+        None: the only channel. For an array, its sampling rate in Hz.
     wavelet : Morse or Morlet
     positions : array or None
         Lines in Hz or orders; None: `lowest` to `highest` at `n_per_octave` per octave.
     lowest, highest : float or None
-        In Hz or orders; None: ten octaves, or twice the lowest possible, to what the wavelet's response allows.
+        In Hz or orders. None for `highest`: what the wavelet's response allows; for `lowest`: ten octaves below, or
+        twice the lowest possible line.
     n_per_octave : int
-        Lines per octave, where `positions` does not give them.
+        Lines per octave, if `positions` is None.
     step : int
         Samples between columns; the columns are exact, not averaged.
     edges : str
-        What is assumed beyond the ends: "reflect" or "zero".
+        Continuation of the signal beyond its ends: "reflect" or "zero".
 
     Returns
     -------
@@ -100,13 +101,13 @@ def cwt(
     Raises
     ------
     InputError
-        On values that are not finite, lines beyond half the sampling rate, or more than 2 GB of coefficients.
+        On non-finite values, lines beyond half the sampling rate, or more than 2 GB of coefficients.
     RefusalError
         If the signal is shorter than the wavelet at the lowest line.
 
     Notes
     -----
-    Not for looking at: `cwt_map` gives the same over a long recording in little memory.
+    For plots, use `cwt_map`, which shows the same over a long recording in little memory.
 
     Source: S. Mallat, *A Wavelet Tour of Signal Processing*, 3rd ed. (2009), chapter 4.
     """
@@ -134,23 +135,23 @@ def cwt_map(
     scaling: str = "amplitude peak",
     edges: Edges = "reflect",
 ) -> TimeFrequencyMap:
-    """Return levels of the wavelet transform in `n_columns` segments, never holding the whole matrix.
+    """Return the levels of the wavelet transform in segments, without holding the whole matrix in memory.
 
     Parameters
     ----------
     signal, channel, wavelet, positions, lowest, highest, n_per_octave, edges
         As in `cwt`.
     n_columns : int
-        Most columns; each segment has a whole number of samples, the last may be shorter.
+        Maximum number of segments; each has a whole number of samples, the last may be shorter.
     reduction : str
-        "mean" of the power in each segment, or "max": short impacts keep their height.
+        "mean" of the power in each segment, or "max", which keeps the height of short impacts.
     scaling : str
         "amplitude peak" or "power".
 
     Returns
     -------
     TimeFrequencyMap
-        A low line is read as often as its bandwidth asks, not at every sample; its maximum may read 1 % low.
+        Low lines are sampled as their bandwidth requires, not at every sample; their maximum may read 1 % low.
 
     Raises
     ------
@@ -177,9 +178,9 @@ def squeezed_cwt(
     edges: Edges = "reflect",
     engine: SqueezeEngine = "gearsig",
 ) -> Coefficients:
-    """Return the wavelet coefficients moved to their momentary frequency, at every `step`-th sample.
+    """Return the wavelet coefficients reassigned to their instantaneous frequency, at every `step`-th sample.
 
-    T(f_l, t) = (2 Δ ln f / C) Σ_j W(f_j, t) over the j with f̂(f_j, t) in line l, f̂ = Im(∂W/∂t / W) / 2π: a unit
+    T(f_l, t) = (2 Δ ln f / C) Σ_j W(f_j, t) over the j with f̂(f_j, t) in line l, where f̂ = Im(∂W/∂t / W) / 2π: a unit
     sine reads 1 in one line, and the sum over all lines is the analytic signal between `lowest` and `highest`.
 
     Parameters
@@ -189,8 +190,8 @@ def squeezed_cwt(
     n_per_octave : int
         Lines, and wavelets, per octave.
     engine : str
-        "gearsig", or "ssqueezepy" for comparison: single precision, the whole matrix at once in memory, each
-        frequency on the line that is nearest on the logarithm.
+        "gearsig", or "ssqueezepy" for comparison: single precision, the whole matrix in memory, each frequency
+        assigned to the line that is nearest on the logarithmic axis.
 
     Returns
     -------
@@ -205,7 +206,7 @@ def squeezed_cwt(
     Notes
     -----
     Sharp only for components that the wavelet separates and whose frequency changes little within it; over angle,
-    orders stay put where frequencies sweep. Use a longer wavelet (larger β) for close components.
+    orders stay constant while frequencies sweep. Use a longer wavelet (larger β) for close components.
 
     Source: I. Daubechies, J. Lu, H.-T. Wu, *Synchrosqueezed wavelet transforms: an empirical mode decomposition-like
     tool*, Applied and Computational Harmonic Analysis 30 (2011).
@@ -243,7 +244,7 @@ def squeezed_cwt_map(
     edges: Edges = "reflect",
     engine: SqueezeEngine = "gearsig",
 ) -> TimeFrequencyMap:
-    """Return levels of the synchrosqueezed wavelet transform in segments, never holding the whole matrix.
+    """Return the levels of the synchrosqueezed wavelet transform in segments, without holding the whole matrix.
 
     Parameters
     ----------
@@ -255,7 +256,7 @@ def squeezed_cwt_map(
     Returns
     -------
     TimeFrequencyMap
-        A line is read as often as the bandwidth of the wavelets that add to it asks.
+        A line is sampled as the bandwidth of its contributing wavelets requires.
 
     Raises
     ------
@@ -290,31 +291,31 @@ def _transform(
     edges: Edges,
     engine: SqueezeEngine | None = None,
 ) -> LinePlan:
-    """Check the edges and the engine (None: not squeezed); return the lines with the reach of ends and components."""
+    """Check edges and engine (None: not squeezed); return the line plan with the reach of ends and components."""
     one_of(edges, "edges", get_args(Edges))
     by = " by ssqueezepy" if engine is not None and is_ssqueezepy(engine) else ""
     method = f"CWT, {wavelet.name}" if engine is None else f"synchrosqueezed CWT{by}, {wavelet.name}"
     edge = half_support(wavelet) / 2 / lines  # half of the support carries all but a thousandth
     middle = len(lines) // 2
-    # At the middle line, a component falls to e⁻² of its power so many lines from its own middle.
+    # Lines, at the middle line, from a component's centre to where its power has fallen to e⁻².
     reach = int(np.searchsorted(lines, lines[middle] * (1.0 + np.sqrt(2.0) / wavelet.duration))) - middle
     return LinePlan(x, lines, spacing, method, edge, max(1, reach), engine is not None)
 
 
 @dataclass(frozen=True)
 class SqueezingWavelets:
-    """Wavelets of a squeezed transform: they reach beyond its lines, so that the outermost ones are complete.
+    """Wavelets of a squeezed transform, extending beyond its lines so that the outermost lines are complete.
 
     Parameters
     ----------
     lines : array, (n_lines,)
         In Hz or orders.
     analysed : array, (n_analysed,)
-        The wavelets' own frequencies or orders.
+        Frequencies or orders of the wavelets.
     weight : float
         2 Δ(ln f) / C: the sum over the wavelets is the analytic signal.
     smallest : float
-        Power below which a coefficient is rounding.
+        Power below which a coefficient is only rounding.
     """
 
     lines: FloatArray
@@ -323,7 +324,7 @@ class SqueezingWavelets:
     smallest: float
 
     def lines_among(self, analysed: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-        """Return which lines are among these wavelets, and which of the wavelets they are."""
+        """Return the indices of the lines among these wavelets, and a mask of the wavelets that are lines."""
         first = int(np.argmin(np.abs(np.log(self.analysed / self.lines[0]))))
         numbers = analysed - first
         inside = (numbers >= 0) & (numbers < len(self.lines))
@@ -333,7 +334,7 @@ class SqueezingWavelets:
 def analysis(
     x: UniformSignal, wavelet: Wavelet, lowest: float | None, highest: float | None, n_per_octave: int
 ) -> SqueezingWavelets:
-    """Return lines, and wavelets that reach as far beyond them as they answer to them."""
+    """Return the lines, and the wavelets: those of the lines and those beyond that still respond to them."""
     lines, _ = lines_of(x, wavelet, None, lowest, highest, n_per_octave)
     v_low, v_high = band(wavelet, _GUARD)
     n_below, n_above = (int(np.ceil(n_per_octave * np.log2(r))) for r in (v_high, 1 / v_low))
@@ -348,13 +349,13 @@ def analysis(
 def _blocks(
     x: UniformSignal, plan: SqueezingWavelets, wavelet: Wavelet, part: np.ndarray, largest_step: int, edges: Edges
 ) -> Iterator[Piece]:
-    """Yield T of some neighbouring lines, block after block."""
+    """Yield the squeezed and plain coefficients of some neighbouring lines, block by block."""
     lines = plan.lines[part]
     table = squeeze_lines(lines, x.rate, "logarithmic")
     v_low, v_high = band(wavelet, _GUARD)
     chosen = np.flatnonzero((plan.analysed > lines[0] / v_high / 1.02) & (plan.analysed < lines[-1] / v_low * 1.02))
     cycles = plan.analysed / x.rate
-    # The largest power of two that reads the band twice as often as it must.
+    # The largest power of two that samples the band at least twice as often as necessary.
     width = cycles[chosen[-1]] * (v_high - v_low)
     step = int(min(largest_step, 1 << max(0, int(np.floor(np.log2(0.5 / width))))))
     group = plan_group(chosen, cycles, wavelet, x.n_samples, step=step)
@@ -372,15 +373,15 @@ def _blocks(
 
 
 def _by_ssqueezepy(x: UniformSignal, plan: SqueezingWavelets, wavelet: Wavelet, edges: Edges) -> ComplexArray:
-    """Return the squeezed wavelet transform of every sample by ssqueezepy.
+    """Return the squeezed wavelet transform at every sample, computed by ssqueezepy, (n_lines, n_samples).
 
-    ssqueezepy sums W Δ(ln f) over the wavelets, with W of peak gain 2 too; 2/C makes a unit sine read 1.
-    It puts what lies beyond its lines on the outermost ones, so it is given one more on either side than is analysed.
+    ssqueezepy sums W Δ(ln f) over the wavelets, also with a peak gain of 2; with 2/C a unit sine reads 1.
+    It assigns everything beyond its lines to the outermost ones, so it is given one extra line on either side.
     """
     lines, analysed = plan.lines, plan.analysed
     ratio = analysed[1] / analysed[0]
     grid = np.concatenate([[analysed[0] / ratio], analysed, [analysed[-1] * ratio]])
-    # Wavelets, their derivatives, a copy, the result, and two of these padded to the next power of two.
+    # Coefficients, their derivatives, a copy, the result, and two of these padded to the next power of two.
     check_ssqueezepy_bytes(len(grid) * 8 * (4 * x.n_samples + 2 * (4 << (x.n_samples - 1).bit_length() - 1)))
     scaled, rms = unit_rms(x)
     with ssqueezepy() as ssq:
@@ -401,14 +402,14 @@ def _by_ssqueezepy(x: UniformSignal, plan: SqueezingWavelets, wavelet: Wavelet, 
 
 
 # --------------------
-# Back from the coefficients: the whole signal, or the component along a ridge.
+# Reconstruction from the coefficients: the whole signal, or the component along a ridge.
 # --------------------
 
 
 def inverse(
     coefficients: Coefficients, *, lowest: FloatArray | float | None = None, highest: FloatArray | float | None = None
 ) -> ComplexArray:
-    """Return the analytic signal at the columns; its real part is the signal.
+    """Return the analytic signal at the columns, reconstructed from coefficients; its real part is the signal.
 
     z(t) = Σ_l weight_l · value(l, t) over the lines between `lowest` and `highest`.
 
@@ -421,16 +422,15 @@ def inverse(
     Returns
     -------
     complex array, (n_columns,)
-        Peak amplitude in the coefficients' unit. Whole signals come back, as error over amplitude: from the STFT
-        with all lines to 1e-6, ends included; from the CWT to 1e-4 away from the ends for frequencies that lie √2 or
-        more inside the outermost lines (the default wavelet), 1e-2 next to them; from the squeezed transforms to 1e-4
-        rms, with single samples 1e-2 off where components cancel. What lies outside the lines, the mean
-        included, is lost.
+        Peak amplitude in the coefficients' unit. Errors over amplitude for whole signals: from the STFT with all lines
+        1e-6, including the ends; from the CWT with the default wavelet, away from the ends, 1e-4 for frequencies at
+        least a factor √2 inside the outermost lines, 1e-2 next to them; from the squeezed transforms 1e-4 rms, with
+        single samples 1e-2 off where components cancel. Content outside the lines, including the mean, is lost.
 
     Raises
     ------
     InputError
-        If limits have another length than the columns.
+        If the length of the limits differs from the number of columns.
     """
     values, lines = coefficients.values, coefficients.positions
     n = values.shape[1]
@@ -466,9 +466,9 @@ class Component(Result, columns=("at", "analytic")):
     at : array, (n_samples,)
         Seconds from the start, or revolutions.
     ridge : Ridge
-        Around which it was gathered.
+        The ridge around which it was reconstructed.
     half_width : float
-        Share of the ridge's frequency or order that the band reaches to either side.
+        Half width of the band, relative to the ridge's frequency or order.
     unit, source : str
     """
 
@@ -485,12 +485,12 @@ class Component(Result, columns=("at", "analytic")):
 
     @property
     def values(self) -> FloatArray:
-        """The waveform."""
+        """Waveform of the component, (n_samples,)."""
         return self.analytic.real
 
     @property
     def amplitude(self) -> FloatArray:
-        """Momentary peak amplitude."""
+        """Instantaneous peak amplitude, (n_samples,)."""
         return np.abs(self.analytic)
 
 
@@ -505,28 +505,28 @@ def component(
     n_per_octave: int = 32,
     edges: Edges = "reflect",
 ) -> Component:
-    """Return the waveform of the component that runs along a ridge, at every sample.
+    """Return the waveform of the component along a ridge, at every sample.
 
-    Squeezed: the sum of all wavelet coefficients whose momentary frequency lies within the band. Not squeezed: of the
-    lines within the band, divided by the share of the wavelet that they hold.
+    Squeezed: the sum of all wavelet coefficients whose instantaneous frequency lies within the band. Not squeezed: the
+    sum over the lines within the band, divided by the share of the wavelet that they hold.
 
     Parameters
     ----------
     signal, channel
-        What the ridge was found in.
+        The signal in which the ridge was found.
     ridge : Ridge
     half_width : float or None
-        Share of the ridge's frequency or order, 0 to 0.5. None: √2/P of the wavelet where squeezed, 2√2/P where not,
-        at most 0.5.
+        Fraction of the ridge's frequency or order, 0 to 0.5. None: √2/P of the wavelet if squeezed, 2√2/P otherwise, at
+        most 0.5.
     squeezed : bool
-        Squeezed: keeps more noise out, and fast modulation too. Not squeezed: smoother.
+        True rejects more noise, but also fast modulation; False is smoother.
     wavelet, n_per_octave, edges
-        As in `squeezed_cwt`; best those that the ridge was found with.
+        As in `squeezed_cwt`; preferably those with which the ridge was found.
 
     Returns
     -------
     Component
-        Where the ridge is shared with another one, both are in it.
+        Where the ridge is shared with another, it contains both components.
 
     Raises
     ------
@@ -545,7 +545,7 @@ def component(
     one_of(edges, "edges", get_args(Edges))
     if ridge.axis != x.axis:
         raise InputError(
-            f"the ridge is over {ridge.axis}, the signal is not",
+            f"the ridge is over {ridge.axis}, but the signal is not",
             where="ridge",
             remedy="give the recording for a frequency ridge, the angle signal for an order ridge",
         )
@@ -556,7 +556,7 @@ def component(
     if float(path.min()) <= 0.0:
         raise InputError("the ridge touches zero", where="ridge", remedy="look for it between lines above zero")
     low, high = path / (1.0 + width), path * (1.0 + width)
-    # Where the signal is just long enough for the ridge, the band's lower half is cut rather than refused.
+    # If the signal is just long enough for the ridge, the band's lower half is cut rather than refused.
     bottom = max(float(low.min()), min(float(path.min()), lowest_analysable(x, wavelet)))
     top = min(float(high.max()), x.highest_valid)
     plan = analysis(x, wavelet, bottom, top, n_per_octave)

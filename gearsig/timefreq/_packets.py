@@ -1,4 +1,4 @@
-"""Wavelet packets: equal bands, each read as often as it is wide, with the energy kept exactly."""
+"""Wavelet packets: bands of equal width, each critically sampled, with the energy preserved exactly."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.results import Result
 from gearsig.timefreq._types import Axis, Columns, LinePlan, Reduction, Source, TimeFrequencyMap, plan_columns, uniform
 
-_MODE = "periodization"  # as many coefficients as samples: the only one that keeps the energy
+_MODE = "periodization"  # as many coefficients as samples: the only mode that preserves the energy
 
 
 @dataclass(frozen=True)
@@ -21,9 +21,9 @@ class WaveletPackets(Result):
     Parameters
     ----------
     values : array, (2^level, n_coefficients)
-        Row by row upwards in frequency. The sum of squares is that of the samples.
+        One row per band, in ascending frequency. The sum of squares equals that of the samples.
     n_samples : int
-        Of the signal; it was filled up with zeros to a multiple of 2^level.
+        Length of the signal, which was zero-padded to a multiple of 2^level.
     rate : float
         Samples per second or revolution of the signal.
     start : float
@@ -49,40 +49,40 @@ class WaveletPackets(Result):
 
     @property
     def n_bands(self) -> int:
-        """2^level."""
+        """Number of bands, 2^level."""
         return len(self.values)
 
     @property
     def band_width(self) -> float:
-        """In Hz or orders."""
+        """Width of a band in Hz or orders."""
         return self.rate / 2 / self.n_bands
 
     @property
     def level(self) -> int:
-        """How often the signal was split."""
+        """Number of times the signal was split."""
         return self.n_bands.bit_length() - 1
 
     @property
     def energies(self) -> FloatArray:
-        """Sum of squares of each band, (n_bands,): they add up to that of the signal."""
+        """Sum of squares of each band, (n_bands,); the total is that of the signal."""
         result: FloatArray = np.einsum("ij,ij->i", self.values, self.values)
         return result
 
     def limits_of(self, band: int) -> tuple[float, float]:
-        """Return the lower and upper border of a band in Hz or orders; its filter's skirts reach beyond."""
+        """Return the lower and upper border of a band in Hz or orders; its filter's skirts extend beyond."""
         return band * self.band_width, (band + 1) * self.band_width
 
     def band_of(self, position: float) -> int:
-        """Return the index of the band that holds a frequency or order."""
+        """Return the index of the band that contains a frequency or order."""
         if not 0.0 <= position <= self.rate / 2:
             raise InputError(f"position is {position:g}", allowed=f"0 to {self.rate / 2:g}")
         return min(int(position / self.band_width), self.n_bands - 1)
 
 
 def node_path(band: int, level: int) -> str:
-    """Return which filters lead to a band: "a" low-pass, "d" high-pass, the first split first.
+    """Return the filter path to a band: "a" low-pass, "d" high-pass, the first split first.
 
-    A high-pass branch comes out mirrored in frequency, so that paths run through the bands in Gray's code.
+    A high-pass branch is mirrored in frequency, so that the paths of successive bands follow the Gray code.
 
     Examples
     --------
@@ -102,30 +102,30 @@ def wavelet_packets(
     Parameters
     ----------
     signal : Recording, AngleSignal, UniformSignal or array, (n_samples,)
-        Over time, bands are of frequencies; over angle, of orders.
+        Bands are frequencies for a signal over time, orders for one over angle.
     channel : str, float or None
         As in `cwt`.
     wavelet : str
-        An orthogonal wavelet of PyWavelets. Long ones separate bands better. Nearly symmetric ones
-        (sym12, dmey) show an event when it was; db10 scatters it over bands by several coefficients.
+        An orthogonal wavelet of PyWavelets. Longer ones separate bands better. Nearly symmetric ones
+        (sym12, dmey) show an event at its true time; db10 shifts it between bands by several coefficients.
     level : int
         1 to 12.
 
     Returns
     -------
     WaveletPackets
-        Σ values² = Σ x². The signal is taken as periodic: within a filter's length of the ends, bands mix both ends.
+        Σ values² = Σ x². The signal is treated as periodic: within a filter's length of the ends, bands mix both ends.
 
     Raises
     ------
     InputError
-        On an unknown wavelet, one that is not orthogonal, or values that are not finite.
+        On an unknown or non-orthogonal wavelet, or non-finite values.
     RefusalError
         If the signal is too short for the level.
 
     Notes
     -----
-    Not for reading frequencies or exact instants: bands overlap by the filters' skirts, and the transform changes when
+    Not for reading frequencies or exact instants: the filters' skirts make bands overlap, and the transform changes if
     the signal is shifted by a sample.
 
     Source: R. R. Coifman, M. V. Wickerhauser, *Entropy-based algorithms for best basis selection*, IEEE Transactions on
@@ -149,13 +149,13 @@ def wavelet_packets(
 
 
 def packet_inverse(packets: WaveletPackets, bands: list[int] | None = None) -> FloatArray:
-    """Return the signal made of some bands, or of all: then it comes back to 1e-12.
+    """Return the signal reconstructed from some bands, or from all, which restores it to 1e-12.
 
     Parameters
     ----------
     packets : WaveletPackets
     bands : list of int or None
-        Indices of the bands that are kept.
+        Indices of the bands to keep; None keeps all.
 
     Returns
     -------
@@ -164,7 +164,7 @@ def packet_inverse(packets: WaveletPackets, bands: list[int] | None = None) -> F
     Raises
     ------
     InputError
-        If a band is not there.
+        If a band does not exist.
     """
     import pywt
 
@@ -195,14 +195,14 @@ def wavelet_packet_map(
     reduction: Reduction = "mean",
     scaling: str = "amplitude peak",
 ) -> TimeFrequencyMap:
-    """Return levels of the wavelet packet bands in segments of time or angle.
+    """Return the levels of the wavelet packet bands in segments of time or angle.
 
     Parameters
     ----------
     signal, channel, wavelet, level
         As in `wavelet_packets`.
     n_columns : int
-        Most columns; no more than there are coefficients in a band.
+        Maximum number of columns, limited to the number of coefficients in a band.
     reduction, scaling
         As in `cwt_map`.
 
@@ -210,7 +210,8 @@ def wavelet_packet_map(
     -------
     TimeFrequencyMap
         "power": mean square of the signal's part in each band, so that the mean over columns of the sum over
-        bands is the signal's mean square. "amplitude peak": √2 times its root, 1 for a unit sine inside a band.
+        bands is the signal's mean square. "amplitude peak": √2 times the root of the power, 1 for a unit sine inside a
+        band.
 
     Raises
     ------
@@ -229,7 +230,7 @@ def wavelet_packet_map(
         f"wavelet packets, {wavelet}, level {level}",
         np.full(n_bands, _orthogonal(wavelet).dec_len * n_bands / 2 / x.rate),
     )
-    # A coefficient stands for n_bands samples: its square over them is their mean square, half a sine's amplitude².
+    # A coefficient represents n_bands samples: its square over n_bands is their mean square, half a sine's amplitude².
     gain = np.sqrt(2.0 / n_bands)
     pieces = ((np.array([band]), 0, n_bands, gain * packets.values[band : band + 1]) for band in range(n_bands))
     return transform.level_map(columns, reduction, scaling, pieces)
@@ -247,7 +248,7 @@ def _orthogonal(name: str):  # type: ignore[no-untyped-def]
 
 
 def _split(x: FloatArray, filters: object, level: int) -> FloatArray:
-    """Return the packets of the last level, upwards in frequency: high bands come out mirrored, so they swap halves."""
+    """Return the last level's packets in ascending frequency: high-pass bands are mirrored, so their halves swap."""
     import pywt
 
     rows = [x]

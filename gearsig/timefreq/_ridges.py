@@ -1,4 +1,4 @@
-"""Ridges: the momentary frequency and amplitude of each component of a transform."""
+"""Ridges: the instantaneous frequency and amplitude of each component of a transform."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from gearsig.peaks import parabola_vertex
 from gearsig.timefreq._types import Coefficients, Ridge, TimeFrequencyMap
 
 SQUEEZED_REACH = 2
-"""Lines on either side over which a squeezed component's share may scatter."""
+"""Lines on either side over which a squeezed component may scatter."""
 _FLOOR_OVER_MEDIAN = 4.0
 _FLOOR_UNDER_TOP = 1e-5
 _COLUMNS_OF_FLOOR = 8
-_REACHES_OF_FLOOR = 5  # lines to either side over the reach of one component, few enough to follow coloured noise
+_REACHES_OF_FLOOR = 5  # lines to either side relative to one component's reach, few enough to follow coloured noise
 _DILATION = ((0, 1.0), (1, 0.7), (-1, 0.7), (2, 0.3), (-2, 0.3))
 
 
 def ridge_power(power: FloatArray, *, squeezed: bool) -> FloatArray:
-    """Return the power that one component has at each line: of squeezed ones, the sum over its lines."""
+    """Return the power of one component at each line; if squeezed, the sum over its lines."""
     if not squeezed:
         return power
     from scipy.ndimage import uniform_filter1d
@@ -35,7 +35,7 @@ def ridge_power(power: FloatArray, *, squeezed: bool) -> FloatArray:
 
 
 def _local_median_power(power: FloatArray, n_reach: int) -> FloatArray:
-    """Return the median power of the lines around each cell, in means over a few columns."""
+    """Return the median power of the lines around each cell, averaged over a few columns, (n_lines, n_columns)."""
     from scipy.ndimage import median_filter
 
     starts = np.arange(0, power.shape[1], _COLUMNS_OF_FLOOR)
@@ -46,10 +46,10 @@ def _local_median_power(power: FloatArray, n_reach: int) -> FloatArray:
 
 
 def ridge_scores(power: FloatArray, n_reach: int) -> FloatArray:
-    """Return scores from 0 to 1: near 1 on local maxima over frequency that stand out from the lines around them.
+    """Return scores from 0 to 1: near 1 on local maxima over frequency that stand out from the surrounding lines.
 
-    The score saturates: a weak component on its own ridge counts about as much as a strong one, so that nothing is won
-    by changing over to the stronger one. Skirts of strong components are no maxima and count nothing.
+    The score saturates: a weak component on its own ridge counts about as much as a strong one, so that a path gains
+    nothing by jumping to the stronger one. Skirts of strong components are not maxima and score zero.
 
     Parameters
     ----------
@@ -76,23 +76,23 @@ def ridge_scores(power: FloatArray, n_reach: int) -> FloatArray:
 _N_FIT = 24
 _MIN_FIT = 4
 _OF_MEETING = 8
-"""A slope is read over so large a share of the meeting that it must tell about."""
+"""A slope beside a meeting is fitted over at least the meeting's length divided by this."""
 _MEETING_GAPS = (3.0, 2.2, 1.6, 1.2, 1.0)
-"""Gaps at which a meeting is looked at; from afar, the paths there are known better."""
+"""Gaps at which a meeting is examined; farther apart, the paths are known more accurately."""
 _VALLEY = 0.8
-"""Share of the power beside it below which nothing crosses; where two cross, it is above 0.95, in any phase."""
+"""Power ratio to the surroundings below which nothing crosses; where two cross, it is above 0.95 at any phase."""
 
 
 @dataclass(frozen=True)
 class Meeting:
-    """Columns [start, stop) in which two paths are closer than they can be told apart."""
+    """Columns [start, stop) in which two paths are too close to be resolved."""
 
     start: int
     stop: int
 
 
 def crossing_segments(a: FloatArray, b: FloatArray, gap: float) -> list[Meeting]:
-    """Return the segments where |a - b| <= gap, those less than a few columns apart taken as one."""
+    """Return the segments where |a - b| <= gap; those less than a few columns apart are merged."""
     near = np.abs(a - b) <= gap
     steps = np.diff(near.astype(np.int8), prepend=0, append=0)
     starts, stops = np.flatnonzero(steps == 1), np.flatnonzero(steps == -1)
@@ -108,12 +108,12 @@ def crossing_segments(a: FloatArray, b: FloatArray, gap: float) -> list[Meeting]
 def reconnected_paths(
     paths: list[FloatArray], levels: list[FloatArray], gap: float, level_weight: float, power: FloatArray | None = None
 ) -> list[FloatArray]:
-    """Return the paths with their tails exchanged wherever both then go on more smoothly.
+    """Return the paths with their tails exchanged wherever both then continue more smoothly.
 
-    Across a meeting of length L, cubics join place and slope on either side; a cubic's bending ∫ p''² dt is
-    4 (u² + u v + v²) / L, u and v being its end slopes less its mean slope. The pairing with the smaller
+    Across a meeting of length L, cubics join position and slope on either side; a cubic's bending ∫ p''² dt is
+    4 (u² + u v + v²) / L, with u and v its end slopes minus its mean slope. The pairing with the smaller
     L³ Σ bending + weight² Σ (change of level)² is kept; where tails are exchanged, the cubics replace the paths. If the
-    power shows a valley all through the place where they would cross, they part again whatever the cubics say.
+    power shows a valley all along where they would cross, they part again whatever the cubics suggest.
 
     Parameters
     ----------
@@ -122,10 +122,10 @@ def reconnected_paths(
     levels : list of arrays, (n_columns,)
         Natural logarithm of the amplitude along each path.
     gap : float
-        Lines within which two components cannot be told apart. A meeting is looked at from up to three times as far,
-        less where it would reach an end of the paths.
+        Lines within which two components cannot be resolved. A meeting is examined from up to three times this
+        distance, less if it would reach an end of the paths.
     level_weight : float
-        Lines that a change of level by a factor e is worth.
+        Cost in lines of a change of level by a factor e.
     power : array, (n_lines, n_columns), or None
     """
     paths, levels = [p.copy() for p in paths], [v.copy() for v in levels]
@@ -137,7 +137,7 @@ def reconnected_paths(
 
 
 def _settled_from_afar(a: FloatArray, b: FloatArray, gap: float) -> list[Meeting]:
-    """Return the meetings, each in the widest of several gaps that leaves columns to compare on both sides."""
+    """Return the meetings, each at the widest of several gaps that leaves columns to compare on both sides."""
     settled: list[Meeting] = []
     for share in _MEETING_GAPS:
         for meeting in crossing_segments(a, b, share * gap):
@@ -149,7 +149,7 @@ def _settled_from_afar(a: FloatArray, b: FloatArray, gap: float) -> list[Meeting
 
 
 def shared_columns(paths: list[FloatArray], gap: float) -> list[NDArray[np.bool_]]:
-    """Return where each path has another one within `gap` lines."""
+    """Return, for each path, where another one lies within `gap` lines, (n_columns,) each."""
     result = [np.zeros(len(p), dtype=np.bool_) for p in paths]
     for i in range(len(paths)):
         for j in range(i + 1, len(paths)):
@@ -164,7 +164,7 @@ _Track = tuple[FloatArray, FloatArray]
 
 @dataclass(frozen=True)
 class _End:
-    """Place, slope (lines per column) and level of a path at one side of a meeting."""
+    """Position (lines), slope (lines per column) and level of a path on one side of a meeting."""
 
     place: float
     slope: float
@@ -172,7 +172,7 @@ class _End:
 
 
 def _settle(a: _Track, b: _Track, meeting: Meeting, level_weight: float, power: FloatArray | None, gap: float) -> None:
-    """Let two paths cross or part again after a meeting, in place, whichever goes on more smoothly."""
+    """Let two paths cross or part again after a meeting, whichever is smoother; modifies them in place."""
     start, stop, n = meeting.start, meeting.stop, len(a[0])
     first, last = start - 1, stop
     n_fit = max(_N_FIT, (stop - start) // _OF_MEETING)
@@ -202,7 +202,7 @@ def _exchange(a: _Track, b: _Track, meeting: Meeting, between: list[FloatArray])
 
 
 def _valley(power: FloatArray, crossed: list[FloatArray], start: int, gap: float) -> bool:
-    """Return whether little lies where two paths would cross, compared with what lies beside it."""
+    """Return whether the power where two paths would cross is low compared with that around it."""
     columns = np.flatnonzero(np.abs(crossed[0] - crossed[1]) <= gap / 2)
     middle = np.round((crossed[0] + crossed[1])[columns] / 2).astype(np.int64)
     centre, around = (_largest_near(power, middle, columns + start, reach) for reach in (gap / 4, 2 * gap))
@@ -216,7 +216,7 @@ def _largest_near(power: FloatArray, lines: NDArray[np.int64], columns: NDArray[
 
 
 def maxima_of_separate_paths(power: FloatArray, parted: list[FloatArray], start: int) -> list[FloatArray]:
-    """Return the largest power's line on either side of the middle between two paths that part again."""
+    """Return, for two paths that part again, the line of largest power on their side of the middle in each column."""
     middle = np.clip(np.round((parted[0] + parted[1]) / 2), 0, len(power) - 1).astype(np.int64)
     half = np.ceil(np.abs(parted[0] - parted[1])).astype(np.int64)
     result = [p.copy() for p in parted]
@@ -250,18 +250,18 @@ def _cubic(p: _End, q: _End, first: int, last: int, columns: NDArray[np.int64]) 
 
 
 NOT_HIDDEN = -(1 << 14)
-"""Mark of cells that no path covers, as in `ridge_path`; written here so that its compiler loads only on use."""
+"""Marks cells that no path covers."""
 MAX_COLUMNS = 4000
-"""Columns that the search for a path works on; longer transforms are pooled."""
+"""Maximum number of columns for the path search; longer transforms are pooled."""
 _SPARE = 8
-"""Ridges looked for beyond those asked, of which the strongest are kept: the clearest need not be strong."""
+"""Ridges searched beyond the requested number; the strongest are kept, as the clearest need not be strong."""
 _MIN_UNCOVERED = 0.6  # share of its columns in which a path is not covered by others
-_MIN_SCORE = 0.25  # mean score of a path: below, it hops between maxima of noise
+_MIN_SCORE = 0.25  # mean score of a path, below which it hops between noise maxima
 
 
 @dataclass(frozen=True)
 class _Grid:
-    """Power over line and column, at most `MAX_COLUMNS` of them, and the power before squeezing."""
+    """Power over lines and at most `MAX_COLUMNS` columns, and the power before squeezing."""
 
     power: FloatArray
     unsqueezed: FloatArray
@@ -279,52 +279,51 @@ def ridges(
     lowest: float | None = None,
     highest: float | None = None,
 ) -> tuple[Ridge, ...]:
-    """Return the `n_ridges` strongest of the clear ridges, which go straight on where they cross.
+    """Return the `n_ridges` strongest of the clear ridges, which continue straight on where they cross.
 
-    Paths are found one after the other by dynamic programming over place and slope, with a price on changes of slope;
-    what a path covers is taken out before the next one. Eight more than asked are looked for, and those of most power
-    kept. Where two of them meet, they are then looked at together: if
-    the power shows a valley all through the meeting, they part again; otherwise tails are exchanged if place, slope and
-    level go on more evenly so. Place and level come from a parabola through the logarithm of the power, where the
-    transform is squeezed of the power before squeezing: squeezing shows which way a component goes, and scatters its
-    level over lines where there is noise.
+    Paths are found one by one by dynamic programming over position and slope, with a penalty on changes of slope; the
+    cells that a path covers are hidden before the next search. Eight more than requested are searched, and those with
+    the most power are kept. Where two of them meet, both are examined together: if the power shows a valley all along
+    the meeting, they part again; otherwise their tails are exchanged if position, slope and level then continue more
+    smoothly. Position and level come from a parabola through the logarithm of the power, for squeezed transforms of the
+    power before squeezing: squeezing shows the direction of a component, but in noise scatters its level over lines.
 
     Parameters
     ----------
     transform : Coefficients or TimeFrequencyMap
-        More than 4000 columns are pooled to their mean power first.
+        With more than 4000 columns, they are first pooled to their mean power.
     n_ridges : int
     steepest : float
-        Lines per (pooled) column that a ridge may rise or fall.
+        Maximum rise or fall of a ridge in lines per (pooled) column.
     stiffness : float
-        Price of changing the slope by two lines per eight columns, in columns on the ridge; twice that is the price of
-        a line where no ridge is. Raise it for chirps in noise, lower it for fast modulation.
+        Penalty for changing the slope by two lines per eight columns, in columns on the ridge; moving by one line where
+        there is no ridge costs twice as much. Raise it for chirps in noise, lower it for fast modulation.
     lowest, highest : float or None
-        Hz or orders between which to look.
+        Range of the search, in Hz or orders.
 
     Returns
     -------
     tuple of Ridge
-        The largest rms amplitude first; fewer than asked where the rest of the map shows no further ridge.
+        In descending rms amplitude; fewer than requested if the map shows no further ridge.
 
     Raises
     ------
     InputError
-        On numbers out of range; also on more ridges than lie side by side within the lines.
+        On numbers out of range, or more ridges than fit side by side on the lines.
     RefusalError
-        If the map holds no ridge at all.
+        If the map shows no ridge at all.
 
     Notes
     -----
-    Two components that come closer than the transform tells them apart, and turn back, look like two that cross: which
-    is which is then not in the data, and the ridges cross. See `shared`, and take a longer wavelet or window. A ridge
-    runs through the whole transform: one that begins or ends within it, or that noise covers for long, is carried on
-    along what is nearest, so cut the recording, or look at `amplitude`. A component shows as long as its amplitude is
-    above that of the noise within the wavelet's or window's band; a longer one has a narrower band.
+    Two components that come closer than the transform's resolution and turn back look like two that cross: the data do
+    not show which is which, and the ridges cross. See `shared`, and use a longer wavelet or window. A ridge runs
+    through the whole transform: one that begins or ends within it, or is masked by noise for long, continues along the
+    nearest structure, so cut the recording, or check `amplitude`. A component is visible as long as its amplitude
+    exceeds that of the noise within the band of the wavelet or window; a longer one has a narrower band.
 
     Source: R. A. Carmona, W. L. Hwang, B. Torrésani, *Multiridge detection and time-frequency reconstruction*, IEEE
-    Transactions on Signal Processing 47 (1999), for ridges as penalised paths; the state with slope and the
-    exchange of tails are this package's own.
+    Transactions on Signal Processing 47 (1999), for ridges as penalised paths; the slope state and the exchange of
+    tails are this package's own.
     """
     remedy = "transform the signal first: gearsig.cwt, stft, squeezed_cwt or squeezed_stft"
     instance_of(transform, Coefficients | TimeFrequencyMap, "transform", remedy=remedy)
@@ -352,14 +351,14 @@ def _lines_between(positions: FloatArray, lowest: float | None, highest: float |
     )
     if high - low < 3:
         raise RefusalError(
-            f"fewer than three of the transform's {len(positions)} lines are looked at",
+            f"fewer than three of the transform's {len(positions)} lines lie in the range",
             remedy="widen the range or compute more lines",
         )
     return slice(low, high)
 
 
 def _check_room(n_ridges: int, part: slice, n_reach: int) -> None:
-    """Raise InputError if so many ridges cannot be told apart on the lines."""
+    """Raise InputError if that many ridges cannot be resolved on the lines."""
     max_ridges = max(1, (part.stop - part.start) // (2 * n_reach + 1))
     if n_ridges > max_ridges:
         raise InputError(
@@ -378,7 +377,7 @@ def _grid(transform: Coefficients | TimeFrequencyMap, part: slice) -> _Grid:
 
     def pooled(values: NDArray[Any]) -> FloatArray:
         power = np.empty((part.stop - part.start, len(starts)))
-        for row, line in enumerate(values[:, part].T if is_map else values[part]):  # the whole may be large
+        for row, line in enumerate(values[:, part].T if is_map else values[part]):  # row by row: the whole may be large
             square = 2.0 * line if is_power else np.square(np.abs(line), dtype=np.float64)
             power[row] = np.add.reduceat(square, starts) / n_pooled
         return power
@@ -407,7 +406,7 @@ def _paths(grid: _Grid, n_ridges: int, steepest: float, stiffness: float) -> lis
     weaker = [parts[i] for i in range(len(parts)) if i not in strongest]
     if len(paths) > 1:
         paths = _settled(paths, grid, power)
-        for i in range(len(paths)):  # once more, now that each knows where the others go
+        for i in range(len(paths)):  # search again, with all other paths known
             hidden = _hidden(scores.shape, weaker + paths[:i] + paths[i + 1 :], grid.n_reach)
             paths[i] = _uncovered_path(scores, hidden, steepest, stiffness)
         paths = _settled(paths, grid, power)
@@ -415,7 +414,7 @@ def _paths(grid: _Grid, n_ridges: int, steepest: float, stiffness: float) -> lis
 
 
 def _uncovered_path(scores: FloatArray, hidden: NDArray[np.int16], steepest: float, stiffness: float) -> FloatArray:
-    """Return the best path; one that hides behind others, by weaving across them, is searched without credit."""
+    """Return the best path; if it hides behind others by weaving across them, search again without credit."""
     path = best_path(scores, hidden, steepest, stiffness)
     if float(np.mean(_along(hidden, path) == NOT_HIDDEN)) >= _MIN_UNCOVERED:
         return path
@@ -423,14 +422,14 @@ def _uncovered_path(scores: FloatArray, hidden: NDArray[np.int16], steepest: flo
 
 
 def _settled(paths: list[FloatArray], grid: _Grid, power: FloatArray) -> list[FloatArray]:
-    """Return the paths, read between the lines, each going on as what it was before it met another one."""
+    """Return the paths, interpolated between lines, each following the same component after a meeting."""
     paths = [_read(grid, p)[0] for p in paths]
     levels: list[FloatArray] = [np.log(np.maximum(_along(power, p), np.finfo(np.float64).tiny)) / 2 for p in paths]
     return reconnected_paths(paths, levels, 2.0 * grid.n_reach, float(grid.n_reach), power)
 
 
 def _hidden(shape: tuple[int, ...], paths: list[FloatArray], n_cover: int) -> NDArray[np.int16]:
-    """Return the slope of the path that covers each cell, in lines per node."""
+    """Return the slope of the path that covers each cell, in lines per node; `NOT_HIDDEN` elsewhere."""
     result = np.full(shape, NOT_HIDDEN, dtype=np.int16)
     q = nodes_apart(shape[1])
     columns = np.arange(shape[1])
@@ -453,7 +452,7 @@ def _ridge(
     alone = ~shared
     if alone.any() and shared.any():
         columns, known = np.arange(len(path)), np.flatnonzero(alone)
-        between = shared & (columns > known[0]) & (columns < known[-1])  # what meets until an end stays as it was read
+        between = shared & (columns > known[0]) & (columns < known[-1])  # meetings that extend to an end stay as read
         places = np.where(between, np.interp(columns, known, places[known]), places)
     lines = transform.positions[part]
     index = np.arange(len(lines))
@@ -467,10 +466,10 @@ def _ridge(
 
 
 def _read(grid: _Grid, path: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return place, between the lines, and height of the parabola through the log power around the maximum at a path.
+    """Return position and height of the parabola through the log power around the maximum near a path, (n_columns,).
 
-    Of squeezed transforms, of the power before squeezing: noise scatters a component's squeezed share over lines, so
-    that their sum reads low, and a sweep's share moves towards where the frequency is going.
+    For squeezed transforms, the power before squeezing is used: noise scatters a squeezed component over lines, so that
+    their sum reads low, and a sweep's energy moves in the direction of the sweep.
     """
     power, columns = grid.unsqueezed, np.arange(len(path))
     n = len(power)
@@ -499,27 +498,27 @@ _MIN_NODES = 48
 _MAX_BEND = 4
 
 
-CREDIT = 0.3  # score of a hidden cell for a path that crosses: what lies there cannot be seen
+CREDIT = 0.3  # score of a hidden cell for a crossing path, since its own content there is not visible
 _NOTHING = 0.1  # score below which a cell holds no ridge
-_ASTRAY = 2.0  # columns that a line costs where no ridge is: else paths leap to whatever is clearer for a while
-_MIN_ANGLE = 2  # lines per node by which slopes must differ to cross
+_ASTRAY = 2.0  # cost in columns per line where there is no ridge: otherwise paths leap to anything clearer for a while
+_MIN_ANGLE = 2  # lines per node by which slopes must differ to count as crossing
 
 
 def nodes_apart(n_columns: int) -> int:
-    """Return how many columns lie between nodes: eight, fewer in short tables."""
+    """Return the number of columns between nodes: eight, fewer in short tables."""
     return min(_MAX_COLUMNS_PER_NODE, max(1, n_columns // _MIN_NODES))
 
 
 def best_path(
     scores: FloatArray, hidden: NDArray[np.int16], steepest: float, stiffness: float, *, credit: float = CREDIT
 ) -> FloatArray:
-    """Return the line of the path in each column.
+    """Return the best path's line in each column, (n_columns,).
 
     The path is a chain of straight pieces over q columns each (eight, fewer in short tables), each rising by s lines.
-    It maximises Σ scores along the path - `stiffness` Σ max(|s' - s| - 1, 0)²: it pays for changes of slope and not for
-    slope, so that it goes straight through a crossing instead of turning into the other branch. Changes by one are
-    free, as slopes between whole numbers need them. Where no ridge is, each line that it travels costs two columns: so
-    it waits for a component that fades, and leaps to another one only if that is clearer for long.
+    It maximises Σ scores along the path - `stiffness` Σ max(|s' - s| - 1, 0)²: changes of slope cost, slope does not,
+    so that the path goes straight through a crossing instead of turning into the other branch. Changes by one are free,
+    as fractional slopes need them. Where there is no ridge, each line travelled costs two columns (times `stiffness`):
+    the path then waits for a fading component, and leaps to another only if that is clearer for long.
 
     Parameters
     ----------
@@ -527,18 +526,18 @@ def best_path(
         0 to 1.
     hidden : array, (n_lines, n_columns)
         Slope, in lines per node, of the path that covers the cell, or `NOT_HIDDEN`. Covered cells score for paths that
-        cross that one, and not for paths along it.
+        cross that path, but not for paths along it.
     steepest : float
-        Lines per column.
+        Maximum slope in lines per column.
     stiffness : float
     credit : float
-        Score of a covered cell for a path that crosses. With one, a path may weave to and fro across another.
+        Score of a covered cell for a crossing path. If it is not zero, a path may weave back and forth across another.
     """
     q = nodes_apart(scores.shape[1])
     n_slopes = min(max(1, int(np.ceil(steepest * q))), scores.shape[0] - 1)
     is_hidden = hidden != NOT_HIDDEN
     lost = np.where(is_hidden | (scores >= _NOTHING), 0.0, stiffness * _ASTRAY / q)
-    # A column's cells lie side by side, as the search goes along them.
+    # Cells of a column are contiguous, since the search runs along them.
     seen, astray = (np.ascontiguousarray(a.T, dtype=np.float32) for a in (np.where(is_hidden, 0.0, scores), lost))
     covering = np.ascontiguousarray(hidden.T)
     lines = _search(seen, astray, covering, n_slopes, np.float32(stiffness), np.float32(credit), q)
@@ -548,7 +547,7 @@ def best_path(
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _search(seen, astray, covering, S, stiffness, credit, q):  # type: ignore[no-untyped-def]
-    """Viterbi recursion over states (slope index s + S, line); inner loops go along lines, several at a time."""
+    """Viterbi recursion over states (slope index s + S, line); inner loops run along lines and are vectorised."""
     n_columns, n_lines = seen.shape
     n_nodes = (n_columns + q - 1) // q
     n_s = 2 * S + 1
@@ -594,7 +593,7 @@ def _search(seen, astray, covering, S, stiffness, credit, q):  # type: ignore[no
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _read_back(best, came, n_columns, S, q):  # type: ignore[no-untyped-def]
     """Follow the best final state back to the first column."""
-    # Of states that are as good the lowest line, and of its slopes the steepest down.
+    # Among equally good states, take the lowest line, and of its slopes the steepest downward one.
     flat = np.argmax(best.T.copy())
     k, i = flat // best.shape[0], flat % best.shape[0]
     path = np.empty(n_columns, dtype=np.int64)
@@ -608,5 +607,5 @@ def _read_back(best, came, n_columns, S, q):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _at(k, s, c, q):  # type: ignore[no-untyped-def]
-    """Line after c of q columns on the way from k to k + s, rounded."""
+    """Return the line after c of q columns on the way from k to k + s, rounded."""
     return k + (2 * s * c + q) // (2 * q)

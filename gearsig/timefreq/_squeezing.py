@@ -1,4 +1,4 @@
-"""Squeezing: coefficients moved to their momentary frequency, by compiled kernels or by ssqueezepy."""
+"""Synchrosqueezing: coefficients reassigned to their instantaneous frequency, by compiled kernels or ssqueezepy."""
 
 from __future__ import annotations
 
@@ -24,52 +24,52 @@ SqueezeEngine = Literal["gearsig", "ssqueezepy"]
 
 
 def is_ssqueezepy(engine: str) -> bool:
-    """Check the name of an engine, and tell whether it is ssqueezepy."""
+    """Check the name of an engine, and return whether it is ssqueezepy."""
     return one_of(engine, "engine", get_args(SqueezeEngine)) == "ssqueezepy"
 
 
 @dataclass(frozen=True)
 class SqueezeLines:
-    """Borders of the lines in radians per sample, (n_lines + 1,), and the line at the left end of equal cells."""
+    """Borders of the lines in radians per sample, (n_lines + 1,), and a table of the line at each cell's left end."""
 
     borders: FloatArray
     lookup: NDArray[np.int64]
 
 
 def squeeze_lines(lines: FloatArray, rate: float, spacing: Spacing) -> SqueezeLines:
-    """Return borders half-way between the lines, on the logarithm where they are spaced on it."""
+    """Return borders halfway between the lines, on a logarithmic scale for logarithmic spacing."""
     logarithmic = spacing == "logarithmic"
     places = np.log(lines) if logarithmic else np.asarray(lines)
     half = np.diff(places) / 2 if len(places) > 1 else np.array([0.5 if not logarithmic else 0.02])
     borders = np.concatenate([[places[0] - half[0]], places[:-1] + half[: len(places) - 1], [places[-1] + half[-1]]])
     borders = (np.exp(borders) if logarithmic else borders) * (2 * np.pi / rate)
-    # One cell more than used: the highest frequency may round into it.
+    # One cell more than needed: the highest frequency may round into it.
     cells = borders[0] + np.arange(4097) * (borders[-1] - borders[0]) / 4097
     lookup = np.clip(np.searchsorted(borders, cells, side="right") - 1, 0, len(borders) - 2)
     return SqueezeLines(borders, lookup.astype(np.int64))
 
 
 def ssqueezepy() -> AbstractContextManager[ModuleType]:
-    """Load the engine, whose results the transforms bring to the lines, scaling and phase of gearsig's own."""
-    # Its parallel kernels abort the process when they are called from several threads; it reads this at every call.
+    """Load ssqueezepy; the transforms convert its results to gearsig's lines, scaling and phase."""
+    # Its parallel kernels abort the process if called from several threads; it reads this variable at every call.
     os.environ.setdefault("SSQ_PARALLEL", "0")
     return engine_module("ssqueezepy")
 
 
 def unit_rms(x: UniformSignal) -> tuple[FloatArray, float]:
-    """Return the signal over its rms: ssqueezepy computes in single precision, with absolute limits."""
+    """Return (signal over its rms, rms), since ssqueezepy uses single precision and absolute limits."""
     rms = float(np.sqrt(np.dot(x.values, x.values) / x.n_samples)) or 1.0
     return np.asarray(x.values / rms), rms
 
 
 MOST_BYTES = 4 << 30
-"""Of ssqueezepy's matrices, all held at once: more would push a usual machine into swapping.
+"""Maximum total size of ssqueezepy's matrices: more would make a typical machine swap.
 
-It is the same whatever is free now: a comparison of engines runs on all machines or on none."""
+It does not depend on free memory, so that a comparison of engines runs on all machines or on none."""
 
 
 def check_ssqueezepy_bytes(n_bytes: int) -> None:
-    """Raise where ssqueezepy would hold more than `MOST_BYTES`."""
+    """Raise InputError if ssqueezepy would need more than `MOST_BYTES`."""
     if n_bytes > MOST_BYTES:
         raise InputError(
             f"ssqueezepy would take about {n_bytes / 1e9:.3g} GB for this signal",
@@ -81,7 +81,7 @@ def check_ssqueezepy_bytes(n_bytes: int) -> None:
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _momentary_frequency(w, dw, smallest):  # type: ignore[no-untyped-def]
-    """ω̂ = Im(w'/w); not a number where |w|² <= `smallest`."""
+    """Compute ω̂ = Im(w'/w); nan where |w|² <= `smallest`."""
     a, b = w.real, w.imag
     power = a * a + b * b
     return (dw.imag * a - dw.real * b) / power if power > smallest else np.nan
@@ -89,10 +89,10 @@ def _momentary_frequency(w, dw, smallest):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def squeeze(W, dW, weights, smallest, borders, lookup, T, first):  # type: ignore[no-untyped-def]
-    """T[l, first + t] += weights[j] W[j, t], l being the line whose borders hold the momentary frequency.
+    """T[l, first + t] += weights[j] W[j, t], where the borders of line l enclose the instantaneous frequency.
 
-    That is in the unit of `borders` (n_lines + 1, increasing). `lookup` gives the line at the left end of each
-    of its equal cells between the outermost borders. Coefficients with |W|² <= `smallest` have no frequency.
+    The frequency is in the unit of `borders` (n_lines + 1, increasing). `lookup` gives the line at the left end of
+    each of its equal cells between the outermost borders. Coefficients with |W|² <= `smallest` have no frequency.
     """
     n_lines = T.shape[0]
     bottom, top = borders[0], borders[n_lines]

@@ -55,37 +55,37 @@ def stft(
     Parameters
     ----------
     signal : Recording, AngleSignal, UniformSignal or array, (n_samples,)
-        Over time, lines are frequencies; over angle, orders.
+        Lines are frequencies for a signal over time, orders for one over angle.
     channel : str, float or None
-        None: the only channel there is. Of an array its sampling rate in Hz.
+        None: the only channel. For an array, its sampling rate in Hz.
     window : str
         "hann" or "gaussian".
     window_length : float or None
         Seconds or revolutions; None: 1/64 of the signal, 16 to 8192 samples.
     zero_padding : int
-        Points of the FFT over those of the window.
+        Ratio of FFT length to window length.
     lowest, highest : float or None
-        Lines that are kept, in Hz or orders.
+        Range of lines to keep, in Hz or orders.
     step : int
         Samples between columns.
     edges : str
-        What is assumed beyond the ends: "reflect" or "zero".
+        Continuation of the signal beyond its ends: "reflect" or "zero".
 
     Returns
     -------
     Coefficients
-        complex64; their weighted sum over all lines from zero to half the rate is the signal to 1e-6.
+        complex64; their weighted sum over all lines from zero to half the rate restores the signal to 1e-6.
 
     Raises
     ------
     InputError
-        On values that are not finite, lines beyond half the sampling rate, or more than 2 GB of coefficients.
+        On non-finite values, lines beyond half the sampling rate, or more than 2 GB of coefficients.
     RefusalError
         If the signal is shorter than the window.
 
     Notes
     -----
-    Not for impacts and slow parts at once: the window is the same for all lines. Take `cwt`.
+    Not for impacts and slow components at the same time, since all lines share one window: use `cwt`.
 
     Source: L. Cohen, *Time-Frequency Analysis* (1995), chapter 7.
     """
@@ -107,7 +107,7 @@ def stft_map(
     scaling: str = "amplitude peak",
     edges: Edges = "reflect",
 ) -> TimeFrequencyMap:
-    """Return levels of the short-time Fourier transform in segments, never holding the whole matrix.
+    """Return the levels of the short-time Fourier transform in segments, without holding the whole matrix in memory.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def stft_map(
     Returns
     -------
     TimeFrequencyMap
-        Windows overlap by at least 7/8; a peak between two of them may read 2 % low.
+        Windows overlap by at least 7/8; a peak between two windows may read 2 % low.
 
     Raises
     ------
@@ -143,7 +143,7 @@ def squeezed_stft(
     edges: Edges = "reflect",
     engine: SqueezeEngine = "gearsig",
 ) -> Coefficients:
-    """Return the short-time spectra moved to their momentary frequency, at every `step`-th sample.
+    """Return the short-time spectra reassigned to their instantaneous frequency, at every `step`-th sample.
 
     f̂ = f - Im(V_g' / V_g) / 2π, with g' the window's derivative; T(f_l, t) is the weighted sum of V over the lines
     whose f̂ lies in line l. A unit sine reads 1 in one line, and the sum over the lines is the analytic signal.
@@ -167,7 +167,7 @@ def squeezed_stft(
 
     Notes
     -----
-    Sharp only for components whose frequency changes little within the window: take the angle signal of a sweep.
+    Sharp only for components whose frequency changes little within the window: for a sweep, use the angle signal.
 
     Source: G. Thakur, H.-T. Wu, *Synchrosqueezing-based recovery of instantaneous frequency from nonuniform samples*,
     SIAM Journal on Mathematical Analysis 43 (2011).
@@ -191,7 +191,7 @@ def squeezed_stft_map(
     edges: Edges = "reflect",
     engine: SqueezeEngine = "gearsig",
 ) -> TimeFrequencyMap:
-    """Return levels of the synchrosqueezed short-time Fourier transform, never holding the whole matrix.
+    """Return the levels of the synchrosqueezed STFT in segments, without holding the whole matrix in memory.
 
     Parameters
     ----------
@@ -217,7 +217,7 @@ def squeezed_stft_map(
 class FramePlan:
     """Windowed frames of a signal: window g and its slope per sample; n_fft points; lines first to last (excluded).
 
-    `engine` None: plain spectra; else they are squeezed.
+    With `engine` None the spectra are plain, otherwise squeezed.
     """
 
     signal: UniformSignal
@@ -232,27 +232,27 @@ class FramePlan:
 
     @property
     def k(self) -> NDArray[np.int64]:
-        """Numbers of the lines that are kept."""
+        """Indices of the lines that are kept."""
         return np.arange(self.first, self.last)
 
     @property
     def twins(self) -> FloatArray:
-        """2 where a line has a mirror image, 1 at zero and at half the rate."""
+        """2 for lines with a mirror image, 1 at zero and at half the rate."""
         return np.where((self.k == 0) | (2 * self.k == self.n_fft), 1.0, 2.0)
 
     @property
     def gains(self) -> FloatArray:
-        """Factors that make a unit sine read 1."""
+        """Factors by which a unit sine reads 1, (n_lines,)."""
         return np.asarray(self.twins / float(self.window.sum()))
 
     @property
     def weight(self) -> float:
-        """Factor of the sum over lines that gives the signal back."""
+        """Factor by which the sum over lines restores the signal."""
         return float(self.window.sum() / self.n_fft / self.window[len(self.window) // 2])
 
     @property
     def transform(self) -> LinePlan:
-        """Lines, and how far the ends and one component reach."""
+        """Line plan with the reach of the ends and of one component."""
         squeezed, n, rate = self.engine is not None, len(self.window), self.signal.rate
         by = " by ssqueezepy" if self.engine == "ssqueezepy" else ""
         spread = float(np.sum(self.slope**2) / np.sum(self.window**2)) ** 0.5  # rms width, rad per sample
@@ -262,7 +262,7 @@ class FramePlan:
             "linear",
             f"{'synchrosqueezed ' if squeezed else ''}STFT{by}, {self.name}",
             np.full(len(self.k), n / 2 / rate),
-            max(2, int(np.rint(spread / np.pi * self.n_fft))),  # to where the power has fallen to e⁻²
+            max(2, int(np.rint(spread / np.pi * self.n_fft))),  # where the power has fallen to e⁻²
             squeezed,
         )
 
@@ -279,15 +279,15 @@ class FramePlan:
         return transform.coefficients(V, step, np.full(len(V), 1.0 if transform.squeezed else self.weight), levels)
 
     def level_map(self, n_columns: int, reduction: Reduction, scaling: str) -> TimeFrequencyMap:
-        """Return the levels of frames that overlap by at least 7/8, 15/16 where they are squeezed."""
+        """Return the levels of frames that overlap by at least 7/8, or 15/16 if squeezed."""
         columns = plan_columns(self.signal, n_columns)
         step = max(1, min(columns.n_per_column, len(self.window) // (8 if self.engine is None else 16)))
         pieces = ((self.k - self.first, frame * step, step, part) for frame, part in self.batches(step))
         return self.transform.level_map(columns, reduction, scaling, pieces)
 
     def batches(self, step: int) -> Iterator[tuple[int, ComplexArray]]:
-        """Yield (first frame, spectra), (n_lines, n_frames), where squeezed with the plain ones behind them."""
-        by_ssqueezepy = _by_ssqueezepy(self, step) if self.engine == "ssqueezepy" else None  # it knows one batch only
+        """Yield (first frame, spectra), (n_lines, n_frames); if squeezed, (2, …): squeezed and plain spectra."""
+        by_ssqueezepy = _by_ssqueezepy(self, step) if self.engine == "ssqueezepy" else None  # all at once
         x, gains = self.signal, self.gains
         lines = self.transform.lines
         table = squeeze_lines(lines, x.rate, "linear")
@@ -298,7 +298,7 @@ class FramePlan:
             if self.engine is None:
                 yield frame, (V * gains).T
                 continue
-            # With the frame's middle as origin of the phase, ∂V/∂t = -V_g' + iω V: the same rule as for wavelets.
+            # With the phase origin at the frame's middle, ∂V/∂t = -V_g' + iω V: the same rule as for wavelets.
             scaled = (V * gains).T.astype(np.complex64)
             if by_ssqueezepy is not None:
                 yield frame, np.stack([by_ssqueezepy[:, frame : frame + scaled.shape[1]], scaled])
@@ -309,7 +309,7 @@ class FramePlan:
             yield frame, np.stack([T, scaled])
 
     def _spectra(self, step: int) -> Iterator[tuple[int, ComplexArray, ComplexArray]]:
-        """Yield (first frame, spectra with the window, with its slope where squeezed), (n_frames, n_lines)."""
+        """Yield (first frame, spectra with the window, spectra with its slope if squeezed), (n_frames, n_lines)."""
         from scipy.fft import rfft
 
         n_frames, n = -(-self.signal.n_samples // step), len(self.window)
@@ -338,7 +338,7 @@ def _frames(
     edges: Edges,
     engine: SqueezeEngine | None = None,
 ) -> FramePlan:
-    """Check what all transforms by frames are given, and plan the frames."""
+    """Check the arguments common to all frame transforms, and plan the frames."""
     from scipy.fft import next_fast_len
 
     if engine is not None:
@@ -354,7 +354,7 @@ def _frames(
     high = x.highest_valid if highest is None else positive(highest, "highest")
     if not 0.0 <= low < high <= x.highest_valid * (1 + 1e-9):
         raise InputError(
-            f"lines from {low:g} to {high:g} {x.position_unit} are asked for",
+            f"lines from {low:g} to {high:g} {x.position_unit} are requested",
             where="lowest, highest",
             allowed=f"0 <= lowest < highest <= {x.highest_valid:g} {x.position_unit}",
         )
@@ -390,7 +390,7 @@ def _length(x: UniformSignal, window_length: float | None) -> int:
 
 
 def _window(name: str, n: int) -> tuple[FloatArray, FloatArray]:
-    """Return the window around its middle sample n // 2, and its derivative per sample."""
+    """Return the window centred on sample n // 2, and its derivative per sample, (n,) each."""
     tau = np.arange(n) - n // 2
     if name == "hann":
         turn = 2 * np.pi / n
@@ -401,13 +401,14 @@ def _window(name: str, n: int) -> tuple[FloatArray, FloatArray]:
 
 
 def _by_ssqueezepy(plan: FramePlan, step: int) -> ComplexArray:
-    """Return the squeezed spectra by ssqueezepy.
+    """Return the squeezed spectra computed by ssqueezepy, (n_lines, n_frames).
 
-    ssqueezepy sums V / n_fft over the lines; 2 / g(0) makes a unit sine read 1, and 1 / g(0) where there is no twin.
+    ssqueezepy sums V / n_fft over the lines; with 2 / g(0), or 1 / g(0) for lines without a mirror image, a unit sine
+    reads 1.
     """
     x, n = plan.signal, len(plan.window)
     n_frames = -(-x.n_samples // step)
-    # Spectra and their derivatives, a copy and the result, complex; frames of both windows before, real.
+    # Complex: spectra, their derivatives, a copy and the result; real: the frames of both windows before.
     check_ssqueezepy_bytes((plan.n_fft // 2 + 1) * n_frames * 8 * 6)
     window = np.zeros(plan.n_fft)
     start = plan.n_fft // 2 - n // 2

@@ -1,4 +1,4 @@
-"""One channel at equal steps of time or angle, and what transforms make of it: maps, coefficients, ridges."""
+"""Uniformly sampled channels over time or angle, and results of transforms: maps, coefficients, ridges."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
 @dataclass(frozen=True)
 class TimeFrequencyMap(Result, matrix=("values", "at", "positions")):
-    """Levels over time and frequency, or shaft angle and order, small enough to draw.
+    """Levels over time and frequency, or shaft angle and order, small enough to plot.
 
     Parameters
     ----------
     values : array, (n_columns, n_lines)
-        Each is the mean or the maximum of the power in a segment of the signal, in `scaling`.
+        Mean or maximum power in each segment of the signal, in `scaling`.
     positions : array, (n_lines,)
         Frequencies in Hz or orders, increasing; see `axis`.
     at : array, (n_columns,)
@@ -38,26 +38,26 @@ class TimeFrequencyMap(Result, matrix=("values", "at", "positions")):
     axis : str
         "frequency" over time, or "order" over shaft angle.
     spacing : str
-        Of the lines: "linear" or "logarithmic".
+        Spacing of the lines: "linear" or "logarithmic".
     scaling : str
         "amplitude peak": a unit sine reads 1 on its ridge; "power": it reads 1/2.
     unit : str
-        Of the values, written out with the scaling.
+        Unit of the values, including the scaling.
     method : str
         Transform with its wavelet or window.
     reduction : str
         "mean" or "max" of the power in each segment.
     edge : array, (n_lines,)
-        How far from both ends, in the unit of `at`, a line is touched by what was assumed beyond them.
+        Distance from both ends, in the unit of `at`, over which the assumed continuation affects each line.
     n_reach : int
-        Lines on either side of a ridge that one component covers.
+        Number of lines on either side of a ridge that one component covers.
     squeezed : bool
-        Whether a component's share is moved to its momentary frequency: it is then the sum over a few lines.
+        Whether components are reassigned to their instantaneous frequency; each is then the sum over a few lines.
     source, shaft : str
-        Channel; the shaft that orders and revolutions are counted on, empty over time.
+        Channel; the shaft that orders and revolutions refer to, empty over time.
     unsqueezed : array, (n_columns, n_lines), or None
-        Of squeezed maps: the levels before squeezing. Noise scatters a component's squeezed share over lines, so that
-        only these hold its level.
+        For squeezed maps: the levels before squeezing. Noise scatters a squeezed component over lines, so that only
+        these hold its level.
     """
 
     values: FloatArray
@@ -88,12 +88,12 @@ class TimeFrequencyMap(Result, matrix=("values", "at", "positions")):
 
     @property
     def at_label(self) -> str:
-        """What `at` counts, with unit."""
+        """Label of `at`, with its unit."""
         return at_label(self.axis, self.shaft)
 
     @property
     def axis_label(self) -> str:
-        """What `positions` count, with unit."""
+        """Label of `positions`, with its unit."""
         return axis_label(self.axis, self.shaft)
 
 
@@ -104,19 +104,19 @@ class Coefficients(Result, matrix=("values.T", "at", "positions")):
     Parameters
     ----------
     values : complex array, (n_lines, n_columns)
-        Modulus: peak amplitude; a unit sine reads 1 on its ridge. Phase: of the cosine, at the column's instant.
+        Modulus: peak amplitude; a unit sine reads 1 on its ridge. Phase: that of the cosine at the column's instant.
     positions : array, (n_lines,)
         Frequencies in Hz or orders, increasing.
     at : array, (n_columns,)
         Instants: seconds from the start, or revolutions of the shaft.
     axis, spacing, unit, method, source, shaft
-        As in `TimeFrequencyMap`; the unit is the signal's own.
+        As in `TimeFrequencyMap`; the unit is that of the signal.
     weights : array, (n_lines,)
-        Real part of Σ weights · values over the lines: the signal at the columns.
+        The real part of Σ weights · values over the lines is the signal at the columns.
     n_reach, squeezed
         As in `TimeFrequencyMap`.
     unsqueezed : array, (n_lines, n_columns), or None
-        Of squeezed transforms: peak amplitudes before squeezing; see `TimeFrequencyMap`.
+        For squeezed transforms: peak amplitudes before squeezing; see `TimeFrequencyMap`.
     """
 
     values: ComplexArray
@@ -144,13 +144,13 @@ class Coefficients(Result, matrix=("values.T", "at", "positions")):
 
 
 def _freeze_unsqueezed(result: TimeFrequencyMap | Coefficients) -> None:
-    """Raise InputError unless a squeezed transform carries its levels before squeezing, and no other one does."""
+    """Freeze the levels before squeezing; raise InputError unless squeezed transforms, and only they, have them."""
     if result.squeezed != (result.unsqueezed is not None):
         raise InputError(
-            f"squeezed is {result.squeezed}, and levels before squeezing are "
+            f"squeezed is {result.squeezed}, but levels before squeezing are "
             f"{'given' if result.unsqueezed is not None else 'missing'}",
             where="unsqueezed",
-            allowed="an array where squeezed, None where not",
+            allowed="an array if squeezed, otherwise None",
         )
     if result.unsqueezed is None:
         return
@@ -161,18 +161,18 @@ def _freeze_unsqueezed(result: TimeFrequencyMap | Coefficients) -> None:
 
 @dataclass(frozen=True)
 class Ridge(Result, columns=("at", "positions", "amplitude", "shared")):
-    """Frequency and amplitude of one component along time, or order along shaft angle.
+    """Frequency and amplitude of one component over time, or order and amplitude over shaft angle.
 
     Parameters
     ----------
     at : array, (n,)
         Seconds from the start, or revolutions.
     positions : array, (n,)
-        Momentary frequency in Hz, or order.
+        Instantaneous frequency in Hz, or order.
     amplitude : array, (n,)
         Peak amplitude in `unit`, from the largest coefficient near the path, before squeezing.
     shared : boolean array, (n,)
-        Where another ridge lies within reach: the amplitude there is of both together.
+        Where another ridge lies within reach: the amplitude there is that of both together.
     axis, unit, source, shaft
         As in `Coefficients`.
     """
@@ -193,23 +193,23 @@ class Ridge(Result, columns=("at", "positions", "amplitude", "shared")):
             raise InputError("at, positions, amplitude and shared of a ridge differ in length")
 
     def position_at(self, at: FloatArray) -> FloatArray:
-        """Return the frequency or order at other instants, by straight lines; constant beyond the ends."""
+        """Return the frequency or order at other instants, by linear interpolation; constant beyond the ends."""
         return np.interp(at, self.at, self.positions)
 
 
 def at_label(axis: Axis, shaft: str) -> str:
-    """Name the direction in which the signal runs."""
+    """Return the label of the signal's time or angle axis."""
     return "time (s)" if axis == "frequency" else f"angle (revolutions of {shaft or 'the shaft'})"
 
 
 # --------------------
-# What a transform works on, and how it is laid out in lines and columns.
+# Input of a transform, and its layout in lines and columns.
 # --------------------
 
 SMALLEST, LARGEST = 1e-12, 1e15
-"""Largest values of a signal, in its unit, between which single precision holds its weak coefficients' squares."""
+"""Range of a signal's largest value, in its unit, for which single precision holds squares of weak coefficients."""
 MAX_COEFFICIENTS = 1 << 28
-"""Complex coefficients that are held at once: 2 GB."""
+"""Maximum number of complex coefficients held in memory: 2 GB."""
 
 
 @dataclass(frozen=True)
@@ -225,7 +225,7 @@ class UniformSignal:
     axis : str
         "frequency" for a signal over time, "order" for one over angle.
     highest : float or None
-        Highest frequency or order that is valid; None: half the rate.
+        Highest valid frequency or order; None: half the rate.
     start : float
         Time or angle of the first sample.
     unit, source, shaft : str
@@ -233,7 +233,7 @@ class UniformSignal:
     Raises
     ------
     InputError
-        On values that are not finite or beyond 1e-12 to 1e15, a wrong shape or rate.
+        On non-finite values, a largest value outside 1e-12 to 1e15, or a wrong shape or rate.
     RefusalError
         If there are fewer than 16 samples.
     """
@@ -268,12 +268,12 @@ class UniformSignal:
 
     @property
     def length(self) -> float:
-        """Seconds or revolutions."""
+        """Length in seconds or revolutions."""
         return self.n_samples / self.rate
 
     @property
     def highest_valid(self) -> float:
-        """Highest frequency or order that the samples carry."""
+        """Highest frequency or order that the samples can represent."""
         return self.rate / 2 if self.highest is None else min(self.highest, self.rate / 2)
 
     @property
@@ -287,7 +287,7 @@ class UniformSignal:
         return "s" if self.axis == "frequency" else "revolutions"
 
     def instants(self, step: int) -> FloatArray:
-        """Return the instant of every `step`-th sample."""
+        """Return the instant of every `step`-th sample, in seconds or revolutions."""
         return self.start + np.arange(0, self.n_samples, step) / self.rate
 
 
@@ -300,14 +300,14 @@ def uniform(signal: Source, channel: str | float | None = None) -> UniformSignal
     Parameters
     ----------
     signal : Recording, AngleSignal, UniformSignal or array, (n_samples,)
-        An angle signal makes every transform one over orders and revolutions.
+        With an angle signal, transforms are over orders and revolutions.
     channel : str, float or None
-        Name of a channel; None: the only one there is. Of an array its sampling rate in Hz.
+        Name of a channel; None: the only one. For an array, its sampling rate in Hz.
 
     Raises
     ------
     InputError
-        If the channel is not there, or none is named and there are several; if an array comes without its rate.
+        If the channel does not exist, if none is named although there are several, or if an array has no rate.
     """
     if isinstance(signal, UniformSignal):
         return signal
@@ -343,7 +343,7 @@ Edges = Literal["reflect", "zero"]
 
 
 def segment_of(values: FloatArray, start: int, n: int, edges: Edges) -> FloatArray:
-    """Return n samples from `start` on, in double precision, with what is assumed beyond the ends."""
+    """Return n samples from `start` on, in double precision, continued beyond the ends as `edges` says."""
     n_samples = len(values)
     inside = values[max(0, start) : max(0, start + n)]
     if len(inside) == n:
@@ -360,7 +360,7 @@ def segment_of(values: FloatArray, start: int, n: int, edges: Edges) -> FloatArr
 Piece = tuple[NDArray[np.int64], int, int, ComplexArray]
 """Lines, first sample, samples between columns, and the coefficients, (n_lines, n_columns).
 
-Of a squeezed transform (2, n_lines, n_columns): squeezed, and as they were."""
+For a squeezed transform (2, n_lines, n_columns): squeezed and unsqueezed."""
 
 
 @dataclass(frozen=True)
@@ -377,7 +377,7 @@ class Columns:
 
     @property
     def largest_step(self) -> int:
-        """Largest power of two that leaves at least eight coefficients in every segment, if it has as many samples."""
+        """Largest power of two that leaves at least eight coefficients per segment, if it has that many samples."""
         return 1 << min(20, max(0, self.n_per_column.bit_length() - 4))
 
 
@@ -388,7 +388,7 @@ def plan_columns(signal: UniformSignal, n_columns: int) -> Columns:
 
 @dataclass(frozen=True)
 class LinePlan:
-    """A signal and the lines that it is transformed to; fields as in `TimeFrequencyMap`."""
+    """A signal and the lines of its transform; fields as in `TimeFrequencyMap`."""
 
     signal: UniformSignal
     lines: FloatArray
@@ -413,7 +413,7 @@ class LinePlan:
     def coefficients(
         self, values: ComplexArray, step: int, weights: FloatArray, unsqueezed: FloatArray | None = None
     ) -> Coefficients:
-        """Return the complex values of every `step`-th sample; the weights give the signal back."""
+        """Return the result for complex values at every `step`-th sample; the weights restore the signal."""
         x = self.signal
         return Coefficients(
             values,
@@ -434,7 +434,7 @@ class LinePlan:
     def level_map(
         self, columns: Columns, reduction: Reduction, scaling: str, pieces: Iterable[Piece]
     ) -> TimeFrequencyMap:
-        """Return mean or maximum of |W|² in each column, from pieces in any order.
+        """Return the map of the mean or maximum of |W|² in each column, from pieces in any order.
 
         |W|² / 2 is the power of a sine of amplitude |W|.
         """

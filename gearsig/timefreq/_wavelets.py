@@ -1,4 +1,4 @@
-"""Analytic wavelets, described by their response around a line's frequency."""
+"""Analytic wavelets, defined by their response relative to a line's frequency, and a filter bank of them."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.timefreq._types import ComplexArray, Edges, Spacing, UniformSignal, segment_of
 
 TAIL = 1e-6
-"""Share of the peak below which a wavelet is taken for zero, in time and in frequency."""
+"""Share of the peak below which a wavelet is treated as zero, in time and in frequency."""
 
 
 @dataclass(frozen=True)
 class Morse:
     """Generalised Morse wavelet.
 
-    Ψ(v) = 2 exp(β ln v - (β/γ)(v^γ - 1)) for v > 0, with v the frequency over the line's own; nothing for v < 0.
+    Ψ(v) = 2 exp(β ln v - (β/γ)(v^γ - 1)) for v > 0, with v the frequency relative to the line's; zero for v < 0.
 
     Parameters
     ----------
     beta : float
         1 to 1000; with γ it sets the number of periods in the wavelet, √(βγ)/π.
     gamma : float
-        1 to 10; 3 makes the wavelet most symmetric.
+        1 to 10; the wavelet is most symmetric at 3.
 
     Notes
     -----
-    The factor 2 makes a unit sine read 1 on its line.
+    With the factor 2, a unit sine reads 1 on its line.
 
     Source: J. M. Lilly, S. C. Olhede, *Generalized Morse wavelets as a superfamily of analytic wavelets*, IEEE
     Transactions on Signal Processing 60 (2012).
@@ -74,7 +74,7 @@ class Morlet:
     Parameters
     ----------
     omega0 : float
-        5 to 100; below 5 the Gaussian would reach to negative frequencies.
+        5 to 100; below 5, the Gaussian would extend to negative frequencies.
 
     Notes
     -----
@@ -119,7 +119,7 @@ def band(wavelet: Wavelet, share: float = TAIL) -> tuple[float, float]:
 
 @lru_cache(maxsize=64)
 def half_support(wavelet: Wavelet) -> float:
-    """Return how many periods of its line a wavelet reaches to either side before it falls below `TAIL`."""
+    """Return the distance from a wavelet's centre, in periods of its line, at which it falls below `TAIL`."""
     step = 1.0 / (32.0 * wavelet.duration + 64.0)
     v = np.arange(0.0, band(wavelet)[1], step)
     shape = np.abs(np.fft.ifft(wavelet.response(v), 1 << int(np.ceil(np.log2(len(v))) + 2)))
@@ -131,14 +131,14 @@ def half_support(wavelet: Wavelet) -> float:
 
 @lru_cache(maxsize=64)
 def admissibility(wavelet: Wavelet) -> float:
-    """C = ∫ Ψ(v)/v dv, the gain of the sum over lines at equal steps of ln v."""
+    """Return C = ∫ Ψ(v)/v dv, the gain of the sum over lines at equal steps of ln v."""
     low, high = band(wavelet, 1e-16)
     s = np.linspace(np.log(low), np.log(high), 20_001)
     return float(np.trapezoid(wavelet.response(np.exp(s)), s))
 
 
 def footprint_periods(wavelet: Wavelet) -> float:
-    """Return the periods that hold most of a wavelet's energy, 2√2 P / 2π.
+    """Return the number of periods that hold most of a wavelet's energy, 2√2 P / 2π.
 
     Source: J. M. Lilly, *Element analysis: a wavelet-based method for analysing time-localized events in noisy time
     series*, Proceedings of the Royal Society A 473 (2017).
@@ -159,7 +159,7 @@ def lines_of(
     highest: float | None,
     n_per_octave: int,
 ) -> tuple[FloatArray, Spacing]:
-    """Return the lines asked for, or lines at equal ratios, 2^(1/n_per_octave), `highest` among them; their spacing.
+    """Return the given lines, or lines at equal ratios 2^(1/n_per_octave) down from `highest`, and their spacing.
 
     Parameters
     ----------
@@ -168,14 +168,14 @@ def lines_of(
     positions : array or None
         The lines themselves; then `lowest` and `highest` are None.
     lowest, highest : float or None
-        In Hz or orders. None: ten octaves down, or twice the lowest possible; as high as the
-        wavelet's response leaves a hundredth beyond what the samples carry.
+        In Hz or orders. None for `highest`: where the wavelet's response falls to a hundredth at the highest valid
+        frequency; for `lowest`: ten octaves below, or twice the lowest possible line.
     n_per_octave : int
 
     Raises
     ------
     InputError
-        If they are not positive, in the wrong order, or beyond what the samples carry.
+        If they are not positive, in the wrong order, or beyond the highest valid frequency.
     RefusalError
         If the signal is too short for the lowest line.
     """
@@ -219,8 +219,8 @@ def fill(X, H, low, high, twiddle, first, out):  # type: ignore[no-untyped-def]
     """out[j, k mod M, r] = X[k] H[j, k] twiddle[k, r]: the bins of line j, ready for M-point inverse FFTs over k.
 
     Bin k of the block has index k - `first` in X, H and twiddle. Bins of line j run from low[j] to high[j] (excluded).
-    Where they are fewer than M, the others are zero; where they are more, they add up: samples are then farther apart
-    than the band asks, and still exact.
+    If they are fewer than M, the others are zero; if they are more, they add up: samples are then sparser than the band
+    requires, but still exact.
     """
     M, n_r = out.shape[1], out.shape[2]
     for j in range(out.shape[0]):
@@ -234,13 +234,13 @@ def fill(X, H, low, high, twiddle, first, out):  # type: ignore[no-untyped-def]
                 for r in range(n_r):
                     out[j, place, r] += value * twiddle[i, r]
                 continue
-            for r in range(n_r):  # indices written out: only so is this loop turned into vector instructions
+            for r in range(n_r):  # the compiler vectorises this loop only with explicit indices
                 out[j, place, r] = value * twiddle[i, r]
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def turns(first, n_bins, n_r, step, n_block):  # type: ignore[no-untyped-def]
-    """e^{2πi k r D / B} for bins k from `first` on and r < n_r; D = step, B = n_block."""
+    """Return e^{2πi k r D / B} for bins k from `first` on and r < n_r, with D = step and B = n_block."""
     out = np.empty((n_bins, n_r), dtype=np.complex64)
     for i in range(n_bins):
         angle = 2.0 * np.pi * (((first + i) * step) % n_block) / n_block
@@ -254,21 +254,21 @@ def turns(first, n_bins, n_r, step, n_block):  # type: ignore[no-untyped-def]
 # Bank of analytic filters: coefficients of many lines, block by block, at any decimation.
 #
 # Each line needs few bins of a block's spectrum. With B = M R samples in a block and at most M bins, sample
-# n = R m + r is an M-point inverse FFT over m of the bins turned by e^{2πi k r / B}: R short transforms that stay in
-# the cache instead of a long one, and only as many of them as samples are wanted. Blocks overlap by the wavelet's
-# support, so that memory depends on the longest wavelet and not on the length of the signal.
+# n = R m + r is an M-point inverse FFT over m of the bins times e^{2πi k r / B}: R short transforms that stay in the
+# cache replace a long one, and only those for the requested samples are computed. Blocks overlap by the wavelet's
+# support, so that memory depends on the longest wavelet, not on the length of the signal.
 
 
 IntArray = NDArray[np.int64]
 
 _SMALLEST_BLOCK = 1 << 13
-_CUT_MARGIN = 512  # samples: wavelets that are cut off at half the sampling rate ring longer
-_CACHE_SAMPLES = 1 << 15  # coefficients that are worked on at a time: they stay in a core's own cache
+_CUT_MARGIN = 512  # samples: wavelets cut off at half the sampling rate ring longer
+_CACHE_SAMPLES = 1 << 15  # coefficients processed at a time: they stay in a core's own cache
 
 
 @dataclass(frozen=True)
 class Batch:
-    """Lines of a group that share the length of their transforms."""
+    """Lines of a group whose transforms have the same length."""
 
     lines: IntArray
     n_bins: int
@@ -283,7 +283,7 @@ class Batch:
 
 @dataclass(frozen=True)
 class LineGroup:
-    """Lines that share blocks: `n_block` samples, of which `n_margin` at either end are not valid."""
+    """Lines that share blocks of `n_block` samples, of which `n_margin` at either end are not valid."""
 
     batches: tuple[Batch, ...]
     n_block: int
@@ -301,7 +301,7 @@ class LineGroup:
 
 @dataclass(frozen=True)
 class Piece:
-    """Coefficients of some lines at samples start, start + step, …; with their derivatives where asked."""
+    """Coefficients of some lines at samples start, start + step, …, with their derivatives if requested."""
 
     lines: IntArray
     start: int
@@ -325,7 +325,7 @@ def plan_groups(
     step : int
         Samples between coefficients; a power of two.
     follow_band : bool
-        Let each line have its own step, as large as its bandwidth allows, up to `step`.
+        Whether each line has its own step, as large as its bandwidth allows, up to `step`.
     """
     octave = np.floor(np.log2(cycles[-1] / cycles) + 1e-9).astype(np.int64)
     return [
@@ -361,7 +361,7 @@ def plan_group(
 
 
 def pieces(values: FloatArray, group: LineGroup, edges: Edges, *, derivatives: bool = False) -> Iterator[Piece]:
-    """Yield the coefficients of a group, block after block."""
+    """Yield the coefficients of a group, block by block."""
     space = workspace(group)
     for start in group.starts(len(values)):
         yield from block_pieces(values, group, start, edges, space, derivatives=derivatives)
@@ -372,7 +372,7 @@ def sampled_pieces(
 ) -> Iterator[tuple[Piece, int, ComplexArray, ComplexArray]]:
     """Yield pieces at every `step`-th sample: piece, first column, coefficients and derivatives there.
 
-    They are computed at the largest power of two that divides the step.
+    They are computed at a step that is the largest power of two, up to 1024, that divides `step`.
     """
     every = min(step & -step, 1024)
     for group in plan_groups(positions / x.rate, wavelet, x.n_samples, step=every):
@@ -383,7 +383,7 @@ def sampled_pieces(
 
 
 def workspace(group: LineGroup) -> ComplexArray:
-    """Return room for the coefficients of a piece and their derivatives: asking for it each time costs more."""
+    """Return a buffer for the coefficients of a piece and their derivatives, to avoid repeated allocation."""
     n_columns = max(_rows_at_once(batch, group) * group.n_block // batch.step for batch in group.batches)
     return np.empty((2, n_columns), dtype=np.complex64)
 
@@ -397,7 +397,7 @@ def block_pieces(
 ) -> Iterator[Piece]:
     """Yield the coefficients of a group in the block whose valid part begins at `start`.
 
-    They lie in `space` (from `workspace`) and hold until the next piece is asked for.
+    They are stored in `space` (from `workspace`) and valid until the next piece is requested.
     """
     margin, length = group.n_margin, min(group.n_core, len(values) - start)
     # In double precision: rounding in strong parts of the spectrum must not reach the weak ones.
@@ -451,5 +451,5 @@ def _batch(
 
 
 def _power_of_two(n: int) -> int:
-    """Smallest power of two not below n."""
+    """Return the smallest power of two not below n."""
     return 1 << max(0, int(n - 1).bit_length())

@@ -392,7 +392,7 @@ def test_a_mode_that_wanders_is_as_wide_as_it_wanders():
 def test_a_component_that_changes_is_told_at_its_seam():
     second = np.where(SAMPLES < 10_000, np.cos(1.3 * SAMPLES), np.cos(2.2 * SAMPLES))
     (note,) = vmd(TONES[0] + second, 1.0, VmdSettings(2), n_per_block=3000).notes
-    assert "does not go on over the seam at" in note
+    assert "does not continue across the seam at" in note
 
 
 # Modes of channels, of signals over angle, of envelopes.

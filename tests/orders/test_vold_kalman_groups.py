@@ -133,7 +133,7 @@ def test_a_recording_too_short_to_settle_is_noted():
     n = 2000
     found = track_vold_kalman(np.ones(n), RATE_HZ, [np.full(n, 200.0)], bandwidth_hz=1.5, n_poles=3)
     assert not found.orders[0].settled.any()
-    assert any("too short for some orders to settle, widen the band: 'component 1'" in note for note in found.notes)
+    assert any("too short for some orders to settle; widen the band: 'component 1'" in note for note in found.notes)
 
 
 def test_bandwidth_in_orders_of_a_frequency_track():
@@ -217,7 +217,7 @@ def test_bandwidth_in_hz_over_angle(over_angle):
         ({"channel": "b"}, "no channel 'b'"),
         ({"shaft_angle": run_up(10.0, 20.0, 60.0)}, "over the angle of shaft"),
         ({"bandwidth_orders": 7.0}, "order zero"),
-        ({"bandwidth_orders": 0.001}, "400 revolutions only"),
+        ({"bandwidth_orders": 0.001}, "only 400 revolutions"),
     ],
 )
 def test_wrong_input_over_angle(over_angle, changes, message):

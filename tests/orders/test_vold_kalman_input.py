@@ -28,7 +28,7 @@ def test_the_speed_source_of_the_recording_is_used():
     [
         ({"orders": []}, "no orders are given"),
         ({"orders": [-1.0]}, "order -1"),
-        ({"orders": [2.0, 2.0]}, "drift apart by 0 cycles"),
+        ({"orders": [2.0, 2.0]}, "drift apart by only 0 cycles"),
         ({"orders": [("middle", 2.0)]}, "ratio of shaft 'middle'"),
         ({"orders": [FrequencyTrack("f", np.ones(10))]}, "has 10 samples"),
         ({"channel": "b"}, "no channel 'b'"),

@@ -1,6 +1,6 @@
-"""Vold–Kalman order tracking: orders taken out of a recording as waveforms.
+"""Vold–Kalman order tracking: orders extracted from a recording as waveforms.
 
-`gearsig.orders` offers `track_vold_kalman`; here are its solvers, for one order and for several.
+`track_vold_kalman` is in `gearsig.orders`; this package holds its solvers, for one order and for several.
 """
 
 from gearsig.orders.vold_kalman._joint import (

@@ -1,4 +1,4 @@
-"""Vold–Kalman order tracking: orders taken out of a recording as waveforms, also where they cross."""
+"""Vold–Kalman order tracking: orders extracted from a recording as waveforms, even where they cross."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from gearsig.recording import Recording
 
 Coupling = bool | Literal["automatic"] | Sequence[Sequence[int]]
 MAX_LEAK = 1e-4
-"""Share of one order that another's band may let through before both are solved for together: -80 dB."""
+"""Share of one order that may leak through another's band before both are solved for together: -80 dB."""
 NOTED_LEAK = 0.03
 
 
@@ -52,7 +52,7 @@ def track_vold_kalman(
     shaft_angle: ShaftAngle | None = None,
     speed_rpm: float | FloatArray | None = None,
 ) -> OrderSeparation:
-    """Return orders of a recording as waveforms and complex envelopes over time, and what is left without them.
+    """Separate a signal into orders, as waveforms and complex envelopes over time, and a residual.
 
     Second generation: y_n = Σ_k Re(a_kn e^{iΘ_kn}) + η_n with ∇^p a_kn = ε_kn. First generation: y_n = Σ_k x_kn + η_n
     with x_kn - 2 cos ω_k(n+1) x_k(n+1) + x_k(n+2) = ε_kn. Both minimise Σ η² + Σ r² ε²; r follows from the bandwidth.
@@ -60,52 +60,54 @@ def track_vold_kalman(
     Parameters
     ----------
     signal : Recording, AngleSignal or array, (n_samples,)
-        Over angle, every order has a constant frequency, and the envelope's smoothness is one per revolution.
+        Over angle, every order has a constant frequency, and the envelope is smooth per revolution, not per second.
     channel : str or float
-        The channel's name; of an array its sampling rate in Hz.
+        The channel's name, or an array's sampling rate in Hz.
     orders : sequence
-        Each a number (cycles per revolution of the angle's shaft), a pair (shaft, number), a `FrequencyTrack`, or its
-        frequency in Hz at each sample.
+        Each is a number (cycles per revolution of the angle's shaft), a pair (shaft, number), a `FrequencyTrack`, or
+        the frequency in Hz at each sample.
     bandwidth_hz, bandwidth_orders : float or one per order
-        One of both: width between the -3 dB points, in Hz or in orders of the order's own shaft (of a frequency track
-        without order: of the angle's shaft). In orders, it varies with speed. At least one over the duration. Noise
-        within it stays in the waveform; a change of level within less than about 1/B is smoothed.
+        Give one of the two: width between the -3 dB points, in Hz or in orders of the order's own shaft (for a
+        frequency track without order, of the angle's shaft). In orders, it varies with speed. At least 1/duration.
+        Noise within the band stays in the waveform; level changes faster than about 1/B are smoothed.
     n_poles : int
-        Of the second generation: 1, 2 or 3. More poles, steeper skirts: away from the order the gain falls as f^-2p.
+        For the second generation: 1, 2 or 3. More poles give steeper skirts: away from the order, the gain falls as
+        f^-2p.
     generation : "first" or "second"
-        The first has two poles and a fixed shape; take the second unless results are to be compared.
+        The first has two poles and a fixed shape; use the second unless you need to compare results.
     coupled : "automatic", True, False, or groups
-        Which orders are solved for together, so that crossing and close ones share the signal between them. Automatic:
-        those of which more than 1e-4 would pass through each other's bands at any time, the groups in turn on what the
-        others leave; or all, where bands are so narrow that this is faster. The notes give the reason.
+        Which orders are solved for together, so that crossing and close orders share the signal between them.
+        Automatic: orders that would pass more than 1e-4 through each other's bands at any time, group by group, each on
+        what the others leave; or all, if the bands are so narrow that this is faster. The notes give the reason.
         True: all. False: one by one. Groups: as positions in `orders`, e.g. [[0, 2]]; the others are solved for alone.
     mirror : bool
-        Of the second generation: count each order's mirror image at negative frequency as part of the signal, which it
-        is. False leaves it out, as most textbooks do: faster, but amplitudes near the ends are off by some percent.
+        For the second generation: whether to count each order's mirror image at negative frequency as part of the
+        signal, as it truly is. False omits it, as most textbooks do: faster, but amplitudes near the ends are off by
+        a few percent.
     shaft_angle, speed_rpm
-        As in `order_spectrum`; not needed for frequency tracks alone.
+        As in `order_spectrum`; not needed if all orders are frequency tracks.
 
     Returns
     -------
     OrderSeparation
-        All at the recording's samples, in the channel's unit; amplitudes are peak. Its notes tell over what time at the
-        ends an order is not settled.
+        At the recording's samples, in the channel's unit; amplitudes are peak. The notes state how long an order takes
+        to settle at the ends.
 
     Raises
     ------
     InputError
-        On an unknown channel or shaft, a bandwidth below what the duration resolves or reaching down to order zero,
-        orders that are the same, or too few samples.
+        On an unknown channel or shaft, a bandwidth below the resolution of the duration or reaching down to order zero,
+        identical orders, or too few samples.
     RefusalError
-        If an order stands still or lies above half the sampling rate all the time.
+        If an order's frequency is zero or above half the sampling rate throughout.
 
     Notes
     -----
     Numerical error: about 1e-11 of the largest component for an order solved for alone, below 1e-6 for several, see
-    `expected_error`. Not for transients shorter than 1/B, and not where only levels over speed are asked for:
-    `track_order_bands` is enough. Close orders are told apart only over times in which they beat, about one over their
-    distance. Near standstill an order meets its own mirror image: the part where the band reaches zero is left out.
-    Memory: about 80 bytes per sample and order, and up to 0.3 GB.
+    `expected_error`. Not for transients shorter than 1/B; if you need only levels over speed, `track_order_bands` is
+    enough. Close orders can be separated only over at least one beat period, about the reciprocal of their distance.
+    Near standstill, an order meets its own mirror image: the part where the band reaches zero is left out.
+    Memory: about 80 bytes per sample and order, plus up to 0.3 GB.
 
     References
     ----------
@@ -125,7 +127,7 @@ def track_vold_kalman(
             recording.sampling_rate_hz,
             recording.channels[recording.index(name)].unit,
         )
-        # An order, or a bandwidth in orders of a track without one, cannot be told without the shaft's angle.
+        # An order, or a bandwidth in orders for a track without an order, requires the shaft angle.
         in_orders = bandwidth_orders is not None
         needed = any(not isinstance(o, FrequencyTrack) or (in_orders and np.isnan(o.order)) for o in orders)
         angle = angle_of(recording, shaft_angle, speed_rpm) if needed else shaft_angle
@@ -147,7 +149,7 @@ def _separated(
     unit: str,
     source: str,
 ) -> OrderSeparation:
-    """Return the orders and the residual; widths (n_orders, n) or (n_orders, 1) in the unit of the tracks."""
+    """Return the separated orders and the residual; widths (n_orders, n) or (n_orders, 1) in the unit of the tracks."""
     one_of(generation, "generation", get_args(Generation))
     if generation == "second":
         count(n_poles, "n_poles", maximum=3)
@@ -167,7 +169,7 @@ def _separated(
     for waveform in waveforms:
         residual -= waveform
     over_angle = tracks.unit == "orders"
-    # Over angle, frequency and bandwidth become Hz with the speed.
+    # Over angle, the speed converts frequency and bandwidth to Hz.
     to_hz = tracks.speed_rev_per_s if over_angle and tracks.speed_rev_per_s is not None else 1.0
     orders = tuple(
         SeparatedOrder(
@@ -197,7 +199,7 @@ def _separated(
 
 
 def _continued(widths: FloatArray, valid: BoolArray) -> FloatArray:
-    """Return the bandwidths, those outside the valid part limited to those inside it: zero width has no weight."""
+    """Return the bandwidths, limited outside the valid part to the range inside it: zero width has no weight."""
     if widths.shape[1] == 1:
         return widths
     lowest = np.where(valid, widths, np.inf).min(axis=1, keepdims=True)
@@ -206,34 +208,34 @@ def _continued(widths: FloatArray, valid: BoolArray) -> FloatArray:
 
 
 def _check_record_length(tracks: Tracks, bandwidth: FloatArray, valid: BoolArray, sampling_rate: float) -> None:
-    """Raise InputError if a band is narrower than one over the time that the order is there."""
+    """Raise InputError if a band is narrower than the reciprocal of the time for which the order is valid."""
     for k, name in enumerate(tracks.names):
         duration = valid[k].sum() / sampling_rate
         width = float(np.median(np.broadcast_to(bandwidth[k], valid[k].shape)[valid[k]]))
         if width * duration < 1.0:
             raise InputError(
-                f"the bandwidth of order {name!r} is {width:.4g} {tracks.unit}, and the order lasts "
-                f"{duration:.4g} {tracks.duration_unit} only",
+                f"the bandwidth of order {name!r} is {width:.4g} {tracks.unit}, but the order lasts only "
+                f"{duration:.4g} {tracks.duration_unit}",
                 where="bandwidth",
                 allowed=f"at least {1 / duration:.4g} {tracks.unit}",
                 remedy="widen the band or record longer",
             )
 
 
-# Which orders lie close to each other or cross, which are solved for together, and where each is settled.
+# Which orders are close to each other or cross, which are solved for together, and where each is settled.
 
 
 @dataclass(frozen=True)
 class Neighbours:
-    """How close orders k and m come while both are there.
+    """How close orders k and m come while both are valid.
 
     Parameters
     ----------
     k, m : int
     distance : float
-        Smallest, in the unit of the tracks; infinite if they are never there together.
+        Smallest distance, in the unit of the tracks; infinite if they are never valid at the same time.
     leak : float
-        Largest gain of either's filter for the other, 0 to 1.
+        Largest gain of the filter of one for the other, 0 to 1.
     close_share : float
         Share of the common time at a distance below twice the wider bandwidth.
     """
@@ -246,7 +248,7 @@ class Neighbours:
 
 
 def _neighbours(tracks: Tracks, bandwidth: FloatArray, valid: BoolArray, poles: int) -> list[Neighbours]:
-    """Compare each two orders: the gain at distance d is 1/(1 + (√2 - 1)(2d/B)^2p), p being `poles`.
+    """Compare each pair of orders: the gain at distance d is 1/(1 + (√2 - 1)(2d/B)^2p), with p = `poles`.
 
     Raises
     ------
@@ -265,7 +267,7 @@ def _neighbours(tracks: Tracks, bandwidth: FloatArray, valid: BoolArray, poles: 
         drift = float(np.ptp((cycles[k] - cycles[m])[are_valid]))
         if drift < 0.5:
             raise InputError(
-                f"orders {tracks.names[k]!r} and {tracks.names[m]!r} drift apart by {drift:.3g} cycles only",
+                f"orders {tracks.names[k]!r} and {tracks.names[m]!r} drift apart by only {drift:.3g} cycles",
                 where="orders",
                 allowed="different orders",
                 remedy="leave one of them out or record longer",
@@ -283,8 +285,8 @@ def _neighbours(tracks: Tracks, bandwidth: FloatArray, valid: BoolArray, poles: 
 def _groups(coupled: Coupling, neighbours: Sequence[Neighbours], problem: Problem) -> list[Group]:
     """Return the positions of the orders solved for together; each order is in one group.
 
-    "automatic": orders are in one group if, at any time, more than `MAX_LEAK` of one would pass through the band of
-    the other, and with them those that either is grouped with. Where that is cheap, all are.
+    "automatic": orders share a group if, at any time, more than `MAX_LEAK` of one would pass through the band of the
+    other, or if a chain of such pairs links them. If it is cheap, all orders form one group.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -317,7 +319,7 @@ def _groups(coupled: Coupling, neighbours: Sequence[Neighbours], problem: Proble
 
 
 def _coupling_notes(groups: Sequence[Group], neighbours: Sequence[Neighbours], tracks: Tracks) -> list[str]:
-    """Return why close orders are solved for together, and a warning for those that are not."""
+    """Return notes on why close orders are solved for together, and warnings for those that are not."""
     group_of = {int(k): i for i, group in enumerate(groups) for k in group}
     unit = tracks.unit
     notes = []
@@ -329,7 +331,7 @@ def _coupling_notes(groups: Sequence[Group], neighbours: Sequence[Neighbours], t
         )
         leak = f"up to {_percent(pair.leak)} of one lies in the band of the other"
         if group_of[pair.k] == group_of[pair.m]:
-            close = ", and told apart where they stay close for long enough to beat" if pair.leak > NOTED_LEAK else ""
+            close = ", and separated where they stay close for long enough to beat" if pair.leak > NOTED_LEAK else ""
             notes.append(f"{text}, where {leak}: they are solved for together{close}")
         else:
             notes.append(
@@ -343,7 +345,7 @@ def _coupling_notes(groups: Sequence[Group], neighbours: Sequence[Neighbours], t
     if len(groups) > 1 and apart and max(leaks, default=1.0) <= MAX_LEAK:
         names = ", ".join(repr(tracks.names[k]) for k in apart)
         notes.append(
-            f"solved for by themselves, at most {_percent(max(leaks))} of another order in their band: {names}"
+            f"solved for by themselves, with at most {_percent(max(leaks))} of another order in their band: {names}"
         )
     return notes
 
@@ -353,9 +355,9 @@ def _percent(share: float) -> str:
 
 
 def _settled(bandwidth: FloatArray, valid: BoolArray, sampling_rate: float, skirt_poles: int) -> BoolArray:
-    """Return where each order has been valid for a settling time before, and stays so for one after, (n_orders, n).
+    """Return where each order is valid for one settling time before and one after, (n_orders, n).
 
-    Where the bandwidth varies, so does the settling time T: it has passed once ∫ dt/T has grown by one.
+    If the bandwidth varies, so does the settling time T: it has elapsed once ∫ dt/T has grown by one.
     """
     settled = np.zeros(valid.shape, dtype=bool)
     for k, is_valid in enumerate(valid):
@@ -372,9 +374,9 @@ def _settled(bandwidth: FloatArray, valid: BoolArray, sampling_rate: float, skir
 def _time_notes(
     tracks: Tracks, bandwidth: FloatArray, valid: BoolArray, settled: BoolArray, skirt_poles: int
 ) -> list[str]:
-    """Return which orders are left out for how long, and over what time at the ends they are not reliable."""
+    """Return notes on which orders are left out for how long, and how long they are unreliable at the ends."""
     notes = [
-        f"order {name!r} is left out for {percent:.2g} % of the time, where its band passes half the sampling rate or "
+        f"order {name!r} is left out for {percent:.2g} % of the time, where its band reaches half the sampling rate or "
         "zero, or the shaft angle is not known"
         for name, percent in zip(tracks.names, 100.0 * (1.0 - valid.mean(axis=1)), strict=True)
         if percent > 0.0
@@ -383,7 +385,7 @@ def _time_notes(
     shortest, longest = float(times.min()), float(times.max())
     span = f"{longest:.3g}" if longest < 1.005 * shortest else f"{shortest:.3g} to {longest:.3g}"
     notes.append(
-        f"at the ends of the recording, and beside parts left out, levels are not reliable over {span} "
+        f"at the ends of the recording, and next to parts left out, levels are not reliable over {span} "
         f"{tracks.duration_unit}, in which the filter's response decays to 1 %"
     )
     never = [
@@ -392,5 +394,5 @@ def _time_notes(
         if not names_single_effect.any()
     ]
     if never:
-        notes.append(f"the recording is too short for some orders to settle, widen the band: {', '.join(never)}")
+        notes.append(f"the recording is too short for some orders to settle; widen the band: {', '.join(never)}")
     return notes

@@ -1,4 +1,4 @@
-"""Several orders at once: by splines on a coarse grid, or sample by sample; which solver suits which problem."""
+"""Joint solvers for several orders, by splines on a coarse grid or sample by sample, and the choice between them."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ BoolArray = NDArray[np.bool_]
 Group = NDArray[np.intp]
 
 ENOUGH = 5e-7
-"""Expected error up to which splines are taken, which are faster."""
+"""Expected error up to which splines, the faster method, are used."""
 
 
 @dataclass(frozen=True)
 class Problem:
-    """All orders: phase in cycles, where they are data, -3 dB bandwidth in cycles per sample; (n_orders, n)."""
+    """All orders, (n_orders, n): phase in cycles, where they are part of the data, -3 dB bandwidth in cycles/sample."""
 
     cycles: FloatArray
     valid: BoolArray
@@ -47,13 +47,13 @@ class Problem:
     mirror: bool
 
     def of(self, group: Group) -> Problem:
-        """Return the part of some orders; neighbours as views, without a copy."""
+        """Return the problem for a group of orders; adjacent rows as views, without a copy."""
         rows = _rows(group)
         return replace(self, cycles=self.cycles[rows], valid=self.valid[rows], bandwidths=self.bandwidths[rows])
 
     @property
     def expected_error(self) -> float:
-        """Of the solution for all orders together, relative to the largest component of the signal."""
+        """Expected error of the joint solution for all orders, relative to the largest component of the signal."""
         if self.generation == "second" or len(self.bandwidths) == 1:
             return accuracy_of(self.cycles, self.valid, self.bandwidths, self.p)
         frequency = np.abs(np.diff(self.cycles, axis=1))[self.valid[:, 1:] & self.valid[:, :-1]]
@@ -64,7 +64,7 @@ class Problem:
 
     @property
     def cheap_together(self) -> bool:
-        """Whether one solution for all orders takes less time than several for groups (trials)."""
+        """Whether one solution for all orders takes less time than several for groups (from trials)."""
         if self.generation == "first" or not 1 < len(self.bandwidths) <= 8:
             return False
         lowest, highest = float(self.bandwidths.min()), float(self.bandwidths.max())
@@ -76,9 +76,9 @@ def solve_groups(
 ) -> tuple[ComplexArray, FloatArray, float]:
     """Return envelopes (nan where not valid), waveforms (0 there), and the remaining error relative to the signal.
 
-    Without `share`, each group sees the whole signal, and takes what leaks through its bands of the others: near the
-    ends, that is some percent even of far ones. With it, each sees the signal less the others' waveforms, in several
-    sweeps (Gauss–Seidel by groups), which lead to the solution for all orders together.
+    Without `share`, each group is fitted to the whole signal and picks up what leaks through its bands from the others:
+    near the ends, a few percent even of distant orders. With `share`, each group is fitted to the signal minus the
+    others' waveforms, in several sweeps (Gauss–Seidel by groups), which converge to the joint solution for all orders.
     """
     solutions: NDArray[Any] = np.empty(
         problem.cycles.shape, np.complex128 if problem.generation == "second" else np.float64
@@ -100,10 +100,10 @@ def solve_groups(
             change = max(change, float(np.abs(new - waveforms[g]).max()) / largest)
             waveforms[g] = new
             residual -= new.sum(axis=0)
-        # Each sweep changes the waveforms by the same fraction of what the last one did.
+        # The change per sweep decreases by a constant factor.
         error = change * min(1.0, change / before)
         before = change
-        if error < 2e-7:  # of the signal's largest value: not worth a further sweep
+        if error < 2e-7:  # of the signal's largest value: another sweep is not worthwhile
             break
     return _envelopes(solutions, problem), waveforms, error
 
@@ -115,7 +115,7 @@ def _rows(group: Group) -> Group | slice:
 def _solve_group(y: FloatArray, problem: Problem) -> tuple[Array, FloatArray]:
     """Return the solution of one group (envelopes, or waveforms of the first generation), and its waveforms.
 
-    Where an order is not valid, the solution goes on all the same, and the waveform is 0.
+    Where an order is not valid, the solution continues, but the waveform is 0.
     """
     cycles, valid, widths = problem.cycles, problem.valid, problem.bandwidths
     active = None if valid.all() else valid
@@ -132,7 +132,7 @@ def _solve_group(y: FloatArray, problem: Problem) -> tuple[Array, FloatArray]:
 
 
 def _envelopes(solutions: Array, problem: Problem) -> ComplexArray:
-    """Return the envelopes, of waveforms too; nan where not valid."""
+    """Return the solutions as complex envelopes, (n_orders, n); nan where not valid."""
     envelopes = solutions.astype(np.complex128, copy=problem.generation == "first")
     if problem.generation == "first":
         for waveform, angle, envelope in zip(solutions, problem.cycles, envelopes, strict=True):
@@ -148,9 +148,9 @@ def solve_envelopes(
     """Return the complex envelopes of the second generation, jointly for all orders.
 
     Data equation y_n = Σ_k (x_kn e^{2πi c_kn} + x_kn* e^{-2πi c_kn}) + η_n, structural equation ∇^p x_kn = ε_kn and its
-    conjugate, minimised as Σ|η_n|² + 2 Σ r_kn² |ε_kn|². Envelopes are 2 x_k: y ≈ Σ Re(2 x_k e^{2πi c_k}). Textbooks
-    leave the conjugate terms out, though the signal is real; the order's mirror image at -f then passes with the gain
-    at 2f, and with several percent near the ends.
+    conjugate; Σ|η_n|² + 2 Σ r_kn² |ε_kn|² is minimised. Envelopes are 2 x_k: y ≈ Σ Re(2 x_k e^{2πi c_k}). Textbooks
+    omit the conjugate terms although the signal is real; the order's mirror image at -f then passes with the gain at
+    2f, and with several percent near the ends.
 
     Parameters
     ----------
@@ -158,13 +158,13 @@ def solve_envelopes(
     cycles : array, (n_orders, n)
         c, the phase of each order in cycles.
     active : array of bool, (n_orders, n), or None
-        Where an order is part of the data; None: everywhere. Elsewhere its envelope continues as a polynomial.
+        Where each order is part of the data; None: everywhere. Elsewhere its envelope continues as a polynomial.
     bandwidths : array, (n_orders, n) or (n_orders, 1)
         -3 dB, in cycles per sample.
     p : int
         Poles, 1 to 3.
     mirror : bool
-        False: without the conjugate terms, as the textbooks.
+        False: without the conjugate terms, as in textbooks.
 
     Returns
     -------
@@ -173,7 +173,7 @@ def solve_envelopes(
     Raises
     ------
     RefusalError
-        If the orders cannot be told apart.
+        If the orders cannot be distinguished.
 
     References
     ----------
@@ -182,14 +182,14 @@ def solve_envelopes(
     problem", 2000. J. Tůma, "Setting the passband width in the Vold-Kalman order tracking filter", 2005.
     """
     n = len(y)
-    # A row of the structural equation holds p + 1 samples; its weight is that of the middle one.
+    # A row of the structural equation spans p + 1 samples; its weight is that of the middle one.
     weights = envelope_weight(_of_rows(bandwidths, n, p), p)
     if len(cycles) == 1:
         return envelope_alone(y, cycles[0], None if active is None else active[0], weights[0], p, mirror=mirror)[None]
     cell, _ = chosen_cell(bandwidths, p, rounding_growth(cycles, active, bandwidths, p))
     if cell:
         return solve_by_splines(y, cycles, active, weights, p, cell, mirror=mirror)
-    # As by splines: the complex x, or with mirror images the real coefficients of cos and -sin.
+    # Unknowns as for splines: the complex x, or with mirror images the real coefficients of cos and -sin.
     data: Array = np.empty(cycles.shape, np.complex128)
     for row, angle in zip(data, cycles, strict=True):
         write_phasors(np.ascontiguousarray(angle), row)
@@ -208,8 +208,8 @@ def solve_envelopes(
 def solve_waveforms(y: FloatArray, cycles: FloatArray, active: BoolArray | None, bandwidths: FloatArray) -> FloatArray:
     """Return the waveforms of the first generation, jointly for all orders.
 
-    Data equation y_n = Σ_k x_kn + η_n, structural equation x_kn - 2 cos ω_k(n+1) x_k(n+1) + x_k(n+2) = ε_kn, minimised
-    as Σ η_n² + Σ r_kn² ε_kn².
+    Data equation y_n = Σ_k x_kn + η_n, structural equation x_kn - 2 cos ω_k(n+1) x_k(n+1) + x_k(n+2) = ε_kn;
+    Σ η_n² + Σ r_kn² ε_kn² is minimised.
 
     Parameters
     ----------
@@ -228,7 +228,7 @@ def solve_waveforms(y: FloatArray, cycles: FloatArray, active: BoolArray | None,
     if len(cycles) == 1:
         return waveform_alone(y, cycles[0], None if active is None else active[0], width[0])[None]
     frequency = (cycles[:, 2:] - cycles[:, :-2]) / 2.0
-    # Outside the active part the order may stand still: any finite weight does there.
+    # Outside the active part the frequency may be zero: any finite weight will do there.
     inside = np.clip(frequency, 0.75 * width, 0.5 - 0.75 * width)
     stencils = np.ones((*frequency.shape, 3))
     stencils[:, :, 1] = -2.0 * np.cos(2.0 * np.pi * frequency)
@@ -245,10 +245,9 @@ def _of_rows(bandwidths: FloatArray, n: int, p: int) -> FloatArray:
 
 
 def chosen_cell(bandwidths: FloatArray, p: int, close: float) -> tuple[int, float]:
-    """Return the cell of the grid on which orders of the second generation are solved for, and the expected error.
+    """Return the grid cell in samples (0: sample by sample) for the second generation, and the expected error.
 
-    0 samples: sample by sample. The error is relative to the largest component of the signal; `close` is the factor of
-    `rounding_growth`.
+    The error is relative to the largest component of the signal; `close` is the factor from `rounding_growth`.
     """
     lowest, highest = float(bandwidths.min()), float(bandwidths.max())
     d = samples_per_cell(lowest, highest, p)
@@ -258,7 +257,7 @@ def chosen_cell(bandwidths: FloatArray, p: int, close: float) -> tuple[int, floa
 
 
 def rotations_error(strength: float, close: float) -> float:
-    """Return the error sample by sample for r·|D| (trials), D's largest gain being 2^p, or less of waveforms."""
+    """Return the sample-by-sample solver's error for r·|D| (trials); D's largest gain is 2^p, less for waveforms."""
     return float(1e-15 * strength * np.sqrt(close))
 
 
@@ -270,17 +269,17 @@ def accuracy_of(cycles: FloatArray, active: BoolArray | None, bandwidths: FloatA
 
 
 def single_order_error(bandwidths: FloatArray) -> float:
-    """Return the rounding error for one order: a rounding step per sample, as far as the filter's memory reaches."""
+    """Return the rounding error for one order: one rounding step per sample over the filter's memory."""
     return 1e-12 + 1e-15 / float(bandwidths.min())
 
 
 def rounding_growth(cycles: FloatArray, active: NDArray[np.bool_] | None, bandwidths: FloatArray, p: int) -> float:
-    """Return the factor by which rounding errors grow, 1 where no two orders stay within a bandwidth.
+    """Return the factor by which rounding errors grow; 1 if no two orders stay within a bandwidth.
 
-    Two orders at a distance g below the bandwidth B can exchange what they hold at the price of (g/B)^2p, which divides
-    the smallest eigenvalue of the normal equations. Within a segment W the price is that of the distance's rms or of
-    going up and down again in W, p/W, whichever is higher (factor from trials); the cheapest segment counts. Orders
-    that cross swiftly are close for too short a time to exchange much.
+    Two orders at a distance g below the bandwidth B can exchange content at a cost of (g/B)^2p, which multiplies the
+    smallest eigenvalue of the normal equations. Within a segment W, g is the rms distance or p/W, the cost of rising
+    and falling again within W, whichever is larger (factor from trials); the cheapest segment counts. Orders that cross
+    quickly are close for too short a time to exchange much.
 
     Parameters
     ----------
@@ -324,29 +323,29 @@ def _smallest_distance(difference: FloatArray, width: float, p: int) -> float:
 # A narrow-band envelope changes little from sample to sample. The least-squares problem is restricted to splines
 # x_k(n) = Σ_i a_ki φ(n/d - i) with one knot every d samples (Ritz–Galerkin); all sums over samples stay exact. The
 # error is that of the best spline, 2.4 (dω_h/π)^2p with ω_h half the bandwidth in rad/sample; the rounding error falls
-# from ε/ω_h^2p to ε/(dω_h)^2p. Both meet near 1e-8 where d is chosen by `samples_per_cell`.
+# from ε/ω_h^2p to ε/(dω_h)^2p. With d from `samples_per_cell`, both are about 1e-8.
 
 
 DEGREE = 5
-"""Of the spline: 2p - 1 for p = 3, as the error's order 2p asks; with p = 2 it is more than needed."""
+"""Degree of the spline: 2p - 1 for p = 3, as an error of order 2p requires; more than needed for p = 2."""
 PIECES = DEGREE + 1
 CELL_ANGLE = {2: 0.0234, 3: 0.0993}
 """d·ω_h for two and three poles where truncation 2.4 (dω_h/π)^2p and rounding ~10 ε/(dω_h)^2p are equal."""
 MAX_INT64_CELL = 2600
-"""Up to here 66 d⁵, the largest value of 5! d⁵ φ, fits 64 bits; that the sums before it wrap around does no harm."""
+"""Largest d for which 66 d⁵, the maximum of 5! d⁵ φ, fits 64 bits; intermediate sums may wrap around harmlessly."""
 
 
 def samples_per_cell(lowest_bandwidth: float, highest_bandwidth: float, p: int) -> int:
-    """Return d, 0 for one pole, and for bands so wide that the grid saves nothing; bandwidths in cycles per sample.
+    """Return d; 0 for one pole and for bands too wide for a grid to save time. Bandwidths are in cycles per sample.
 
-    The geometric mean of both bandwidths shares the loss evenly between truncation and rounding.
+    The geometric mean of both bandwidths divides the loss evenly between truncation and rounding.
     """
     d = int(CELL_ANGLE.get(p, 0.0) / (np.pi * np.sqrt(lowest_bandwidth * highest_bandwidth)))
     return min(2**16, d) if d >= 3 else 0
 
 
 def expected_error(lowest_bandwidth: float, highest_bandwidth: float, d: int, p: int) -> float:
-    """Return the sum of truncation and rounding error that d leads to, relative to the largest component."""
+    """Return the sum of truncation and rounding error for a given d, relative to the largest component."""
     truncation = 2.4 * (d * highest_bandwidth) ** (2 * p)
     return float(truncation + 2e-15 / (np.pi * d * lowest_bandwidth) ** (2 * p))
 
@@ -365,9 +364,9 @@ def solve_by_splines(
     cycles : array, (n_orders, n)
         c.
     active : array of bool, (n_orders, n), or None
-        Where an order is part of the data equation; None: everywhere.
+        Where each order is part of the data equation; None: everywhere.
     weights : array, (n_orders, n - p) or (n_orders, 1)
-        r, of each row of the structural equation or constant.
+        r, for each row of the structural equation or constant.
     p, d : int
         Poles; samples per cell, at least p + 1.
     mirror : bool
@@ -380,7 +379,7 @@ def solve_by_splines(
     Raises
     ------
     RefusalError
-        If the orders cannot be told apart.
+        If the orders cannot be distinguished.
     """
     basis, differences = _sampled_basis(d, p)
     matrix, right = _data_terms(y, cycles, active, basis, mirror)
@@ -396,9 +395,9 @@ def solve_by_splines(
 def _sampled_basis(d: int, p: int) -> tuple[FloatArray, FloatArray]:
     """Return the B-splines' values in a cell, (d, 6), and their p-th differences, (d, 7).
 
-    Column s belongs to the spline that began 5 - s cells earlier. The difference is the forward one, so the last p rows
-    of a cell reach into the spline that begins with the next cell (column 6). Integers throughout: the difference of
-    rounded values would have few digits left.
+    Column s belongs to the spline that began 5 - s cells earlier. Forward differences are used, so the last p rows of a
+    cell reach into the spline that begins with the next cell (column 6). All numbers are integers: differences of
+    rounded values would have few significant digits.
     """
     kind: Any = np.int64 if d < MAX_INT64_CELL else np.object_
     grid: Array = np.arange((PIECES + 2) * d).astype(kind)
@@ -422,7 +421,7 @@ def _pairs(basis: FloatArray) -> tuple[NDArray[np.int64], FloatArray]:
 
 
 def _chunks(d: int, n: int, n_rows: int) -> Iterator[tuple[int, int, slice]]:
-    """Yield (first cell, one past the last, rows in them) of the cells that cover n samples, some at a time."""
+    """Yield (first cell, one past the last, rows in them) for chunks of the cells that cover n samples."""
     n_cells, per_chunk = -(-n // d), max(1, 2**15 // d)
     for first in range(0, n_cells, per_chunk):
         last = min(first + per_chunk, n_cells)
@@ -432,7 +431,7 @@ def _chunks(d: int, n: int, n_rows: int) -> Iterator[tuple[int, int, slice]]:
 def _data_terms(
     y: FloatArray, cycles: FloatArray, active: BoolArray | None, basis: FloatArray, mirror: bool
 ) -> tuple[Array, Array]:
-    """Return the data equation's part of the normal equations of the coefficients.
+    """Return the contribution of the data equation to the normal equations of the coefficients.
 
     matrix[o, i, k, l] couples coefficient i + o of unknown k to coefficient i of unknown l; right[i, k]. The unknowns
     are x_k, or with mirror images the coefficients of cos and -sin of each order in turn. The matrix is real for one
@@ -449,7 +448,7 @@ def _data_terms(
     square: FloatArray = np.zeros(0)
     for first, last, samples in _chunks(d, n, n):
         values, regressors = _padded_chunk(y, cycles, active, samples, (last - first, d), mirror=mirror)
-        # Where cos² + sin² is 1 throughout, its products are the same in every cell.
+        # If cos² + sin² is 1 throughout, its products are the same in every cell.
         whole = np.tile(products.sum(axis=0), (last - first, 1)) if active is None and last * d <= n else None
         # e_k* y on the right, e_k* e_m in the matrix; e is a phasor, or cos and -sin of each order in turn.
         for k, e_k in enumerate(regressors):
@@ -468,7 +467,7 @@ def _data_terms(
 
 
 def _summed(samples: Array, columns: FloatArray) -> Array:
-    """Return each cell's sums over its samples, weighted by real columns: not a complex product with zeros in it."""
+    """Return each cell's sums over its samples, weighted by real columns; avoids complex products with zeros."""
     if np.iscomplexobj(samples):
         return np.asarray(samples.real @ columns + 1j * (samples.imag @ columns))
     return np.asarray(samples @ columns)
@@ -477,9 +476,10 @@ def _summed(samples: Array, columns: FloatArray) -> Array:
 def _padded_chunk(
     y: FloatArray, cycles: FloatArray, active: BoolArray | None, samples: slice, shape: tuple[int, int], *, mirror: bool
 ) -> tuple[FloatArray, list[Array]]:
-    """Return the signal and the regressors as (cell, sample in it); zero past the end, where inactive.
+    """Return the signal and the regressors as (cell, sample in it); zero past the end and where inactive.
 
-    Phasors, or with mirror images Re(a e^{iΘ}) = u cos Θ - v sin Θ: cosine and minus sine of each order in turn.
+    The regressors are phasors, or, with mirror images, Re(a e^{iΘ}) = u cos Θ - v sin Θ: cosine and minus sine of each
+    order in turn.
     """
     length = samples.stop - samples.start
     values: FloatArray = np.zeros(shape)
@@ -496,7 +496,7 @@ def _padded_chunk(
 
 
 def _add_structure(matrix: Array, weights: FloatArray, differences: FloatArray, n: int, p: int) -> None:
-    """Add r²·(∇^p φ_i)(∇^p φ_j), summed over the rows that lie wholly inside the signal."""
+    """Add r²·(∇^p φ_i)(∇^p φ_j), summed over the rows that lie entirely within the signal."""
     d = len(differences)
     pairs, products = _pairs(differences)
     whole = products.sum(axis=0)
@@ -512,9 +512,9 @@ def _add_structure(matrix: Array, weights: FloatArray, differences: FloatArray, 
 
 
 def _add_products(matrix: Array, k: int, m: int, first: int, pairs: NDArray[np.int64], grams: Array) -> None:
-    """Add each cell's products of pieces s <= t, (n_cells, n_pairs), to the splines that the pieces belong to.
+    """Add each cell's products of pieces s <= t, (n_cells, n_pairs), to the entries of their splines.
 
-    matrix[t - s, cell + s] at unknowns k and m and, conjugate, m and k; the first cell is `first`.
+    They go to matrix[t - s, cell + s] at unknowns k, m and, conjugated, at m, k; the first cell is `first`.
     """
     for (s, t), products in zip(pairs, grams.T, strict=True):
         cells = slice(first + s, first + s + len(products))
@@ -524,9 +524,9 @@ def _add_products(matrix: Array, k: int, m: int, first: int, pairs: NDArray[np.i
 
 
 def _solve_spline_system(matrix: Array, right: Array) -> Array:
-    """Solve the Hermitian banded system by Cholesky's method; unknowns ordered by spline, then by order.
+    """Solve the Hermitian banded system by Cholesky factorisation; unknowns are ordered by spline, then by order.
 
-    A real matrix takes real and imaginary part of the right-hand side as two.
+    With a real matrix, real and imaginary parts of the right-hand side are solved as two right-hand sides.
     """
     from scipy.linalg import LinAlgError, solveh_banded
 
@@ -542,7 +542,7 @@ def _solve_spline_system(matrix: Array, right: Array) -> Array:
         x = solveh_banded(band, b, lower=True, overwrite_ab=True, check_finite=False)
     except LinAlgError:
         raise RefusalError(
-            "the orders cannot be told apart in this recording", remedy="leave one of them out or record longer"
+            "the orders cannot be distinguished in this recording", remedy="leave one of them out or record longer"
         ) from None
     return np.ascontiguousarray(x).view(right.dtype).reshape(n_splines, n_orders)
 
@@ -583,7 +583,7 @@ def solve_band(
     stencils : array, (n_orders, n - p, p + 1)
         s.
     triangle_bytes : int
-        Memory for the triangle. Longer problems keep it in parts and compute each part a second time, backwards.
+        Memory for the triangle. Longer problems store it in parts and compute each part a second time, backwards.
 
     Returns
     -------
@@ -592,7 +592,7 @@ def solve_band(
     Raises
     ------
     RefusalError
-        If the orders cannot be told apart.
+        If the orders cannot be distinguished.
     """
     n_orders, n = data.shape
     p = stencils.shape[2] - 1
@@ -605,7 +605,7 @@ def solve_band(
     head_rights = np.zeros((len(starts) + 1, p * n_orders), observed.dtype)
 
     def forwards(i: int) -> Any:
-        """Begin part i with the rows that the part before left over; return how many rows are its own."""
+        """Start part i with the rows left over from the previous part; return the number of rows of its own."""
         start, stop = starts[i], min(starts[i] + per_part, n)
         triangle[:], right[:] = 0, 0
         triangle[: p * n_orders], right[: p * n_orders] = heads[i], head_rights[i]
@@ -619,7 +619,7 @@ def solve_band(
     for i in range(len(starts) - 1, -1, -1):
         used = used if i == len(starts) - 1 else forwards(i)
         if not _substitute(triangle, right, x.reshape(-1)[starts[i] * n_orders :], used):
-            raise RefusalError("the orders cannot be told apart in this recording", remedy="leave one of them out")
+            raise RefusalError("the orders cannot be distinguished in this recording", remedy="leave one of them out")
     return np.ascontiguousarray(x[:n].T)
 
 
@@ -650,9 +650,8 @@ def rotate(
 ) -> None:
     """Rotate the data row and the structural rows of each sample from start to stop into the triangle.
 
-    Rows are rotated one after the other into a banded triangle (the square-root information filter). The normal
-    equations, whose condition is the square of this problem's, are never formed: the error is about r times the
-    rounding error, not r².
+    Rows are rotated one by one into a banded triangle (square-root information filter). The normal equations, whose
+    condition number would be squared, are never formed: the error is about r times the rounding error, not r².
 
     J. A. George, M. T. Heath, "Solution of sparse linear least squares problems using Givens rotations", 1980.
     """
@@ -677,7 +676,7 @@ def rotate(
 
 @njit(cache=True, nogil=True, inline="always")  # type: ignore[untyped-decorator,unused-ignore]
 def _insert(triangle: Array, right: Array, first: int, row: Array, value: Any) -> None:
-    """Rotate one row, with its right-hand side, into the triangle; the first empty place takes what is left.
+    """Rotate one row, with its right-hand side, into the triangle; the first empty row takes the remainder.
 
     With diagonal d (real) of triangle row R and leading entry v_c of the row: h² = d² + |v_c|²,
     R' = (d R + v_c* v)/h, v' = (d v - v_c R)/h.

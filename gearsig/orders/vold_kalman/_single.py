@@ -1,16 +1,16 @@
-"""The Vold–Kalman filter for one order by itself, exact at any bandwidth: second generation, first generation.
+"""The Vold–Kalman filter for a single order, exact at any bandwidth: second and first generation.
 
-Information filter from both ends, smoother back to them. The state z holds the order's value x and its differences v, a
-up to the (p - 1)-th. The structural equation is the noise ε of the highest one, with variance q = 1/r². What the
-samples so far say is kept as zᵀSz - 2gᵀz. A step disturbs the last component (index p) and then sums up: with s the
-last row of S,
+An information filter runs inward from both ends, and a smoother runs back to them. The state z holds the order's value
+x and its differences v, a up to the (p - 1)-th. The structural equation is the noise ε of the highest difference, with
+variance q = 1/r². The information from the samples so far is kept as zᵀSz - 2gᵀz. A step disturbs the last component
+(index p) and then accumulates the differences: with s the last row of S,
 
-    ρ = 1/(1 + q s_p),  G = q ρ s,  S -= G sᵀ,  g -= G g_p,   and on the way back   ε = Gᵀz - q ρ g_p.
+    ρ = 1/(1 + q s_p),  G = q ρ s,  S -= G sᵀ,  g -= G g_p,   and in the backward pass   ε = Gᵀz - q ρ g_p.
 
-As large a number as r² never meets one as small as the data: rounding grows with the filter's memory, 1/bandwidth, not
-with r² as in the normal equations. Both halves of the signal are run over in the same loop, each from its end (row 0
-forwards, row 1 backwards in time): a step waits for the one before it, and two that do not wait for each other fit into
-the time of one.
+Numbers as large as r² are never combined with numbers as small as the data: rounding grows with the filter's memory,
+1/bandwidth, not with r² as in the normal equations. One loop processes both halves of the signal, each from its end
+(row 0 forwards, row 1 backwards in time): each step depends on the previous one, but the two halves are independent, so
+that both take the time of one.
 
 Together with its mirror image at negative frequency, an order has a pair of real numbers u, v (the envelope u + iv) for
 each component of the state: the signal is y = u cos Θ - v sin Θ, so S starts from the row (cos Θ, -sin Θ) and its
@@ -43,14 +43,14 @@ Entry = Any
 State = tuple[Any, ...]
 F = TypeVar("F", bound=Callable[..., Any])
 
-# With nothing infinite, a complex number times a real one costs two products, not four.
+# With infinities excluded, a complex times a real number costs two products, not four.
 _OPTIONS: dict[str, Any] = {"nogil": True, "fastmath": {"nnan", "ninf", "nsz", "contract"}, "error_model": "numpy"}
 _kernel: Callable[[F], F] = njit(cache=True, **_OPTIONS)
 _copying: Callable[[F], F] = njit(cache=True, nogil=True, error_model="numpy")
 
 
 def _by(choose: Callable[..., F]) -> Callable[..., Any]:
-    """Return a function that numba compiles as what `choose` returns for the types of its arguments."""
+    """Return a function that numba compiles as the implementation that `choose` returns for its argument types."""
 
     def function(*args: Any) -> Any:
         raise NotImplementedError("for compiled functions")
@@ -60,7 +60,7 @@ def _by(choose: Callable[..., F]) -> Callable[..., Any]:
 
 
 def _for(of_numbers: F, of_blocks: F) -> Callable[..., Any]:
-    """Return a function of an entry, which may be a number or a block, and of whatever else."""
+    """Return a function whose first argument is an entry, a number or a block; further arguments may be anything."""
     return _by(lambda entry, *_: of_blocks if isinstance(entry, types.BaseTuple) else of_numbers)
 
 
@@ -76,7 +76,7 @@ _product = _for(
 _difference = _for(lambda a, b: a - b, lambda a, b: (a[0] - b[0], a[1] - b[1], a[2] - b[2], a[3] - b[3]))
 _scaled = _for(lambda a, factor: factor * a, lambda a, f: (f * a[0], f * a[1], f * a[2], f * a[3]))
 _transposed = _for(lambda a: a, lambda a: (a[0], a[2], a[1], a[3]))
-# A symmetric block from its upper triangle: what is below is then not computed at all.
+# A symmetric block from its upper triangle, so that the lower one need not be computed.
 _upper = _for(lambda a: a, lambda a: (a[0], a[1], a[1], a[3]))
 # An entry times a component of the state: a number, or the pair (real part, imaginary part).
 _applied = _for(lambda a, z: a * z, lambda a, z: complex(a[0] * z.real + a[1] * z.imag, a[2] * z.real + a[3] * z.imag))
@@ -107,9 +107,9 @@ def _block_damped(s: Entry, q: float) -> tuple[Entry, Entry]:
 
 _damped = _for(_number_damped, _block_damped)  # (R = 1/(I + q s), s R) of a symmetric entry
 
-# What the way back needs of a step: first R (symmetric), then q s_j R of the other components.
+# Gains of a step that the backward pass needs: first R (symmetric), then q s_j R of the other components.
 N_GAINS = {1: 3, 2: 7, 3: 11}
-"""Numbers kept per step where entries are blocks, by poles; otherwise as many as there are poles."""
+"""Numbers kept per step if entries are blocks, by number of poles; for numbers, one per pole."""
 
 
 def _keep_number(a: float, gains: FloatArray, row: int, i: int, k: int) -> None:
@@ -130,10 +130,10 @@ def _block_kept(_unit: Entry, gains: FloatArray, row: int, i: int, k: int) -> En
 
 
 _keep = _for(_keep_number, _keep_block)
-_kept = _for(lambda _unit, gains, row, i, k: gains[row, i, k], _block_kept)  # `unit` tells number or block
+_kept = _for(lambda _unit, gains, row, i, k: gains[row, i, k], _block_kept)  # `unit` selects number or block
 
 
-# One step forward, by poles: add the data of a sample, and go to the next. The form holds S's upper triangle, then g.
+# One forward step, by number of poles: add a sample's data and go to the next. The form holds S's upper triangle and g.
 
 
 def _forward_step(
@@ -153,7 +153,7 @@ def _step_two(
 ) -> State:
     """Two poles: v' = v - κx + ε, x' = x + v', so x_(n+1) - (2 - κ) x_n + x_(n-1) = ε.
 
-    κ None: second generation. κ = 2 - 2 cos ω: first, whose gain of x is kept less κ, as the way back needs it.
+    κ None: second generation. κ = 2 - 2 cos ω: first; the gain of x is then stored minus κ for the backward pass.
     """
     xx, xv, vv, g_x, g_v = form
     xx, g_x = _with_data(xx, g_x, x[i], data, row, i)
@@ -209,8 +209,8 @@ def _step_three(
 _step = _by(lambda form, *_: {2: _forward_step, 5: _step_two, 9: _step_three}[len(form)])
 
 
-# One step back: from the state after it to that before, z_j - z_(j+1) for all but the last component, and for that one
-# R z_p - Σ (q s_j R)ᵀ z_j + q R g.
+# One backward step, from the state after it to the state before: z_j - z_(j+1) for all components except the last, and
+# R z_p - Σ (q s_j R)ᵀ z_j + q R g for the last.
 
 
 def _backward_step(z: State, x: Array, gains: FloatArray, row: int, i: int, unit: Entry) -> State:
@@ -245,23 +245,23 @@ _back = _by(lambda z, *_: (_backward_step, _back_two, _back_three)[len(z) - 1])
 def filter_halves(
     front: Array, back: Array, data: FloatArray, q: FloatArray, kappa: Any, gains: FloatArray, a: State, b: State
 ) -> tuple[State, State]:
-    """Run over a part of both halves, and return their forms after it.
+    """Filter a part of both halves, and return their forms after it.
 
     Parameters
     ----------
     front, back : arrays, (n,), real or complex
-        Data (0 where inactive) of either half, from its end on, where entries are numbers; on return q R g.
+        Data (0 where inactive) of each half, starting from its end, if entries are numbers; on return q R g.
     data : array, (1, 2, n) or (3, 2, n)
-        Where entries are numbers: 1 where the order is part of the data, 0 elsewhere. Where they are blocks: signal,
-        cosine and sine, zero where inactive.
+        If entries are numbers: 1 where the order is part of the data, 0 elsewhere. If they are blocks: signal, cosine
+        and sine, zero where inactive.
     q : array, (2, n)
         Variance of the step after each sample.
     kappa : array, (2, n), or None
         See `_step_two`.
     gains : array, (2, n, n_gains)
-        On return, those of the step after each sample.
+        On return, the gains of the step after each sample.
     a, b : tuples
-        Form of either half before this part: S's upper triangle row by row, then g. Before any data: zero.
+        Form of each half before this part: S's upper triangle row by row, then g. Zero before any data.
     """
     for i in range(len(front)):
         a = _step(a, front, data, q, kappa, gains, 0, i)
@@ -271,27 +271,27 @@ def filter_halves(
 
 @_kernel
 def smooth_halves(front: Array, back: Array, gains: FloatArray, a: State, b: State, unit: Entry) -> tuple[State, State]:
-    """Turn q R g into the solution; a and b are the states after this part, those before it are returned."""
+    """Turn q R g into the solution; a and b are the states after this part, the states before it are returned."""
     for i in range(len(front) - 1, -1, -1):
         a = _back(a, front, gains, 0, i, unit)
         b = _back(b, back, gains, 1, i, unit)
     return a, b
 
 
-# How the recursions are driven: both halves to the middle, joined there, and back to the ends. Sample i of the first
-# half goes with sample n - 1 - i. Where n is odd, an unobserved sample is added at the end: it fits whatever the others
-# say, so it changes nothing.
+# Driver of the recursions: both halves run to the middle, are joined there, and run back to the ends. Sample i of the
+# first half is paired with sample n - 1 - i. For odd n, an unobserved sample is added at the end; it fits any solution
+# and so changes nothing.
 
 Prepare = Callable[[int, int, Array, Array], tuple[FloatArray, FloatArray, FloatArray | None]]
-"""Return (data, q, kappa) of samples i to j of both halves, after writing front and back: (i, j, front, back)."""
+"""Callable (i, j, front, back): writes front and back, returns (data, q, kappa) for samples i to j of both halves."""
 BLOCK_SAMPLES, GAIN_BYTES = 2**12, 256 * 2**20
-"""Of each half in a block, so that it fits the cache; memory for the gains: longer signals compute parts twice."""
+"""Samples of each half per block, to fit the cache; memory for the gains, beyond which parts are computed twice."""
 TIME_REVERSAL = {
     1: np.array([[1.0]]),
     2: np.array([[1.0, -1.0], [0.0, -1.0]]),
     3: np.array([[1.0, -2.0, 1.0], [0.0, -1.0, 1.0], [0.0, 0.0, 1.0]]),
 }
-"""Turns value and differences at the last of p samples into those at the first, counted the other way."""
+"""Converts value and differences at the last of p samples into those at the first, in reversed time."""
 
 
 def _smoothed_halves(
@@ -317,9 +317,9 @@ def _smoothed_halves(
     dtype : type
         Of the solution.
     pair : bool
-        Whether the components of the state are pairs, and S of blocks of 2 by 2.
+        Whether the components of the state are pairs and the entries of S blocks of 2 by 2.
     gain_bytes : int
-        Longer signals keep the gains of a part only, and compute each part a second time, backwards.
+        Memory for the gains. Longer signals keep only one part's gains and compute each part a second time, backwards.
     block_samples : int
 
     Raises
@@ -362,11 +362,12 @@ def _smoothed_halves(
 
 
 def _joined(p: int, front: State, back: State, q: float, *, pair: bool) -> tuple[State, State]:
-    """Return the states after the last step of either half, from what both halves say.
+    """Return the states after the last step of each half, from the information in both halves.
 
-    Each form holds the rows of the structural equation up to its own state. With two poles both states are the same two
-    samples, and each row is in one of the forms. With one pole, the first half leaves the row across the middle to the
-    second. With three, one row is in neither: the first half takes one more step, with ε = √q η as a further unknown.
+    Each form holds the rows of the structural equation up to its own state. With two poles, both states are the same
+    two samples, and each row is in one of the forms. With one pole, the first half leaves the row across the middle to
+    the second. With three, one row is in neither: the first half takes one more step, with ε = √q η as a further
+    unknown.
     """
     turn = TIME_REVERSAL[p]
     n_steps = max(0, p - 2)
@@ -391,7 +392,7 @@ def _joined(p: int, front: State, back: State, q: float, *, pair: bool) -> tuple
 
 
 def _dense(entries: State, p: int, size: int) -> FloatArray:
-    """Return S from its upper triangle, row by row, of numbers or of blocks of 2 by 2."""
+    """Return the full S, (p·size, p·size), from its upper triangle of numbers or 2-by-2 blocks, row by row."""
     blocks = np.zeros((p, p, size, size))
     rows, columns = np.triu_indices(p)
     upper = np.array(entries).reshape(-1, size, size)
@@ -399,17 +400,17 @@ def _dense(entries: State, p: int, size: int) -> FloatArray:
     return blocks.transpose(0, 2, 1, 3).reshape(p * size, p * size)
 
 
-# What the recursions take, block by block: both halves of the signal, each from its end.
+# Input of the recursions, block by block: both halves of the signal, each from its end.
 
 
 @_copying
 def fold(values: Array, first: int, last: int, out: FloatArray) -> None:
     """Write values[first], values[first + 1]… and values[last], values[last - 1]… as the two rows of `out`.
 
-    Beyond its ends, `values` continues with its first and last one.
+    Beyond its ends, `values` continues with its first and last value.
     """
     highest, n = len(values) - 1, out.shape[1]
-    if first >= 0 and first + n <= highest + 1 and last <= highest and last + 1 >= n:  # plain copies: several at once
+    if first >= 0 and first + n <= highest + 1 and last <= highest and last + 1 >= n:  # plain copies: vectorised
         for i in range(n):
             out[0, i] = values[first + i]
         for i in range(n):
@@ -422,7 +423,7 @@ def fold(values: Array, first: int, last: int, out: FloatArray) -> None:
 
 @_copying
 def demodulate(signal: FloatArray, cosine: FloatArray, sine: FloatArray, out: Array) -> None:
-    """Write y e^{-iΘ}."""
+    """Write y e^{-iΘ} to `out`."""
     for i in range(len(out)):
         out[i] = complex(signal[i] * cosine[i], -signal[i] * sine[i])
 
@@ -431,8 +432,8 @@ def demodulate(signal: FloatArray, cosine: FloatArray, sine: FloatArray, out: Ar
 def oscillator(cycles: FloatArray, bandwidth: FloatArray, kappa: FloatArray, q: FloatArray) -> None:
     """Write κ = 2 - 2 cos ω and q = 1/r² of each row of the first generation's structural equation.
 
-    q = 4 tan² h sin(ω - h) sin(ω + h)/(√2 - 1), h half the bandwidth in rad. Where the band comes close to zero or half
-    the sampling rate (the order is no part of the data there), q stays at what 3/4 of a bandwidth from there gives.
+    q = 4 tan² h sin(ω - h) sin(ω + h)/(√2 - 1), with h half the bandwidth in rad. Where the band comes close to zero or
+    half the sampling rate (where the order is not part of the data), q keeps its value 3/4 of a bandwidth away.
 
     Parameters
     ----------
@@ -469,7 +470,7 @@ def envelope_alone(
     gain_bytes: int = GAIN_BYTES,
     block_samples: int = BLOCK_SAMPLES,
 ) -> ComplexArray:
-    """Return the envelope 2x of one order, as `solve_envelopes` does for several.
+    """Return the envelope 2x of one order; the counterpart of `solve_envelopes` for a single order.
 
     Parameters
     ----------
@@ -479,7 +480,7 @@ def envelope_alone(
     p : int
     mirror : bool
     gain_bytes, block_samples : int
-        Memory for the gains; samples of each half in a block.
+        Memory for the gains; samples of each half per block.
 
     Returns
     -------
@@ -488,14 +489,14 @@ def envelope_alone(
     Raises
     ------
     RefusalError
-        If the data do not determine it.
+        If the data do not determine the order.
     """
     n = len(y)
     q = (2.0 if mirror else 1.0) / weights**2
 
     def prepare(i: int, j: int, front: Array, back: Array) -> tuple[FloatArray, FloatArray, None]:
         level, of_steps = _levels(active, n, i, j), _of_steps(q, n, p, i, j)
-        data = np.empty((3, 2, j - i))  # signal (zero where it is no data), cosine and sine
+        data = np.empty((3, 2, j - i))  # signal (zero where inactive), cosine and sine
         np.multiply(_of_samples(y, n, i, j), level, out=data[0])
         cosine_and_sine(_of_samples(cycles, n, i, j).reshape(-1), data[1].reshape(-1), data[2].reshape(-1))
         if mirror:
@@ -523,7 +524,7 @@ def envelope_alone(
 
 
 def waveform_alone(y: FloatArray, cycles: FloatArray, active: BoolArray | None, bandwidth: FloatArray) -> FloatArray:
-    """Return the waveform of one order, as `solve_waveforms` does for several; bandwidth (n - 2,) or (1,)."""
+    """Return the waveform of one order, (n,), see `solve_waveforms` for several; bandwidth (n - 2,) or (1,)."""
     n = len(y)
 
     def prepare(i: int, j: int, front: Array, back: Array) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -541,7 +542,7 @@ def waveform_alone(y: FloatArray, cycles: FloatArray, active: BoolArray | None, 
 
 
 def _levels(active: BoolArray | None, n: int, i: int, j: int) -> FloatArray:
-    """Return 1 where samples are data, 0 where not, (2, j - i)."""
+    """Return 1 where samples are data, 0 elsewhere, (2, j - i)."""
     level = np.ones((2, j - i)) if active is None else _of_samples(active, n, i, j)
     if i == 0 and n % 2:
         level[1, 0] = 0.0
@@ -556,7 +557,7 @@ def _of_samples(values: Array, n: int, i: int, j: int) -> FloatArray:
 
 
 def _of_steps(values: FloatArray, n: int, p: int, i: int, j: int) -> FloatArray:
-    """Return the values of the structural equation's rows, (n - p,) or (1,), that a block's steps belong to.
+    """Return the values, given per row of the structural equation, for a block's steps, (2, j - i).
 
     With one pole, the first half leaves the step across the middle to the second: there, q is 0.
     """

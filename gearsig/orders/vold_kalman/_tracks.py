@@ -1,4 +1,4 @@
-"""The orders that a Vold–Kalman filter separates: phase, frequency and bandwidth over time; weights and phasors."""
+"""Orders to be separated by a Vold–Kalman filter: phase, frequency and bandwidth over time; weights and phasors."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ class FrequencyTrack:
     frequency_hz : array, (n_samples,)
         At the recording's samples, not negative. Its integral is the phase, zero at the first sample.
     order : float, optional
-        Cycles per revolution of `shaft`, where that is known: it tells the shaft's speed, so that a bandwidth in orders
-        is one of that shaft, and levels can be read over speed.
+        Cycles per revolution of `shaft`, if known. It determines the shaft's speed, so that a bandwidth in orders
+        refers to that shaft, and levels can be read over speed.
     shaft : str, optional
     """
 
@@ -54,17 +54,17 @@ class FrequencyTrack:
 class SeparatedOrder(
     Result, columns=("time_s", "waveform", "amplitude", "phase_rad", "frequency_hz", "valid", "settled")
 ):
-    """One order taken out of a signal: waveform, and complex envelope over time.
+    """One order extracted from a signal: waveform and complex envelope over time.
 
     Parameters
     ----------
     name : str
     shaft : str
-        Empty where not known, for a frequency track.
+        Empty if not known, for a frequency track.
     order : float
-        Cycles per revolution of `shaft`; nan where not known, for a frequency track.
+        Cycles per revolution of `shaft`; nan if not known, for a frequency track.
     envelope : array, (n_samples,), complex
-        A e^{iφ} of A cos(2π·cycles + φ), A the peak amplitude in `unit`; nan where not `valid`.
+        A e^{iφ} of A cos(2π·cycles + φ), with A the peak amplitude in `unit`; nan where not `valid`.
     waveform : array, (n_samples,)
         The order's part of the signal; 0 where not `valid`.
     frequency_hz : array, (n_samples,)
@@ -73,8 +73,9 @@ class SeparatedOrder(
     valid : array of bool, (n_samples,)
         Where the whole band lies between zero and half the sampling rate and the shaft angle is known.
     settled : array of bool, (n_samples,)
-        Where, in addition, the order is known for long enough on both sides: at the ends of the recording, and beside
-        the parts left out, the filter leans on one side only, passes more noise, and its gain is not the closed form's.
+        Where, in addition, the order is valid for long enough on both sides. At the ends of the recording and next to
+        parts left out, the filter has data on one side only: it passes more noise, and the closed-form gain does not
+        hold.
     time_s : array, (n_samples,)
     unit, source : str
     """
@@ -107,12 +108,12 @@ class SeparatedOrder(
 
     @property
     def phase_rad(self) -> FloatArray:
-        """Phase of the cosine against the angle, -π to π, (n_samples,); nan where not valid."""
+        """Phase of the cosine relative to the angle, -π to π, (n_samples,); nan where not valid."""
         phase: FloatArray = np.angle(self.envelope)
         return phase
 
     def tracked(self, *, step: int = 1) -> TrackedOrder:
-        """Return amplitude and phase along speed, every `step`-th valid sample, as `track_orders` gives them.
+        """Return amplitude and phase over speed at every `step`-th valid sample, like the result of `track_orders`.
 
         Raises
         ------
@@ -144,22 +145,22 @@ class OrderSeparation(Result, rows="orders"):
     Parameters
     ----------
     orders : tuple of SeparatedOrder
-        In the order asked for.
+        In the requested order.
     residual : array, (n_samples,)
-        The signal less all waveforms.
+        The signal minus all waveforms.
     sampling_rate : float
-        Of the signal that was separated: in Hz, or samples per revolution for an `AngleSignal`.
+        Of the separated signal: in Hz, or samples per revolution for an `AngleSignal`.
     axis : "time" or "angle"
-        Along which the samples are equally spaced.
+        Axis along which the samples are equally spaced.
     generation : "first" or "second"
     n_poles : int
         Of the second generation; the first has two.
     groups : tuple of tuples of int
         Positions of the orders that were solved for together.
     expected_error : float
-        Of the numerical solution, relative to the signal's largest component.
+        Error of the numerical solution, relative to the signal's largest component.
     notes : tuple of str
-        What the reader should know: masked parts, ends, which orders are close and which were solved for together.
+        Notes on masked parts, ends, close orders, and orders solved for together.
     """
 
     orders: tuple[SeparatedOrder, ...]
@@ -177,7 +178,7 @@ class OrderSeparation(Result, rows="orders"):
 
     @property
     def coupled(self) -> bool:
-        """Whether any orders were solved for together."""
+        """Whether any orders were solved for jointly."""
         return any(len(group) > 1 for group in self.groups)
 
     def time_s(self) -> FloatArray:
@@ -195,8 +196,8 @@ CHUNK_SAMPLES = 2**17
 class Tracks:
     """Phase (cycles) and frequency of each order at the samples, (n_orders, n), and where they are known, (n,).
 
-    Over time, frequencies are in Hz and durations in s; over angle, in orders and in revolutions. `speed_rev_per_s` is
-    that of the angle's shaft, (n,), None where it was not asked for.
+    Over time, frequencies are in Hz and durations in s; over angle, in orders and revolutions. `speed_rev_per_s` is the
+    speed of the angle's shaft, (n,), or None if there is no shaft angle.
     """
 
     names: tuple[str, ...]
@@ -214,7 +215,7 @@ class Tracks:
 def tracks_of_orders(
     orders: Sequence[NamedOrder], angle: ShaftAngle | None, rig: Rig | None, n: int, sampling_rate_hz: float
 ) -> Tracks:
-    """Return the tracks of orders given as number (of the angle's shaft), (shaft, number) or frequency track."""
+    """Return the tracks of orders given as a number (of the angle's shaft), (shaft, number) or a frequency track."""
     cycles, frequency = np.empty((len(orders), n)), np.empty((len(orders), n))
     labels: list[tuple[str, str, float]] = []
     known = np.ones(n, dtype=bool)
@@ -235,7 +236,7 @@ def tracks_of_orders(
         if angle is None or turns is None or speed is None:
             raise InputError("an order is given without a shaft angle", where="orders", remedy="give frequency tracks")
         shaft, number, ratio = _of_shaft(order, angle, rig)
-        # The samples within the angle's time, with one sample of tolerance at either end.
+        # Only samples within the angle's time are known, with one sample of tolerance at either end.
         known[: max(0, int(np.ceil(angle.start_s * sampling_rate_hz - 1.0)))] = False
         known[max(0, int(np.floor(angle.end_s * sampling_rate_hz + 1.0)) + 1) :] = False
         np.multiply(turns, number * ratio, out=cycles[k])
@@ -253,7 +254,7 @@ def tracks_over_angle(orders: Sequence[NamedOrder], signal: AngleSignal) -> Trac
     for order in orders:
         if isinstance(order, FrequencyTrack):
             raise InputError(
-                f"{order.name!r} is a frequency over time, the signal is one over angle",
+                f"{order.name!r} is a frequency over time, but the signal is over angle",
                 where="orders",
                 remedy="give the recording and its shaft angle",
             )
@@ -283,7 +284,7 @@ def tracks_over_angle(orders: Sequence[NamedOrder], signal: AngleSignal) -> Trac
 
 
 def named_orders(orders: Sequence[OrderLike]) -> list[NamedOrder]:
-    """Return the orders, plain frequencies over time as tracks."""
+    """Return the orders, with plain frequency arrays converted to named tracks."""
     orders = listed(orders, "orders", object, remedy='give a list: [2, ("output", 4.5)]')
     if not orders:
         raise InputError("no orders are given", where="orders", remedy="name at least one")
@@ -294,7 +295,7 @@ def named_orders(orders: Sequence[OrderLike]) -> list[NamedOrder]:
 
 
 def _of_shaft(order: float | tuple[str, float], angle: ShaftAngle, rig: Rig | None) -> tuple[str, float, float]:
-    """Return an order's shaft, its number, and that shaft's revolutions per revolution of the angle's."""
+    """Return an order's shaft, its number, and the revolutions of that shaft per revolution of the angle's shaft."""
     if isinstance(order, tuple) and len(order) != 2:
         raise InputError(f"an order is {short(order)}", where="orders", allowed="a number, or (shaft, number)")
     shaft, number = order if isinstance(order, tuple) else (angle.shaft, order)
@@ -310,14 +311,14 @@ def _of_shaft(order: float | tuple[str, float], angle: ShaftAngle, rig: Rig | No
 
 
 def _sampled_angle(angle: ShaftAngle, n: int, sampling_rate_hz: float) -> tuple[FloatArray, FloatArray]:
-    """Return revolutions and revolutions per second at the samples."""
+    """Return revolutions and revolutions per second at the samples, (n,) each."""
     revolutions, speed = np.empty(n), np.empty(n)
     for start in range(0, n, CHUNK_SAMPLES):
         part = slice(start, min(start + CHUNK_SAMPLES, n))
         t = np.arange(part.start, part.stop) / sampling_rate_hz
         revolutions[part] = angle.revolutions_at(t)
         speed[part] = angle.speed_rpm_at(t) / 60.0
-    # The cubic's slope may round to a little below zero where the machine stands.
+    # At standstill, the cubic's slope may round to slightly below zero.
     return revolutions, np.maximum(speed, 0.0)
 
 
@@ -335,7 +336,7 @@ def bandwidths_of(
             f"{name} has shape {bandwidths.shape}", allowed=f"one number, or one for each of {n_orders} orders"
         )
     for width in bandwidths:
-        if isinstance(width, str):  # no number, even one that could be read as such
+        if isinstance(width, str):  # strings are refused even if they could be parsed as numbers
             raise InputError(
                 f"{name} is {width!r}", allowed=f"a number above 0, in {unit}", remedy="leave the unit out"
             )
@@ -345,7 +346,7 @@ def bandwidths_of(
         if not over_angle:
             return widths[:, None].copy()
         if speed is None or speed.min() <= 0.0:
-            raise InputError("the shaft stands still in between", where="bandwidth_hz", remedy="give bandwidth_orders")
+            raise InputError("the shaft stops in between", where="bandwidth_hz", remedy="give bandwidth_orders")
         return np.asarray(np.divide.outer(widths, speed))
     for order, width, label in zip(tracks.orders, widths, tracks.names, strict=True):
         if width >= 2 * order:
@@ -356,7 +357,7 @@ def bandwidths_of(
     if over_angle:
         return widths[:, None].copy()
     rows = []
-    for k, width in enumerate(widths):  # with the speed of the order's own shaft, or else of the angle's
+    for k, width in enumerate(widths):  # by the speed of the order's own shaft, or else of the angle's
         order_speed = tracks.frequency_hz[k] / tracks.orders[k] if np.isfinite(tracks.orders[k]) else speed
         if order_speed is None:
             raise InputError(
@@ -374,7 +375,7 @@ def valid_parts(tracks: Tracks, bandwidth: FloatArray, sampling_rate: float, gen
     Raises
     ------
     RefusalError
-        If an order has no such part.
+        If there is no such part for an order.
     """
     f = tracks.frequency_hz
     margin: FloatArray = bandwidth / 2
@@ -387,7 +388,7 @@ def valid_parts(tracks: Tracks, bandwidth: FloatArray, sampling_rate: float, gen
             continue
         reach = f"runs from {f[k].min():.4g} to {f[k].max():.4g} {tracks.unit}"
         if f[k].max() == 0.0:
-            raise RefusalError(f"order {name!r} stands still all the time", remedy="record while the machine turns")
+            raise RefusalError(f"order {name!r} stands still throughout", remedy="record while the machine turns")
         if f[k].min() >= sampling_rate / 2:
             raise RefusalError(
                 f"order {name!r} {reach}, at or above half the sampling rate of {sampling_rate:g} {tracks.unit}",
@@ -408,15 +409,15 @@ def valid_parts(tracks: Tracks, bandwidth: FloatArray, sampling_rate: float, gen
 
 
 HALF_POWER = np.sqrt(np.sqrt(2.0) - 1.0)
-"""r·|D| at the -3 dB points, for there 1/(1 + r²|D|²) = 1/√2."""
+"""r·|D| at the -3 dB points, where 1/(1 + r²|D|²) = 1/√2."""
 
 
 def settling_time(bandwidth: FloatArray, skirt_poles: int) -> FloatArray:
     """Return the time after which the filter's response has decayed to 1 %, in the inverse unit of the bandwidth.
 
-    The slowest pole of 1/(1 + (√2 - 1)(2f/B)^2p) decays as exp(-t/τ), τ = (√2 - 1)^(1/2p)/(πB sin(π/2p)); this is
-    τ ln 100: 0.94/B, 1.66/B and 2.53/B for one, two and three poles. The first generation's skirts have one. Where the
-    bandwidth is 0, as that of an order of a shaft at rest, it is infinite.
+    The slowest pole of 1/(1 + (√2 - 1)(2f/B)^2p) decays as exp(-t/τ), τ = (√2 - 1)^(1/2p)/(πB sin(π/2p)). The settling
+    time is τ ln 100: 0.94/B, 1.66/B and 2.53/B for one, two and three poles. The first generation's skirts have one
+    pole. For zero bandwidth, as for an order of a shaft at rest, it is infinite.
     """
     slowness = HALF_POWER ** (1.0 / skirt_poles) / (np.pi * np.sin(0.5 * np.pi / skirt_poles))
     with np.errstate(divide="ignore"):
@@ -439,10 +440,10 @@ def waveform_weight(bandwidth: FloatArray, frequency: FloatArray) -> FloatArray:
     """Return r of the first generation; bandwidth and frequency in cycles per sample.
 
     With h half the bandwidth and ω the frequency in rad, r = √(√2 - 1)/(2 tan h √(sin²ω - sin²h)): the -3 dB points of
-    1/(1 + r²(2 cos ω' - 2 cos ω)²) lie 2h apart, not quite symmetric about ω.
+    1/(1 + r²(2 cos ω' - 2 cos ω)²) are 2h apart, not quite symmetric about ω.
     """
     h, omega = np.pi * bandwidth, 2.0 * np.pi * frequency
-    # sin²ω - sin²h as a product: no digits are lost where the band nearly touches zero frequency.
+    # sin²ω - sin²h as a product, to keep all digits where the band nearly touches zero frequency.
     r: FloatArray = HALF_POWER / (2.0 * np.tan(h) * np.sqrt(np.sin(omega - h) * np.sin(omega + h)))
     return r
 
@@ -450,7 +451,8 @@ def waveform_weight(bandwidth: FloatArray, frequency: FloatArray) -> FloatArray:
 def lowest_frequency(bandwidth: FloatArray) -> FloatArray:
     """Return the frequency below which the first generation's band reaches zero; both in cycles per sample.
 
-    cos ω = cos² h: about 0.71 bandwidths, for the band is not symmetric. The same holds below half the sampling rate.
+    cos ω = cos² h: about 0.71 bandwidths, as the band is not symmetric. The same distance applies at half the sampling
+    rate.
     """
     f: FloatArray = np.arccos(np.cos(np.pi * bandwidth) ** 2) / (2.0 * np.pi)
     return f
@@ -465,10 +467,10 @@ QUARTER_TURN_RAD = 1.5707963267948966
 
 @njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
 def cosine_and_sine(revolutions: FloatArray, cosine: FloatArray, sine: FloatArray) -> None:
-    """Write cos 2πx and sin 2πx, to about 1e-15.
+    """Write cos 2πx and sin 2πx, accurate to about 1e-15.
 
-    Taylor series of a quarter of the angle (at most π/4, where the terms left out are below 1e-16), then doubled twice:
-    without branches, so that the compiler runs several samples at once.
+    Taylor series of a quarter of the angle (at most π/4, where the omitted terms are below 1e-16), then doubled twice.
+    There are no branches, so the compiler can vectorise.
     """
     for i in range(len(revolutions)):
         x = revolutions[i]
@@ -484,7 +486,7 @@ def cosine_and_sine(revolutions: FloatArray, cosine: FloatArray, sine: FloatArra
 
 @njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
 def write_phasors(revolutions: FloatArray, out: NDArray[Any]) -> None:
-    """Write e^{2πix}, by way of pieces that lie side by side in the cache: into every other place it is slow."""
+    """Write e^{2πix} by way of contiguous blocks in the cache, since writing with a stride of two is slow."""
     cosine, sine = np.empty(BLOCK), np.empty(BLOCK)
     for start in range(0, len(revolutions), BLOCK):
         n = min(BLOCK, len(revolutions) - start)
@@ -507,10 +509,10 @@ def write_modulated(envelope: NDArray[Any], revolutions: FloatArray, out: FloatA
 
 @njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
 def write_envelope(waveform: FloatArray, revolutions: FloatArray, out: NDArray[Any]) -> None:
-    """Write the envelope a of x = Re(a e^{2πic}), taken as constant from a sample to its neighbours.
+    """Write the envelope a of x = Re(a e^{2πic}), assumed constant from a sample to its neighbours.
 
-    They are x(n±1) = x cos α± ∓ q sin α±, α± the phase step; both give the quadrature q by least squares, and
-    a = (x + iq) e^{-2πic}.
+    The neighbours are x(n±1) = x cos α± ∓ q sin α±, with α± the phase step; both give the quadrature q by least
+    squares, and a = (x + iq) e^{-2πic}.
     """
     n = len(waveform)
     cosine, sine = np.empty(BLOCK), np.empty(BLOCK)
