@@ -101,16 +101,13 @@ def encoder_angle(
     half_width, note = _half_width(revolutions, noise)
     positions, angle, slopes = local_parabolas(revolutions, half_width)
     angle = np.maximum.accumulate(angle)
-    duration = (len(x) - 1) / sampling_rate_hz
     return ShaftAngle(
         "",
         positions / sampling_rate_hz,
         angle,
         np.maximum(slopes, 0.0) * sampling_rate_hz,
         "encoder",
-        relative_speed_uncertainty=float(
-            np.sqrt(2.0 / half_width) * noise / (duration * abs(angle[-1] - angle[0]) / duration)
-        ),
+        relative_speed_uncertainty=float(np.sqrt(2.0 / half_width) * noise / abs(angle[-1] - angle[0])),
         notes=notes + note,
     )
 
@@ -206,7 +203,7 @@ def speed_channel_angle(values: FloatArray, sampling_rate_hz: float, rpm_per_uni
 def _forwards(speed: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
     """Return the speed made positive, with noise below zero removed, and notes."""
     top = float(np.max(np.abs(speed)))
-    if top * 60.0 < 1.0 or float(np.mean(np.abs(speed))) * len(speed) == 0.0:
+    if top * 60.0 < 1.0:
         raise RefusalError(
             f"the speed channel stays within ±{60 * top:.3g} rpm: the machine is at rest",
             remedy="check the channel and rpm_per_unit",

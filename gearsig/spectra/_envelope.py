@@ -707,8 +707,8 @@ def compare_bands(
     else:
         choices.append(_choice("kurtogram", band.band_hz, x, fs, alpha, n, slip))
     enhanced = enhanced_envelope(coherence)
-    clarity, rates = _clarity(enhanced.spectrum, alpha, n, slip, power=True)
-    choices.append(BandChoice("enhanced", enhanced.band_hz, clarity, rates, enhanced.spectrum))
+    clarity_db, found_hz = _clarity(enhanced.spectrum, alpha, n, slip, power=True)
+    choices.append(BandChoice("enhanced", enhanced.band_hz, clarity_db, found_hz, enhanced.spectrum))
     return tuple(sorted(choices, key=lambda choice: -choice.clarity_db))
 
 
@@ -766,8 +766,8 @@ def _choice(
     middle = min(max(sum(band_hz) / 2, width / 2), fs / 2 - width / 2)
     band_hz = (max(middle - width / 2, 0.0), min(middle + width / 2, fs / 2))
     spectrum = envelope_spectrum(x, fs, band_hz=band_hz, highest_hz=(n + 0.5) * alpha)
-    clarity, rates = _clarity(spectrum, alpha, n, slip, power=False)
-    return BandChoice(method, band_hz, clarity, rates, spectrum)
+    clarity_db, found_hz = _clarity(spectrum, alpha, n, slip, power=False)
+    return BandChoice(method, band_hz, clarity_db, found_hz, spectrum)
 
 
 def _clarity(spectrum: Spectrum, alpha: float, n: int, slip: float, *, power: bool) -> tuple[float, float]:

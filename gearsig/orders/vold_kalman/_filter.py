@@ -388,11 +388,7 @@ def _time_notes(
         f"at the ends of the recording, and next to parts left out, levels are not reliable over {span} "
         f"{tracks.duration_unit}, in which the filter's response decays to 1 %"
     )
-    never = [
-        repr(name)
-        for name, names_single_effect in zip(tracks.names, settled, strict=True)
-        if not names_single_effect.any()
-    ]
+    never = [repr(name) for name, has_settled in zip(tracks.names, settled, strict=True) if not has_settled.any()]
     if never:
         notes.append(f"the recording is too short for some orders to settle; widen the band: {', '.join(never)}")
     return notes
