@@ -355,7 +355,7 @@ def test_recording_and_rig_file_are_given_at_once_on_the_start_page() -> None:
     page = at("start", {})
     uploader = page.file_uploader(key="start file")
     uploader.upload("machine.toml", sample.rig.read_bytes()).run()
-    assert "Now the recording" in shown_text(page)
+    assert "Now add the recording" in shown_text(page)
     uploader = page.file_uploader(key="start file").upload("machine.toml", sample.rig.read_bytes())
     uploader.upload(sample.recording.name, sample.recording.read_bytes()).run()
     (file,) = state_of(page, state.RECORDING_FILE)
