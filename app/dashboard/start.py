@@ -81,7 +81,7 @@ TO_TRY: tuple[tuple[str, str, str, Callable[[], str], str], ...] = (
     ),
     (
         "Why does my simulation differ?",
-        "A recording compared with a simulation of its rig: where they differ, what is missing, how much it explains.",
+        "A recording against a simulation of its rig: where they differ, which effect is missing, what it explains.",
         "Find the reason",
         two_spectra,
         "gap",

@@ -97,7 +97,7 @@ def test_an_own_file_stays_open_while_the_laboratory_is_looked_at(page: playwrig
     rows = "\n".join(f"{i / 1000:g};{(i * 37) % 101}" for i in range(3000))
     content = f"time (s);a1\n{rows}\n".encode()
     page.get_by_role("link", name="Analysis").click()
-    page.get_by_text("Own file", exact=True).click()
+    page.get_by_text("Your file", exact=True).click()
     page.get_by_text("Choose a recording on the left").first.wait_for()
     uploader = page.locator("[data-testid=stFileUploader] input[type=file]").first
     uploader.set_input_files({"name": "mine.csv", "mimeType": "text/csv", "buffer": content})

@@ -196,7 +196,7 @@ def choose_reference_rate(key: str = "", *, of_several: bool = False, name: str 
 # The recording of the analysis page, with its machine, its reference, and what its file does not state.
 # --------------------
 
-SAMPLE, FILE, NO_REFERENCE = "Sample", "Own file", "None"
+SAMPLE, FILE, NO_REFERENCE = "Sample", "Your file", "None"
 MACHINE = "described"
 """In the address: the machine of a sample that was described otherwise than it is."""
 
