@@ -297,7 +297,7 @@ def test_a_machine_without_a_name_is_described_all_the_same() -> None:
     sample = SAMPLES["damaged_tooth"]
     nameless = sample.rig.read_text("utf-8").partition("\n")[2]
     page = opened_file("a.csv.gz", sample.recording.read_bytes(), nameless)
-    assert "machine without a name" in shown_text(page)
+    assert "unnamed machine" in shown_text(page)
     page = opened_file("a.csv.gz", sample.recording.read_bytes())
     assert "machine not described" in shown_text(page)
 
