@@ -219,7 +219,7 @@ def _recent() -> dict[str, ChosenFile]:
 def remember_file(token: str, file: ChosenFile) -> None:
     """Keep a file for a reload of its page; the oldest files are dropped if there are too many or too large ones.
 
-    All sessions share the store, so it is bounded; a token that only one session knows opens only the files of that session.
+    All sessions share the store, so it is bounded; a token that one session alone knows opens only its own files.
     """
     files = _recent()
     files.pop(token, None)

@@ -76,8 +76,8 @@ FACTS: dict[str, tuple[str, ...]] = {
 }
 """Tables of a rig file that are shown as one row of fields; an empty field is left out of the file."""
 ABOUT = {
-    "bearing": "A catalogue name; or number n, diameter d, pitch diameter D and contact angle α of the rolling elements; "
-    "or the orders that its maker states, which take precedence over both.",
+    "bearing": "A catalogue name; or number n, diameter d, pitch diameter D and contact angle α of the rolling "
+    "elements; or the orders that its maker states, which take precedence over both.",
     "operating_point": "Guides the search for the true speed; used in its place, within ± 6 %, where neither a "
     "tachometer nor gears give the speed.",
     "machine": "For zones A to D of ISO 20816-3: rated power, or the shaft height of a motor or generator.",
