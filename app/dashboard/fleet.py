@@ -216,7 +216,7 @@ def _show_point(fleet: Fleet, row: Row) -> None:
         row = _choose_series(series, machine, point)
         over = _choose_over(fleet.recordings(machine, point))
         _show_trend(fleet, row, over)
-        with st.expander(f"All {len(series)} indicators, the worst first", icon=":material/table:"):
+        with st.expander(f"All {len(series)} indicators, worst first", icon=":material/table:"):
             show_table(_series_table(series))
     _show_recordings(fleet.recordings(machine, point).iloc[::-1], f"{machine!r} {point!r}")
 
@@ -224,7 +224,7 @@ def _show_point(fleet: Fleet, row: Row) -> None:
 def _choose_series(series: DataFrame, machine: str, point: str) -> Row:
     rows = series.to_dict("records")
     key = state.source_key(SERIES, f"{machine!r} {point!r}")
-    label = "Indicator, the worst first"
+    label = "Indicator, worst first"
     names = [_series_name(row) for row in rows]
     address.begin(key, "indicator", 0, address.one_of({name: i for i, name in enumerate(names)}))
     place = st.selectbox(label, range(len(rows)), format_func=lambda i: _series_text(rows[i]), key=key) or 0
@@ -252,7 +252,7 @@ def _series_table(series: DataFrame) -> dict[str, list[Any]]:
         "limit": [row["upper_limit"] for row in rows],
         "unit": [unit_text(row["unit"]) for row in rows],
         "since": [row["since"] for row in rows],
-        "limits by": [row["basis"] for row in rows],
+        "basis of limits": [row["basis"] for row in rows],
     }
 
 

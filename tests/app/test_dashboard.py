@@ -441,7 +441,7 @@ def test_nothing_is_open_before_a_file_is_given() -> None:
     page.sidebar.radio(key=state.ORIGIN).set_value("Your file").run()
     assert not page.exception
     assert not figures(page, of_verdict=True)
-    assert "Give a recording" in shown_text(page)
+    assert "Choose a recording" in shown_text(page)
 
 
 def test_no_long_signal_goes_to_the_browser_whole() -> None:
