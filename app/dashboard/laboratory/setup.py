@@ -33,7 +33,7 @@ MODEL = "cracked"
 """The model whose motion the bifurcation diagram can follow."""
 MODELS = (MODEL, "reduced-fe")
 DRIVE_MODEL = "forging"
-"""The drive that starts and stops, with its own page."""
+"""The drive that starts and stops, with its own controls and figures."""
 
 
 @dataclass(frozen=True)
