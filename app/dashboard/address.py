@@ -1,7 +1,7 @@
-"""The page's address: what is chosen on a page stands in it, so that a view can be sent. The one place that touches it.
+"""The page's address, which holds what is chosen on a page so that a view can be shared. Only this module touches it.
 
-A widget takes its first value from the address by `ask`, and stands in it while it differs from its default. Values
-that an address cannot ask for are ignored. Back and Forward of the browser make the page what their address says.
+By `ask`, a widget takes its first value from the address, and its value stays there while it differs from the default.
+Values that an address cannot ask for are ignored. The browser's Back and Forward restore the page of their address.
 """
 
 from __future__ import annotations
@@ -20,23 +20,23 @@ _FOLLOWED, _BARE = "choices that follow the address", "pages with an empty addre
 _drawn: ContextVar[set[str] | None] = ContextVar("names in the address of what is being drawn", default=None)
 _draft: ContextVar[dict[str, list[str]] | None] = ContextVar("the address as it will be", default=None)
 Read = Callable[[list[str]], Any]
-"""From texts of an address to a value; ValueError, KeyError or IndexError where they ask for nothing that there is."""
+"""From texts of an address to a value; ValueError, KeyError or IndexError if they ask for nothing that exists."""
 
 # --------------------
-# What of the address belongs to what is shown.
+# Which part of the address belongs to what is shown.
 # --------------------
 
 
 @contextmanager
 def of_page(page: str) -> Iterator[None]:
-    """Draw a page: by its end, what stands in its address and is not of what it shows is taken out.
+    """Draw a page, and then remove from its address what does not belong to what it shows.
 
-    What the address asks for is taken when the page is opened, and once: what is chosen later, another recording say,
-    begins with its own defaults. Back and Forward open the page anew, and their address goes before the session's
+    What the address asks for is taken once, when the page is opened: what is chosen later, such as another recording,
+    starts with its own defaults. Back and Forward open the page anew, and their address overrides the session's
     choices.
     """
     bare: set[str] = st.session_state.setdefault(_BARE, set())
-    # An empty address that the page did not make is that of a link to it, which asks for nothing.
+    # An empty address that the page did not make comes from a link to the page, which asks for nothing.
     is_followed = is_history() and (bool(_in_address()) or page in bare)
     if st.session_state.get(_PAGE) != page or is_followed:
         st.session_state[_PAGE] = page
@@ -50,25 +50,25 @@ def of_page(page: str) -> Iterator[None]:
 
 
 def is_history() -> bool:
-    """Whether the browser's Back or Forward made the page run; the address that they ask for is in force then."""
+    """Whether the browser's Back or Forward made the page run; the address is then already the one they ask for."""
     return bool(getattr(get_script_run_ctx(suppress_warning=True), "is_history_navigation", False))
 
 
 @contextmanager
 def of_part(part: str) -> Iterator[None]:
-    """Draw a part of a page that may run without the rest of it, as a fragment; see `of_page`."""
+    """Draw a part of a page that may run without the rest, as a fragment; see `of_page`."""
     is_inner = _drawn.get() is not None
     if is_inner:
         with _names_of(part):
             yield
         return
-    # Each change of the address is a step that Back takes: all that a run changes is written as one.
+    # Each change of the address is a step for Back: all changes of one run are written together.
     token = _draft.set(_in_address())
     try:
         with _names_of(part):
             yield
         known: dict[str, set[str]] = st.session_state[_NAMES]
-        # Not reached where a run is broken off: what it did not come to is still asked for, and stays.
+        # Not reached if a run is interrupted: what it did not get to is still asked for, and stays.
         if _WHOLE in known:
             forget_asked()
             kept = set().union(*known.values())
@@ -93,7 +93,7 @@ def _names_of(part: str) -> Iterator[None]:
 
 
 def write() -> None:
-    """Write the address as far as it is known: what takes long is begun with an address that opens it again."""
+    """Write the address as far as it is known, so that long work starts with an address that opens it again."""
     draft = _draft.get()
     if draft is not None and draft != _in_address():
         st.query_params.from_dict(draft)
@@ -114,7 +114,7 @@ def _asked() -> dict[str, list[str]]:
 
 
 def asked(name: str) -> str:
-    """Return what the address asked for when the page was opened, an empty text for nothing."""
+    """Return what the address asked for under a name when the page was opened, an empty text for nothing."""
     return next(iter(all_asked(name)), "")
 
 
@@ -130,7 +130,7 @@ def forget_asked() -> None:
 
 
 def follows(key: str) -> bool:
-    """Whether the address goes before what the session holds under a key: once after Back or Forward."""
+    """Whether the address overrides what the session holds under a key: once after Back or Forward."""
     followed: set[str] | None = st.session_state.get(_FOLLOWED)
     if followed is None or key in followed:
         return False
@@ -139,19 +139,19 @@ def follows(key: str) -> bool:
 
 
 def now(name: str) -> str:
-    """Return what stands in the address now, an empty text for nothing."""
+    """Return what the address holds under a name now, an empty text for nothing."""
     return next(iter(_as_it_will_be().get(name, ())), "")
 
 
 def claim(name: str) -> None:
-    """Say that what stands in the address under a name is of what is being drawn."""
+    """Record that a name in the address belongs to what is being drawn."""
     names = _drawn.get()
     if names is not None:
         names.add(name)
 
 
 def put(name: str, *texts: str) -> None:
-    """Keep texts in the address; none takes the name out."""
+    """Write texts to the address under a name; without texts, the name is removed."""
     if texts:
         claim(name)
     changed = _as_it_will_be()
@@ -171,7 +171,7 @@ def put(name: str, *texts: str) -> None:
 
 
 def chosen(key: str, name: str, options: Collection[str], first: str) -> str:
-    """Return one of some options: the session's choice, else the address', which then always names it; see `of_page`.
+    """Return one of the options: the session's choice, else the address's; then the address always names it.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ def chosen(key: str, name: str, options: Collection[str], first: str) -> str:
         In the address.
     options : collection of str
     first : str
-        Where neither names one of them.
+        If neither names one of them.
     """
     held, texts = st.session_state.get(key), _asked().pop(name, [])
     candidates: list[str | None] = [*texts] if follows(key) else [held, *texts]
@@ -202,7 +202,7 @@ def ask(
     key: str = "",
     **looks: Any,
 ) -> Any:
-    """Return what a widget of Streamlit gives; it stands in the address while it differs from its default.
+    """Return the value of a Streamlit widget; the address holds it while it differs from its default.
 
     The session keeps the choice while other views and pages are shown.
 
@@ -215,13 +215,13 @@ def ask(
     name : str
         In the address: short, and unique among what the page shows at a time.
     first : value
-        The default; also where the widget is empty.
+        The default; also used if the widget is empty.
     read : callable
         From texts of the address to a value, e.g. `one_of(options)`.
     written : callable or None
-        From a value to what the address says of it, where that is another one.
+        From a value to the one that the address holds for it, if they differ.
     key : str
-        Of its state, see `state.view_key`; empty: one for the page, by its name.
+        Of its state, see `state.view_key`; empty: one made from the name and the page.
     """
     key = key or f"{name} of {st.session_state.get(_PAGE)}"
     begin(key, name, first, read)
@@ -234,7 +234,7 @@ def ask(
 def ask_one(
     widget: Callable[..., Any], label: str, options: Collection[Any], *, first: Any = None, **looks: Any
 ) -> Any:
-    """Return one of some options as a widget gives it; without a default the first is chosen at first. See `ask`."""
+    """Return the option chosen in a widget; the default is `first`, or else the first option. See `ask`."""
     first = next(iter(options)) if first is None else first
     return ask(widget, label, options, first=first, read=one_of(options), **looks)
 
@@ -250,7 +250,7 @@ def ask_number(
     whole: bool = False,
     **looks: Any,
 ) -> Any:
-    """Return a number that the user types; a field that is emptied stands for its default. See `ask`.
+    """Return a number that the user types; an empty field means its default. See `ask`.
 
     Parameters
     ----------
@@ -263,7 +263,7 @@ def ask_number(
     name, **looks
         See `ask`.
     first : float or None
-        The default; None: what is known elsewhere, and the field is empty.
+        The default; None: the value is known elsewhere, and the field is empty.
     whole : bool
     """
     kind: type = int if whole else float
@@ -286,7 +286,7 @@ def tabs(names: Sequence[str], *, key: str) -> Sequence[Any]:
 
 
 def begin(key: str, name: str, first: Any, read: Read) -> None:
-    """Give a widget that has no state yet the value that the address asks for, else `first`; see `ask`, `of_page`."""
+    """Give a widget without state the value that the address asks for, or else `first`; see `ask`, `of_page`."""
     texts = _asked().pop(name, [])
     if not follows(key) and key in st.session_state:
         return
@@ -306,7 +306,7 @@ def _texts(value: Any) -> list[str]:
 
 
 def text_of(value: Any) -> str:
-    """Return what an address says of a value.
+    """Return the text that an address holds for a value.
 
     Examples
     --------
@@ -325,13 +325,13 @@ def text_of(value: Any) -> str:
 # --------------------
 
 LARGEST = 2.0**53
-"""Of a number: browsers count exactly up to it."""
+"""Limit of a number: browsers represent integers exactly up to it."""
 LONGEST = 200
-"""Of a text."""
+"""Maximum length of a text."""
 
 
 def one_of(options: Iterable[Any]) -> Read:
-    """Read one of some options; of a mapping its value, by the text that it stands under.
+    """Read one of some options; of a mapping, the value whose key the text is.
 
     Examples
     --------
@@ -343,7 +343,7 @@ def one_of(options: Iterable[Any]) -> Read:
 
 
 def some_of(options: Iterable[str], *, maximum: int | None = None) -> Read:
-    """Read several of some options; what is none of them is left out.
+    """Read several of some options; anything else is left out.
 
     Examples
     --------
@@ -362,7 +362,7 @@ def some_of(options: Iterable[str], *, maximum: int | None = None) -> Read:
 
 
 def _number(text: str) -> float:
-    if "_" in text or not text.isascii():  # which Python would take for digits, too
+    if "_" in text or not text.isascii():  # Python would accept these as digits, too
         raise ValueError(text)
     return float(text)
 
@@ -387,7 +387,7 @@ def number(low: float | None = None, high: float | None = None, *, whole: bool =
 
 
 def span(start: float, end: float) -> Read:
-    """Read two ascending numbers, as far as they lie between two others.
+    """Read two ascending numbers, clipped to a range.
 
     Examples
     --------
@@ -405,7 +405,7 @@ def span(start: float, end: float) -> Read:
 
 
 def words(texts: list[str]) -> str:
-    """Read a text of the user's."""
+    """Read a user's text, of limited length."""
     if len(texts[0]) > LONGEST:
         raise ValueError(texts[0][:LONGEST])
     return texts[0]

@@ -1,4 +1,4 @@
-"""From a recording to a diagnosis, and the views of the chain that it rests on; only the open one is computed."""
+"""From a recording to a diagnosis, with views of the processing chain behind it; only the open one is computed."""
 
 from __future__ import annotations
 
@@ -53,35 +53,35 @@ if TYPE_CHECKING:
 
 
 # --------------------
-# The chain of one analysis as a strip of small pictures, drawn of the recording that is open.
+# The chain of one analysis as a strip of small pictures, drawn from the open recording.
 # --------------------
 
 
 _strip = component_of("strip")
 WIDTH, HEIGHT, N = 100.0, 44.0, 120
 N_LOOKED_AT = 1 << 16
-"""Samples that are enough for a small picture."""
+"""Number of samples that suffice for a small picture."""
 ICONS = {
     "Machine": "M10 13H90M10 31H90M38 6V20M48 6V20M38 6H48M38 20H48M38 20V42H48V20M70 9V17M74 9V17M20 27V35M24 27V35",
     "Indicators": "M8 8H92M8 18H70M8 28H84M8 38H52",
     "Report": "M34 3H58L68 13V41H34ZM58 3V13H68M40 20H62M40 27H62M40 34H54",
 }
 FIRST_OF = {"tooth": "Average", "bearing": "Envelope", "resonance": "Map", "motion": "Starts and stops"}
-"""View that is open at first, by what the verdict is about."""
+"""View that is opened first, by the subject of the verdict."""
 
 
 def choose_view(analysis: Analysis, names: Sequence[str]) -> str:
-    """Return the view that the user chose; it is in the address, too."""
+    """Return the view that the user chose, which the address also names."""
     picture = verdict_picture(analysis)
     first = FIRST_OF.get(picture.about if picture is not None else "", "Order spectrum")
     if analysis.motion is not None:
         first = FIRST_OF["motion"]
     elif isinstance(analysis.shaft_angle, CannotTell):
-        # The form asks for the speed, of a machine that is described too.
+        # The form asks for the speed, even where the machine is described.
         first = "Machine" if analysis.rig is None or not analysis.rig.shafts else "Spectrum"
     chosen = address.chosen(state.TAB, "view", names, first if first in names else names[0])
     angle = analysis.shaft_angle
-    speed_rpm = None if isinstance(angle, CannotTell) else angle.mean_speed_rpm  # stated later, it makes more of them
+    speed_rpm = None if isinstance(angle, CannotTell) else angle.mean_speed_rpm  # stated later, it adds pictures
     items = _tiles(
         state.view_key(f"tiles {is_dark()} {speed_rpm} {analysis.rig and analysis.rig.key()}", analysis),
         tuple(names),
@@ -127,7 +127,7 @@ def _points(x: FloatArray, y: FloatArray) -> str:
 
 
 def _scaled(values: FloatArray, *, min_span: float = 0.0) -> FloatArray:
-    """Return heights of values in the picture; a span below `min_span` of their mean is not blown up."""
+    """Return the values' heights in the picture; a span below `min_span` of their mean is not magnified."""
     low, high = float(np.min(values)), float(np.max(values))
     half = max((high - low) / 2, min_span * abs(low + high) / 2) or 1.0
     return HEIGHT / 2 - (values - (low + high) / 2) / half * (HEIGHT / 2 - 3)
@@ -205,7 +205,7 @@ def _ring(channel: ChannelAnalysis) -> str:
 
 
 def _modes(values: FloatArray) -> str:
-    """Three parts of the signal by frequency, of equal energy, below each other."""
+    """Return paths of three frequency bands of the signal, of equal energy, one below the other."""
     lines = np.fft.rfft(values - values.mean())
     shares = np.cumsum(np.abs(lines) ** 2)
     borders = [0, *np.searchsorted(shares, shares[-1] * np.array([1, 2]) / 3), len(lines)]
@@ -220,7 +220,7 @@ def _modes(values: FloatArray) -> str:
 
 
 def _phase(values: FloatArray) -> str:
-    """Velocity over displacement of the slow part of the signal."""
+    """Return the path of velocity over displacement of the signal's low frequencies."""
     lines = np.fft.rfft(values - values.mean())
     lines[max(3, len(lines) // 12) :] = 0
     x = np.fft.irfft(lines, len(values))[:500]
@@ -251,13 +251,13 @@ def show_speed(analysis: Analysis) -> None:
 
 
 STARTS_AND_STOPS = (
-    "The machine starts and stops: spectra, orders and averages need a lasting speed. Backlash, impacts and forces "
-    "stand under Starts and stops, where the motion of both gears was recorded."
+    "The machine starts and stops: spectra, orders and averages need a sustained speed. Backlash, impacts and forces "
+    "are shown under Starts and stops if the motion of both gears was recorded."
 )
 
 
 def show_of_channel(analysis: Analysis, view: Callable[[Analysis, ChannelAnalysis], None]) -> None:
-    """Show a view of the channel that the user chooses; the first is the one that the verdict's picture is of."""
+    """Show a view of the channel that the user chooses; the default is the channel of the verdict's picture."""
     channels = {channel.channel: channel for channel in analysis.channels}
     if not channels:
         is_unsteady = any(finding.code == "start-stop" for finding in analysis.findings)
@@ -266,7 +266,7 @@ def show_of_channel(analysis: Analysis, view: Callable[[Analysis, ChannelAnalysi
     picture = verdict_picture(analysis)
     name = picture.channel.channel if picture is not None else next(iter(channels))
     if len(channels) > 1:
-        # By what comes first: another machine is another verdict, which may rest on another channel.
+        # Keyed by the default: another machine gives another verdict, which may rest on another channel.
         looks = {
             "key": state.view_key(f"{state.CHANNEL} {name}", analysis),
             "name": "channel",
@@ -323,7 +323,7 @@ def show_envelope(analysis: Analysis, channel: ChannelAnalysis) -> None:
 
 
 MOST_CHANNELS = 12
-"""Shown over time."""
+"""Maximum number of channels shown over time."""
 
 
 def show_channels(analysis: Analysis) -> None:
@@ -390,7 +390,7 @@ def show_indicators(analysis: Analysis) -> None:
         key, read = state.view_key(f"indicator {name}", analysis), address.some_of(known)
         chosen = address.ask(column.multiselect, label, known, key=key, name=name, first=[], read=read)
         kept = kept[kept[name].isin(chosen)] if chosen else kept
-    # at 800 pixels up to the gear; what the others repeat, or says nothing, takes no room
+    # at 800 pixels the columns up to the gear fit; those that repeat others or are empty take no room
     widths = {"indicator": 168, "value": 80, "unit": 56, "channel": 66, "of": 140, "band": 130}
     config: dict[str, Any] = {
         name: st.column_config.Column(width=px, pinned=name == "indicator") for name, px in widths.items()
@@ -406,7 +406,7 @@ def show_indicators(analysis: Analysis) -> None:
 
 
 def indicator_frame(indicators: tuple[Indicator, ...], compared: tuple[IndicatorChange | None, ...] = ()) -> DataFrame:
-    """Return indicators as a table, one per line; with changes also what they were in the reference."""
+    """Return a table of indicators, one per row; with changes, also the reference values and the changes in dB."""
     from pandas import DataFrame
 
     rows = [
@@ -434,7 +434,7 @@ def indicator_frame(indicators: tuple[Indicator, ...], compared: tuple[Indicator
 order_map_of = cached(6, "Computing the map …")(order_map)
 frequency_map_of = cached(6, "Computing the map …")(frequency_map)
 RUN_SHARE = 0.05
-"""A speed that changes by more of its mean is an axis of its own."""
+"""A speed that changes by more than this share of its mean is offered as an axis."""
 
 
 def show_map_over_time(analysis: Analysis, channel: ChannelAnalysis) -> None:
@@ -476,8 +476,8 @@ def show_map_over_time(analysis: Analysis, channel: ChannelAnalysis) -> None:
     key = state.view_key(f"map of {channel.channel} {lines} {along}", analysis)
     show_map(panel, key, also=also, shown=(0.0, highest))
     st.caption(
-        "Lines of the machine stand upright over order and lean over frequency and speed (a Campbell diagram, with "
-        "the mesh as rays); resonances stay at their frequency. Read level, speed and time under the pointer."
+        "Lines of the machine are vertical over order and slanted over frequency and speed (a Campbell diagram, with "
+        "the mesh as rays); resonances stay at their frequency. The pointer shows level, speed and time."
     )
 
 
@@ -490,7 +490,7 @@ def _mesh_orders(analysis: Analysis) -> list[float]:
 
 def _map_of(analysis: Analysis, channel: ChannelAnalysis, *, over_order: bool) -> OrderMap:
     angle, recording, name = analysis.shaft_angle, analysis.recording, channel.channel
-    assert not isinstance(angle, CannotTell)  # noqa: S101 - asked before
+    assert not isinstance(angle, CannotTell)  # noqa: S101 - checked before
     if over_order and channel.order_map is not None and channel.order_map.axis == "order":
         return channel.order_map
     if over_order:
@@ -516,8 +516,8 @@ def show_start_stop(analysis: Analysis) -> None:
 def show_report(analysis: Analysis, request: AnalysisRequest) -> None:
     """Offer the page that `gearsig report` writes, and the command that repeats the analysis."""
     st.markdown(
-        "One page: verdict, findings, figures, indicators, and where everything came from. As HTML it is one file that "
-        "opens without a network and holds no scripts; as PDF it is for printing, without the table of indicators."
+        "One page: verdict, findings, figures, indicators and provenance. The HTML is a single file that opens offline "
+        "and contains no scripts; the PDF is for printing and omits the table of indicators."
     )
     stem = safe_file_name(request.name).split(".")[0] or "recording"
     key = state.view_key("report", analysis)
@@ -535,8 +535,8 @@ def show_report(analysis: Analysis, request: AnalysisRequest) -> None:
 
 def _show_provenance(analysis: Analysis) -> None:
     rows = provenance_rows(analysis, "")
-    st.markdown("Where it came from:")
-    # a list of facts, whose names take little room
+    st.markdown("Provenance:")
+    # a list of facts with short names
     with st.container(key="provenance"):
         st.table({name: as_typed(text) for name, text in rows}, border="horizontal")
 
@@ -546,7 +546,7 @@ Whole = Callable[[Analysis], None]
 
 
 def _methods(view: str) -> dict[str, Of]:
-    """Return the methods of the table that belong to a view."""
+    """Return the methods of `METHODS` that belong to a view, by title."""
     return {method.title: partial(show_method, name) for name, method in METHODS.items() if method.view == view}
 
 
@@ -558,7 +558,7 @@ def _show_severity(analysis: Analysis, channel: ChannelAnalysis) -> None:
 
 
 MOTION = "Starts and stops"
-"""Of machines that start and stop, where the teeth could be examined."""
+"""View of machines that start and stop, if the teeth could be examined."""
 OF_RECORDING: dict[str, Whole] = {
     MOTION: show_start_stop,
     "Waveform": show_channels,
@@ -581,7 +581,7 @@ VIEWS = (MACHINE, "Waveform", "Speed", *OF_CHANNEL, "Indicators", REPORT)
 
 
 def show_views(analysis: Analysis, file: ChosenFile, chosen: Chosen) -> None:
-    """Show the chain as a strip of small pictures, and the one that is chosen in full."""
+    """Show the chain as a strip of small pictures, and the chosen one in full."""
     names = (MOTION, *VIEWS) if analysis.motion is not None else VIEWS
     name = choose_view(analysis, names)
     with st.container(key="view"):
@@ -590,7 +590,7 @@ def show_views(analysis: Analysis, file: ChosenFile, chosen: Chosen) -> None:
 
 @st.fragment
 def _show(name: str, analysis: Analysis, file: ChosenFile, request: AnalysisRequest) -> None:
-    """Show one view; what the user changes in it reruns only this."""
+    """Show one view; changes within it rerun only this view."""
     with address.of_part("view"):
         if name == MACHINE:
             show_machine(file, analysis.recording.channel_names)
@@ -603,7 +603,7 @@ def _show(name: str, analysis: Analysis, file: ChosenFile, request: AnalysisRequ
 
 
 def _show_one_of(methods: dict[str, Of], view: str, analysis: Analysis, channel: ChannelAnalysis) -> None:
-    """Show one of the methods of a view; the user chooses where there are several."""
+    """Show one method of a view; the user chooses if there are several."""
     name = next(iter(methods))
     if len(methods) > 1:
         page = MethodPage(analysis, channel, "")
@@ -617,7 +617,7 @@ def show() -> None:
     chosen = choose_recording()
     state.remember(chosen[1] if chosen is not None else None)
     if chosen is None:
-        st.info("Give a recording on the left, or begin with a sample.", icon=":material/upload_file:")
+        st.info("Choose a recording on the left, or start with a sample.", icon=":material/upload_file:")
         st.page_link(state.pages()["start"], label="Open a recording, or one of the samples", icon=":material/home:")
         return
     analysis = analysed(*chosen)
@@ -627,7 +627,7 @@ def show() -> None:
 
 
 def analysed(file: ChosenFile, chosen: Chosen) -> Analysis | None:
-    """Return the analysis; where the file or the machine stands against it, say so and offer to mend the machine."""
+    """Return the analysis; if the file or the machine prevents it, show why and offer to correct the machine."""
     try:
         return analysis_of(chosen.request, chosen.content, chosen.reference)
     except GearsigError as error:

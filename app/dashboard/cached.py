@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 # --------------------
-# Bytes from the browser to a recording, by way of a private folder that is gone afterwards.
+# From the browser's bytes to a recording, through a private folder that is deleted afterwards.
 # --------------------
 
 
@@ -62,7 +62,7 @@ def read_rig_text(text: str, name: str = "rig.toml") -> Rig | None:
 def read_content(
     content: bytes | Content, name: str, *, rig: Rig | None, sampling_rate_hz: float | None, speed: SpeedSource | None
 ) -> Recording:
-    """Read a recording from a file of this machine, e.g. a sample, or from the bytes of a file called `name`.
+    """Read a recording from a file on this computer, e.g. a sample, or from the bytes of a file called `name`.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def read_content(
     rig : Rig or None
     sampling_rate_hz : float or None
     speed : SpeedSource or None
-        Of files that do not state them.
+        For files that do not state them.
 
     Raises
     ------
@@ -88,7 +88,7 @@ def read_content(
 
 @contextmanager
 def _as_file(content: bytes | Content, name: str) -> Iterator[Path]:
-    """Give a file of this machine, or the bytes of one called `name` as a file that is gone afterwards."""
+    """Yield a file of this computer, or the bytes of one called `name` as a file that is deleted afterwards."""
     if isinstance(content, Path):
         yield content
         return
@@ -110,7 +110,7 @@ def _constant(speed_rpm: float | None) -> ConstantSpeed | None:
 
 
 def _stated_speed(request: AnalysisRequest) -> SpeedSource | None:
-    """Return what the user states of the speed: times of pulses, else a constant one."""
+    """Return the speed source that the user states: times of pulses, or else a constant speed."""
     from gearsig.recording import read_pulse_times
 
     pulses = request.pulses
@@ -122,7 +122,7 @@ def _stated_speed(request: AnalysisRequest) -> SpeedSource | None:
 
 @kept(6, "Reading …", key=lambda request, _, rig=None: (request, rig and rig.key()))
 def recorded(request: AnalysisRequest, content: Content, rig: Rig | None = None) -> Recording:
-    """Return a recording as requested; `rig` is for files without a rig file of their own.
+    """Return a recording as requested; `rig` is for files without their own rig file.
 
     Raises
     ------
@@ -135,24 +135,24 @@ def recorded(request: AnalysisRequest, content: Content, rig: Rig | None = None)
 
 
 def analysis_of(request: AnalysisRequest, content: Content, reference: Content | None = None) -> Analysis:
-    """Return the analysis of a recording; it is frozen, so that sessions may share it.
+    """Return the analysis of a recording; it is immutable, so that sessions may share it.
 
     Raises
     ------
     InputError
-        If the rig, the recording or the reference cannot be read, or not be analysed.
+        If the rig, the recording or the reference cannot be read or analysed.
     """
     size = _size(content) + (0 if reference is None else _size(reference))
     return (_large if size > 50_000_000 else _small)(request, content, reference)
 
 
-# Each holds its recording and several spectra, a few times the size of the file: of large ones fewer are kept.
+# Each analysis holds its recording and several spectra, a few times the file's size: fewer large ones are kept.
 def _size(content: bytes | Content) -> int:
     return content.stat().st_size if isinstance(content, Path) else len(content)
 
 
 def read_and_analyze(request: AnalysisRequest, content: Content, reference: Content | None = None) -> Analysis:
-    """Read rig, recording and reference, and analyse; of recordings longer than memory their most telling parts."""
+    """Read rig, recording and reference, and analyse; of recordings too long for memory, the most telling parts."""
     from gearsig.diagnosis import (
         REFERENCE_OPTIONS,
         LongAnalysis,
@@ -166,7 +166,7 @@ def read_and_analyze(request: AnalysisRequest, content: Content, reference: Cont
     then = None
     if reference is not None:
         with _as_file(reference, request.reference_name) as path, options_named(REFERENCE_OPTIONS):
-            # A sample's machine may have been mended in the form.
+            # A sample's machine may have been corrected in the form.
             its_rig, its_rate_hz = rig_and_rate_of_reference(
                 path, rig, rate_hz, request.reference_rate_hz, is_same_machine=True
             )
@@ -217,9 +217,9 @@ def _recent() -> dict[str, ChosenFile]:
 
 
 def remember_file(token: str, file: ChosenFile) -> None:
-    """Keep a file for a reload of its page; the oldest give way where they are too many or too large.
+    """Keep a file for a reload of its page; the oldest files are dropped if there are too many or too large ones.
 
-    All sessions share the place, so that it is bounded: a token that only one session knows opens its files alone.
+    All sessions share the store, so it is bounded; a token that one session alone knows opens only its own files.
     """
     files = _recent()
     files.pop(token, None)
@@ -233,7 +233,7 @@ def _kept_size(file: ChosenFile) -> int:
 
 
 def kept_file(token: str) -> ChosenFile | None:
-    """Return the file of a token, None where it has given way to others or was never there."""
+    """Return the file of a token, None if it was dropped or never kept."""
     return _recent().get(token)
 
 

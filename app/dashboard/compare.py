@@ -1,4 +1,4 @@
-"""A simulation beside a recording: choice, comparison, and what the page shows of it."""
+"""The comparison page: choice of a recording and a simulation, their comparison, and its figures."""
 
 from __future__ import annotations
 
@@ -69,12 +69,12 @@ from sims.machine import nominal_of
 from sims.presets import presets
 
 WELCOME = """
-Give a **recording** and its rig file, and a **simulation** of the machine: a file of any simulator, or one that is run
-here at the recording's speed. The page lays one over the other by order, band and angle, and says for every difference
-whether the records' own scatter explains it. For the cause of what differs, see the page *Gap*.
+Choose a **recording** and its rig file, and a **simulation** of the machine: a file from any simulator, or one run
+here at the recording's speed. The page overlays the two by order, band and angle, and says for each difference whether
+the records' own scatter explains it. For the cause of the differences, see the *Gap* page.
 """
 TWIN = "Set to the rig"
-"""Instead of a preset: the rig's own geometry, the rest usual for its size."""
+"""Instead of a preset: the rig's own geometry, with the rest typical for its size."""
 
 
 @dataclass(frozen=True)
@@ -106,34 +106,32 @@ Pairs = tuple[tuple[str, str], ...]
 def simulated_of(
     simulation: Simulation, request: AnalysisRequest, content: Content | None, recording: Recording
 ) -> Recording:
-    """Return the simulation for a recording, which `request` stands for.
+    """Return the simulation to compare with a recording, which `request` identifies.
 
-    A file without a rig of its own takes the gears of the recording's rig.
+    A file without its own rig takes the gears of the recording's rig.
 
     Raises
     ------
     GearsigError
-        If the speed is not known, the machine allows less, or the rig does not say enough for a twin.
+        If the speed is not known, exceeds what the machine allows, or the rig describes too little for a twin.
     """
     if isinstance(simulation, SimulationToCompare):
         return _simulated(simulation, request, recording)
-    assert content is not None  # noqa: S101 - a file has content, said to the type checker
+    assert content is not None  # noqa: S101 - a file has content; for the type checker
     rig = recording.rig
     return recorded(simulation, content, None if rig is None else for_simulation(rig))
 
 
 @kept(3, "Simulating …", key=lambda *arguments: repr(arguments[:2]))
 def _simulated(run: SimulationToCompare, request: AnalysisRequest, recording: Recording) -> Recording:
-    """Simulate the recording's machine at its speed and sampling rate; `request` stands for the recording."""
+    """Simulate the recording's machine at its speed and sampling rate; `request` identifies the recording."""
     del request
     rig = recording.rig
     speed_rpm = run.speed_rpm if run.speed_rpm is not None else speed_of(recording)
     rate_hz = min(max(recording.sampling_rate_hz, 4096.0), 102400.0)
     if run.machine == TWIN:
         if rig is None:
-            raise InputError(
-                "no rig is described that the simulator could be set to", remedy="give a rig file, or choose a preset"
-            )
+            raise InputError("there is no rig to set the simulator to", remedy="give a rig file, or choose a preset")
         torque_nm = run.torque_nm if run.torque_nm is not None else nominal_of(rig).torque_nm
         point = OperatingCondition(speed_rpm, torque_nm)
         twin = CrackedPair().twin_of(rig)
@@ -159,13 +157,13 @@ def compared(
     recording: Recording,
     simulated: Recording,
 ) -> Comparison:
-    """Return the comparison; `request` and `simulation` stand for the records."""
+    """Return the comparison of two records, which `request` and `simulation` identify."""
     del request, simulation
     return compare(simulated, recording, channels=pairs, align_by=align_by)
 
 
 def teeth_of(rig: Rig | None) -> dict[str, float]:
-    """Return the parameters that give a preset the rig's teeth: orders are compared, so they must be the same."""
+    """Return the preset parameters for the rig's tooth numbers, which must match because orders are compared."""
     if rig is None or len(rig.pairs) != 1:
         return {}
     pair = rig.pairs[0]
@@ -174,7 +172,7 @@ def teeth_of(rig: Rig | None) -> dict[str, float]:
 
 
 def speed_of(recorded: Recording) -> float:
-    """Return the mean speed of the driver in the recording.
+    """Return the mean speed of the driver in the recording, in rpm.
 
     Raises
     ------
@@ -193,7 +191,7 @@ def speed_of(recorded: Recording) -> float:
 
 
 def command_of(request: AnalysisRequest, simulation: Simulation, pairs: Pairs, align_by: str) -> str:
-    """Return the command that gives the same comparison outside the dashboard; empty for a simulation of this page."""
+    """Return the command that gives the same comparison outside the dashboard; empty if the page simulated."""
     if isinstance(simulation, SimulationToCompare):
         return ""
     words = ["gearsig", "compare", simulation.name, request.name, *stated_options(request)]
@@ -209,12 +207,12 @@ ORIGIN, MACHINE = "simulation of compare", "machine of compare"
 
 
 def choose_simulation() -> tuple[Simulation, Content | None] | None:
-    """Return what the recording is compared with, None while there is nothing.
+    """Return the simulation that the recording is compared with, None until one is chosen.
 
     Raises
     ------
     InputError
-        If a rig file is no text.
+        If a rig file is not text.
     """
     with st.sidebar:
         st.divider()
@@ -232,14 +230,14 @@ def choose_simulation() -> tuple[Simulation, Content | None] | None:
                 "Simulated signals",
                 "simulation file",
                 rig="Its rig file (TOML), if it has one",
-                about_rig="Without one it is read as the file states, with the gears of the recording's rig.",
+                about_rig="Without one, the file is read as it states, with the gears of the recording's rig.",
                 name="simulation_file",
             )
         return None if file is None else (file.request(), file.content)
 
 
 def choose_alignment(simulation: Simulation | None) -> str:
-    """Return how averages are aligned: by correlation where the simulation is made here, whose mark sits anywhere."""
+    """Return how averages are aligned, by default by correlation if the page simulates: its mark is arbitrary."""
     source = "made here" if isinstance(simulation, SimulationToCompare) else "of files"
     with st.sidebar:
         chosen = address.ask_one(
@@ -249,14 +247,14 @@ def choose_alignment(simulation: Simulation | None) -> str:
             first="correlation" if source == "made here" else "auto",
             name="align",
             key=state.source_key("comparison alignment", source),
-            help="Marks: angle 0 is the same tooth in both. Correlation: the simulation is turned to where the "
-            "averages fit best. Auto: marks for shafts that have one in both.",
+            help="Marks: angle 0 is the same tooth in both. Correlation: the simulation is rotated to where the "
+            "averages match best. Auto: marks for shafts that have one in both.",
         )
     return str(chosen)
 
 
 def choose_pairs(simulated: Recording, recorded: Recording) -> Pairs:
-    """Return the channels that are compared: those of equal names, or two that the user names."""
+    """Return the channels to compare: those with equal names, or two that the user chooses."""
     ours, measured = simulated.vibration_names(), recorded.vibration_names()
     common = [name for name in measured if name in ours]
     if common and len(measured) == len(common):
@@ -296,8 +294,8 @@ def _choose_run() -> SimulationToCompare:
         [TWIN, *known],
         format_func=title,
         name="machine",
-        help="Set to the rig: its teeth, module and face width, all else usual for its size. A preset keeps its own "
-        "geometry but takes the rig's teeth.",
+        help="Set to the rig: its teeth, module and face width; the rest is typical for its size. A preset keeps its "
+        "own geometry but takes the rig's tooth numbers.",
     )
     if machine != TWIN:
         st.caption(known[machine].title)
@@ -315,7 +313,7 @@ NAMES = ("recorded", "simulated")
 
 
 def show_comparison(comparison: Comparison, rig: Rig | None) -> None:
-    """Show what was set alike, verdict, findings, then one channel in figures that zoom together, and in numbers."""
+    """Show verdict, common settings and findings, then one channel in figures that zoom together and in numbers."""
     headline, *more = re.split(r"(?<=[;.]) ", comparison.verdict, maxsplit=1)
     st.subheader(f"{as_typed(headline.rstrip(';.'))}.", anchor=False)
     if more:
@@ -360,7 +358,7 @@ def show_alike(comparison: Comparison, rig: Rig | None) -> None:
 
 
 def _show_orders(comparison: Comparison, channel: ChannelComparison) -> None:
-    """Show both order spectra, and below them how far each line is off over the same orders."""
+    """Show both order spectra, and below them the difference of each line over the same orders."""
     spectra = channel.recorded_spectrum, channel.simulated_spectrum
     shown = (0.0, shown_orders(comparison))
     source = f"comparison {channel.name}"
@@ -372,7 +370,8 @@ def _show_orders(comparison: Comparison, channel: ChannelComparison) -> None:
     name = axis_label("order", comparison.reference_shaft)
     show_differences(at, off, beyond, name, f"lines of {source}", shown, "simulated − recorded")
     st.caption(
-        "Simulated less recorded, line by line; the floor is the records' own scatter. Zooming above zooms here."
+        "Simulated minus recorded, line by line; the floor is the records' own scatter. This figure zooms with the "
+        "one above."
     )
 
 
@@ -420,7 +419,7 @@ def _show_bands(comparison: Comparison, channel: ChannelComparison) -> None:
 
 
 def show_downloads(comparison: Comparison, command: str) -> None:
-    """Offer the page, the data and the lines, made when they are asked for."""
+    """Offer the report, the data and the lines, each made on request."""
     offer_page(
         "Report (HTML)", lambda: comparison_page(comparison, command=command).encode(), "compare.html", "comparison"
     )
@@ -452,9 +451,7 @@ def _show_lines(comparison: Comparison, channel: ChannelComparison) -> None:
         width="stretch",
     )
     reference = f", re 1 {unit_text(channel.unit)}" if channel.unit else ""
-    st.caption(
-        f"Levels are rms{reference}. ± is twice the standard error that follows from the halves of both records."
-    )
+    st.caption(f"Levels are rms{reference}. ± is twice the standard error, estimated from the halves of both records.")
 
 
 def show() -> None:

@@ -1,4 +1,4 @@
-"""Compiled code, made ahead of the first look: once an installation, beside the dashboard."""
+"""Code compiled ahead of its first use: once per installation, in the background of the dashboard."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from gearsig.cache import cache_folder, keep
 from gearsig.errors import GearsigError
 
 SERVER_FIRST_S = 5.0
-"""Loading compiled code would hold up the server and the first page that it shows."""
+"""Delay before compiled code is loaded, which would otherwise hold up the server and its first page."""
 _compiling: list[Thread] = []
 
 
 def begin() -> None:
-    """Compile what is not compiled yet in a process of its own, then load it into this one; returns at once."""
+    """Compile what is not yet compiled in a separate process, then load it into this one; returns at once."""
     mark = cache_folder("compiled") / _fingerprint()
     thread = Thread(target=_load if mark.exists() else _compile_and_load, args=(mark,), daemon=True)
     if not mark.exists():
@@ -29,23 +29,23 @@ def begin() -> None:
 
 
 def is_being_made() -> bool:
-    """Whether compiling goes on; who needs the code now had better wait than compile it a second time."""
+    """Whether compilation is in progress; callers that need the code should wait rather than compile it again."""
     return any(thread.is_alive() for thread in _compiling)
 
 
 def _compile_and_load(mark: Path) -> None:
-    # not a pool: the server would wait for that at its end
+    # not a pool: the server would wait for it on exit
     process = get_context("spawn").Process(target=compile_all, daemon=True)
     process.start()
     process.join()
     if process.exitcode == 0:
         keep(mark, lambda file: file.write(b"compiled\n"))
         run_every_model()
-    # else the first simulation compiles it, and says what is wrong
+    # otherwise the first simulation compiles the code and reports what is wrong
 
 
 def compile_all() -> None:
-    """Do what the start page offers first, an analysis, then what takes longer to compile."""
+    """Run the analysis that the start page offers first, then the simulators, which take longer to compile."""
     from app.samples import samples
     from gearsig.diagnosis import analyze_file
     from gearsig.recording import read_recording
@@ -65,7 +65,7 @@ def _load(_: Path) -> None:
 
 
 def run_every_model() -> None:
-    """Run both models of a gear pair for a moment, healthy and cracked, which compiles all that they need."""
+    """Run both models of a gear pair briefly, healthy and cracked, to compile everything they need."""
     from app.dashboard.laboratory.run import run_setup
     from app.dashboard.laboratory.setup import FIRST, MODELS, Setup
     from sims.effects import EffectSetting, completed
@@ -80,7 +80,7 @@ def run_every_model() -> None:
 
 
 def _fingerprint() -> str:
-    """Changes with whatever makes numba compile anew: its own version, and the sources."""
+    """Return a text that changes with whatever makes numba recompile: its version, its cache folder, the sources."""
     import gearsig
     import sims
 

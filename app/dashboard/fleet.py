@@ -1,4 +1,4 @@
-"""A fleet's store on the page: machines as a tree, indicators over time with limits and alarms, their recordings."""
+"""The fleet page: machines as a tree, indicators over time with limits and alarms, and their recordings."""
 
 from __future__ import annotations
 
@@ -49,21 +49,21 @@ STORE, EXAMPLE, MACHINE, POINT, SERIES = (
     "fleet indicator",
 )
 EXAMPLE_NAME = "example"
-"""Of the samples' own store in the address; folders of this machine are never opened by a link."""
+"""Name in the address of the store made from the samples; a link never opens folders of this computer."""
 N_MACHINES = 40
 Row = dict[Any, Any]
-"""Of a table of the store."""
+"""Row of a table of the store."""
 MARKS = {
     "alarm": ":red[:material/error:]",
     "warning": ":orange[:material/warning:]",
     "unknown": ":gray[:material/help:]",
     "ok": ":green[:material/check_circle:]",
 }
-"""Told apart by shape as well as by colour."""
+"""Distinguished by shape as well as by colour."""
 BADGES = {"alarm": "red", "warning": "orange", "unknown": "gray", "ok": "green"}
 HOW_TO_FILL = """
-There are no results in this folder yet. Recordings are added from the command line, as often as you like; what is
-known already is passed over:
+There are no results in this folder yet. Add recordings from the command line, as often as you like; recordings
+already in the store are skipped:
 """
 COMMANDS = """
 gearsig fleet add recordings --pattern '{machine}/{point}_{date:%Y%m%d}.csv' --dry-run
@@ -71,12 +71,12 @@ gearsig fleet add recordings --pattern '{machine}/{point}_{date:%Y%m%d}.csv'
 gearsig fleet watch incoming --pattern '{machine}/{point}_{date:%Y%m%d-%H%M}.csv'
 """.strip()
 ABOUT_COMMANDS = (
-    "`--dry-run` shows which machine, point and date each file is taken for; `watch` takes new files as they appear."
+    "`--dry-run` shows which machine, point and date each file is assigned to; `watch` adds new files as they appear."
 )
 
 
 def show() -> None:
-    """Choose a store, a machine and an indicator, show it over time; worst first throughout."""
+    """Let the user choose a store, a machine and an indicator, and show it over time; worst first throughout."""
     address.begin(EXAMPLE, "store", "", address.one_of((EXAMPLE_NAME, "")))
     store = st.session_state[EXAMPLE]
     address.keep("store", store, "")
@@ -88,10 +88,10 @@ def show() -> None:
             persist_state="session",
             on_change=_see,
             args=("",),
-            help="Where `gearsig fleet add` keeps its results; `GEARSIG_FLEET` names another one.",
+            help="Where `gearsig fleet add` keeps its results; `GEARSIG_FLEET` sets another default.",
         )
         if store == EXAMPLE_NAME:
-            st.caption("Shown is the example, made of the samples.")
+            st.caption("This is the example, made from the samples.")
             st.button("Close the example", icon=":material/close:", on_click=_see, args=("",))
     st.subheader("Fleet: machines over time", anchor=False)
     path = Path(example_store() if store == EXAMPLE_NAME else folder).expanduser()
@@ -120,7 +120,7 @@ def show() -> None:
 
 @kept(1, "Analysing half a year of three gearboxes …")
 def example_store() -> str:
-    """Return the folder of a store of the samples' own, which lasts as long as the dashboard."""
+    """Return the folder of a store made from the samples, which exists while the dashboard runs."""
     folder = Path(mkdtemp(prefix="gearsig-fleet-"))
     atexit.register(rmtree, folder, ignore_errors=True)
     write_example_fleet(folder / "recordings")
@@ -134,7 +134,7 @@ def _show_how_to_begin() -> None:
     st.markdown(HOW_TO_FILL)
     st.code(COMMANDS, language="bash", wrap_lines=True)
     st.markdown(ABOUT_COMMANDS)
-    about = "Three gearboxes made of the samples. Their recordings are analysed once, which takes about 20 s."
+    about = "Three gearboxes made from the samples. Their recordings are analysed once, which takes about 20 s."
     look = ":material/play_arrow:"
     st.button("See an example", type="primary", icon=look, help=about, on_click=_see, args=(EXAMPLE_NAME,))
 
@@ -151,7 +151,7 @@ def _show_counts(status: DataFrame) -> None:
 
 
 def _choose_point(status: DataFrame) -> tuple[str, str]:
-    """Show machines with their measuring points, the worst first; return the one that is looked at."""
+    """Show machines with their measuring points, the worst first; return the selected machine and point."""
     looks: dict[str, Any] = {"placeholder": "Part of a name"}
     searched = address.ask(st.text_input, "Machine", name="search", first="", read=address.words, **looks)
     shown = status[status["machine"].str.contains(searched, case=False, regex=False)]
@@ -179,7 +179,7 @@ def _choose_point(status: DataFrame) -> tuple[str, str]:
 
 
 def _point_button(row: Row, words: str, *, is_chosen: bool) -> None:
-    # never the primary colour: on it the mark's own would not be seen
+    # never the primary colour, on which the mark's own colour would be invisible
     name = f"**{as_typed(words)}**" if is_chosen else as_typed(words)
     st.button(
         f"{MARKS[row['level']]} {name}",
@@ -216,7 +216,7 @@ def _show_point(fleet: Fleet, row: Row) -> None:
         row = _choose_series(series, machine, point)
         over = _choose_over(fleet.recordings(machine, point))
         _show_trend(fleet, row, over)
-        with st.expander(f"All {len(series)} indicators, the worst first", icon=":material/table:"):
+        with st.expander(f"All {len(series)} indicators, worst first", icon=":material/table:"):
             show_table(_series_table(series))
     _show_recordings(fleet.recordings(machine, point).iloc[::-1], f"{machine!r} {point!r}")
 
@@ -224,7 +224,7 @@ def _show_point(fleet: Fleet, row: Row) -> None:
 def _choose_series(series: DataFrame, machine: str, point: str) -> Row:
     rows = series.to_dict("records")
     key = state.source_key(SERIES, f"{machine!r} {point!r}")
-    label = "Indicator, the worst first"
+    label = "Indicator, worst first"
     names = [_series_name(row) for row in rows]
     address.begin(key, "indicator", 0, address.one_of({name: i for i, name in enumerate(names)}))
     place = st.selectbox(label, range(len(rows)), format_func=lambda i: _series_text(rows[i]), key=key) or 0
@@ -252,12 +252,12 @@ def _series_table(series: DataFrame) -> dict[str, list[Any]]:
         "limit": [row["upper_limit"] for row in rows],
         "unit": [unit_text(row["unit"]) for row in rows],
         "since": [row["since"] for row in rows],
-        "limits by": [row["basis"] for row in rows],
+        "basis of limits": [row["basis"] for row in rows],
     }
 
 
 def _choose_over(recordings: DataFrame) -> str:
-    """Return what the indicator is shown over: the date, or what the recordings state of load and speed."""
+    """Return the axis that the indicator is shown over: the date, or the load or speed that the recordings state."""
     known = [name for name, column in CONDITIONS.items() if recordings[column].max() > recordings[column].min()]
     if not known:
         return "date"
@@ -269,7 +269,7 @@ def _choose_over(recordings: DataFrame) -> str:
 
 
 def _show_trend(fleet: Fleet, row: Row, over: str) -> None:
-    """Show one indicator over time, load or speed, in the band of its limits, with what lies beyond marked."""
+    """Show one indicator over time, load or speed, with the band of its limits and the values beyond it marked."""
     only = {name: row[name] for name in ("point", "channel", "place", "computed_on")}
     if over == "date":
         trends = fleet.trend(row["machine"], row["name"], **only)
@@ -286,7 +286,7 @@ def _show_trend(fleet: Fleet, row: Row, over: str) -> None:
 
 
 def _show_recordings(recordings: DataFrame, of: str) -> None:
-    """Offer the recordings of a measuring point, the latest first; open one in the analysis page."""
+    """Offer the recordings of a measuring point, latest first; open one on the analysis page."""
     rows = recordings.to_dict("records")
     dates = [f"{row['date']:%Y-%m-%dT%H:%M}" for row in rows]
     looks: dict[str, Any] = {"name": "recording", "first": 0, "key": state.source_key("fleet recording", of)}
@@ -306,12 +306,12 @@ def _recording_text(row: Row) -> str:
 
 
 def _file_of(path: Path) -> ChosenFile:
-    """Return a recording of the store as the analysis page takes a file, with the rig file that lies beside it.
+    """Return a recording of the store as a file for the analysis page, with the rig file next to it.
 
     Raises
     ------
     InputError
-        If it is not there any more.
+        If it no longer exists or cannot be read.
     """
     try:
         digest = sha256_of(path)
@@ -321,6 +321,6 @@ def _file_of(path: Path) -> ChosenFile:
         raise InputError(
             "cannot be read: the store keeps results, not the recordings",
             where=str(path),
-            remedy="bring the file back to its place",
+            remedy="put the file back in its place",
         ) from None
     return ChosenFile(path.name, digest, path, beside.name if beside is not None else "rig.toml", text)

@@ -1,4 +1,4 @@
-"""Gears of finite elements: one that is turned, a pair with maps and sweeps, three publications beside the models."""
+"""Finite-element gears: one gear to rotate, a pair with maps and sweeps, three publications beside the models."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ from sims.simulator import SimulationSetup
 
 _solid = component_of("solid")
 DOF = 30_000
-"""Of the mesh that is turned: what a browser draws thirty times a second."""
+"""Degrees of freedom of the mesh to rotate: as many as a browser draws thirty times a second."""
 STRESS = "stress"
 """Shown instead of a mode."""
 SWING = 0.05
-"""Greatest motion of a mode as it is drawn, over the tip radius."""
+"""Maximum motion of a mode as drawn, relative to the tip radius."""
 
 
 @dataclass(frozen=True)
@@ -44,10 +44,10 @@ class SolidView:
     Parameters
     ----------
     nodes : array of int, (n,)
-        Of a sector, that its surface shows.
+        Of a sector, those on its visible surface.
     points_mm : array, (n_teeth · n, 3)
     quads : array of int, (n_quads, 4)
-        Into the points.
+        Indices into the points.
     """
 
     nodes: np.ndarray
@@ -56,7 +56,7 @@ class SolidView:
 
 
 def solid_view(study: GearBodyStudy) -> SolidView:
-    """Return what is seen of the study's gear from all sides."""
+    """Return the outer surface of the study's whole gear."""
     faces = fe_gear.outer_faces(study.mesh)
     nodes, inverse = np.unique(faces, return_inverse=True)
     n_teeth = study.mesh.blank.n_teeth
@@ -67,7 +67,7 @@ def solid_view(study: GearBodyStudy) -> SolidView:
 
 @kept(3, "Meshing the gear, finding its modes …")
 def studied(blank: GearBlank, held: fe_gear.Held, force_n: float) -> tuple[GearBodyStudy, SolidView]:
-    """Mesh, modes and stress of one gear, done once for equal requests."""
+    """Return mesh, modes and stress of one gear, computed once for equal requests."""
     study = gear_body.study_gear(blank, DOF, n_modes=2 * gear_body.N_SHOWN, held=held, force_n=force_n)
     return study, solid_view(study)
 
@@ -89,12 +89,12 @@ def choose_blank() -> tuple[GearBlank, fe_gear.Held, float]:
 
 
 def show_gear() -> None:
-    """One gear: its modes and the stress of a pushed tooth, to be turned."""
+    """Show one gear to rotate, with its modes and the stress of a loaded tooth."""
     study, view = studied(*choose_blank())
     names = [gear_body.label(study, k) for k in range(min(gear_body.N_SHOWN, len(study.modes.frequencies_hz)))]
     labels = {str(k): f"Mode {k + 1}: {name}" for k, name in enumerate(names)}
-    labels |= {STRESS: "Stress of a pushed tooth"} if study.mesh.size.order > 1 else {}
-    key = f"shown of a gear {list(labels.values())}"  # a browser goes on showing the words of another gear
+    labels |= {STRESS: "Stress of a loaded tooth"} if study.mesh.size.order > 1 else {}
+    key = f"shown of a gear {list(labels.values())}"  # else the browser keeps the previous gear's labels
     so_far = address.now("shown")
     st.session_state.setdefault(key, so_far if so_far in labels else "0")
     looks = {"name": "shown", "format_func": labels.__getitem__, "key": key}
@@ -122,26 +122,26 @@ def show_gear() -> None:
             "swings": shown != STRESS,
             "colours": level_colours(dark=is_dark())[50:240:24].tolist(),
             "legend": legend,
-            "help": "Drag or arrow keys turn it, + and − or the wheel zoom.",
+            "help": "Drag or use the arrow keys to rotate, + and − or the wheel to zoom.",
             "words": f"Gear of {study.mesh.blank.n_teeth} teeth: {labels[shown]}",
         },
     )
     with st.expander("Numbers", key="gear numbers"):
         st.markdown("  \n".join(as_typed(line) for line in gear_body.lines(study)))
-    coarse = "The mesh is coarse, so that the picture turns smoothly"
-    coarse += "; what that costs stands under Numbers." if study.discretisation else "."
-    st.caption(f"{coarse} {gear_body.PEAKS if shown == STRESS else 'The motion is drawn much too large.'}")
+    coarse = "The mesh is coarse so that the picture rotates smoothly"
+    coarse += "; the resulting error is given under Numbers." if study.discretisation else "."
+    st.caption(f"{coarse} {gear_body.PEAKS if shown == STRESS else 'The motion is greatly exaggerated.'}")
 
 
 @kept(4, "Running both sweeps …")
 def pair_studied(preset: str, torque_nm: float, sweep_s: float) -> pair_study.Study:
-    """Maps, sweeps and spectra of a pair, done once for equal requests."""
+    """Return maps, sweeps and spectra of a pair, computed once for equal requests."""
     ready = ReducedPair().prepare(SimulationSetup(preset, {}), np.random.default_rng(0))
     return pair_study.flexible_study(ready.pair, torque_nm, (torque_nm,), sweep_s=sweep_s, step_s=ready.step_s)
 
 
 VIEWS = {
-    "sweeps": ("Sweeps", "Speed swept up and down: where both part, the motion jumps"),
+    "sweeps": ("Sweeps", "Speed swept up and down: where the two differ, the motion jumps"),
     "stiffness_map": ("Mesh stiffness", "Mesh stiffness over angle and torque"),
     "transmission_error_map": ("Transmission error", "Static transmission error over angle and torque"),
     "pair_stiffness_map": ("Contact stiffness", "Contact stiffness of one pair of teeth"),
@@ -153,8 +153,8 @@ VIEWS = {
 
 
 def show_pair() -> None:
-    """A pair: what is looked at, of maps, sweeps with jumps, spectra."""
-    names = sorted(presets("reduced-fe"), key=lambda name: "light" not in name)  # first the one whose teeth part
+    """Show a chosen view of a pair: maps, sweeps with jumps, or spectra."""
+    names = sorted(presets("reduced-fe"), key=lambda name: "light" not in name)  # first the one whose teeth separate
     left, middle, right = st.columns((2, 1, 1))
     looks: dict[str, Any] = {"name": "pair", "format_func": lambda name: presets("reduced-fe")[name].title}
     preset = address.ask_one(left.selectbox, "Pair", names, **looks)
@@ -174,12 +174,12 @@ def show_pair() -> None:
         jumps_hz = {way: row[f"jump_{way}_hz"] for way in ("up", "down")}
         jumps = ", ".join(f"{way}: {f'jump at {hz:.0f} Hz' if hz else 'no jump'}" for way, hz in jumps_hz.items())
         st.caption(f"Torsional mode {row['torsional_mode_hz']:.0f} Hz. Sweep {jumps}. {row['n_steps']:,} steps.")
-    st.caption("Short sweeps load the teeth by the rotors' inertia, more on the way up than on the way down.")
+    st.caption("In short sweeps the rotors' inertia loads the teeth, more on the way up than on the way down.")
     download("Sweeps as CSV", pair_study.sweeps_csv(study).encode(), "sweeps.csv")
 
 
 def show_run_up(run_up: OrderMap) -> None:
-    """Show levels over order and time, with the speed under the pointer."""
+    """Show levels over order and time, with the speed at the pointer."""
     unit = decibel_text(run_up.unit)
     levels = decibels(run_up.values, run_up.scaling, run_up.unit)
     panel = LevelPanel(levels, run_up.positions, run_up.time_s, run_up.axis_label, "time (s)", unit)
@@ -193,12 +193,12 @@ def show_run_up(run_up: OrderMap) -> None:
 
 @kept(3, "Computing every figure: one to two minutes …")
 def computed(name: str) -> Paper:
-    """Return the figures of a publication, done once."""
+    """Return the figures of a publication, computed once."""
     return paper(name)
 
 
 def show_publications() -> None:
-    """Choose a publication; its figures are computed when asked for."""
+    """Let the user choose a publication; its figures are computed on request."""
     looks: dict[str, Any] = {"name": "publication", "format_func": PAPERS.__getitem__}
     name = address.ask_one(st.selectbox, "Publication", list(PAPERS), **looks)
     looks = {"name": "computed", "first": False, "read": address.one_of((False, True)), "key": f"{name} is computed"}
@@ -229,7 +229,7 @@ def show() -> None:
     """Choose one gear, a pair or a publication; show it."""
     st.subheader("Flexible gears", anchor=False)
     st.caption(
-        "Gears of finite elements: modes and stress of one, jumps and maps of a pair, three publications recomputed."
+        "Finite-element gears: modes and stress of one gear, jumps and maps of a pair, three publications recomputed."
     )
     looks = {"name": "view", "label_visibility": "collapsed"}
     TABS[address.ask_one(st.segmented_control, "What is shown", list(TABS), **looks)]()

@@ -13,7 +13,7 @@ from app.dashboard.widgets.texts import show_error
 from gearsig.errors import GearsigError
 
 FOLDER = Path(__file__).parent
-# Modules by their names, which are the pages' addresses; each is imported when it is first opened.
+# Module name, which is also the page's address, → title and icon; a module is imported when its page is first opened.
 PAGES = {
     "start": ("Start", "home"),
     "analysis": ("Analysis", "troubleshoot"),
@@ -26,7 +26,7 @@ PAGES = {
 
 
 def show(name: str) -> None:
-    """Show a page; what stands against it is said in its place."""
+    """Show a page, or in its place the error that prevents it."""
     try:
         import_module(f"app.dashboard.{name}").show()
     except GearsigError as error:

@@ -1,9 +1,9 @@
-// What a page adds to its bare address before the user has done anything takes the bare address's place: Back has one
-// step for each thing that was done.
+// What a page adds to its bare address before the user has done anything replaces the bare address: Back has one step
+// for each user action.
 if (!history.hasOneStepEach) {
   history.hasOneStepEach = true;
   const push = history.pushState.bind(history), replace = history.replaceState.bind(history);
-  let isNew = true; // the page, and nothing was done on it
+  let isNew = true; // nothing has been done on the page yet
   for (const kind of ["pointerdown", "keydown"]) addEventListener(kind, () => (isNew = false), true);
   history.pushState = (state, title, url) => {
     const isOther = new URL(url, location).pathname !== location.pathname;
@@ -11,7 +11,7 @@ if (!history.hasOneStepEach) {
     isNew ||= isOther;
   };
 
-  // What is shown of other numbers than the sliders beside it stand at fades at once, not when the server hears of it.
+  // Results for other values than those of the sliders fade at once, not only when the server notices.
   const stands = (key) => document.querySelector(`.${CSS.escape(key)} input[type=range]`);
   const isAway = ([key, value]) => {
     const slider = stands(key);

@@ -1,4 +1,4 @@
-"""The start page: one's own recording, three things to try, and the samples."""
+"""The start page: the user's own recording, three things to try, and the samples."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def path(x: FloatArray, y: FloatArray, colour: str, *, width: float = 2.0, close
 
 
 def ring_of_teeth() -> str:
-    """Return the ring of teeth with one that stands out."""
+    """Return SVG paths of a ring of teeth in which one tooth stands out."""
     turn = np.linspace(0, 2 * np.pi, 900, endpoint=False)
     noise = np.sin(29 * turn) * 2.0 + np.sin(58 * turn + 1) * 1.2 + np.sin(7 * turn) * 0.8
     away = np.abs(turn - 2.46)
@@ -41,7 +41,7 @@ def ring_of_teeth() -> str:
 
 
 def crack_dial() -> str:
-    """Return two teeth with a crack in a root, over a dial."""
+    """Return SVG of two teeth with a crack in a root, above a slider."""
     teeth = "M60 84V62C68 58 72 46 76 22H104C108 46 112 58 120 62H136C144 58 148 46 152 22H180C184 46 188 58 196 62V84"
     return (
         f'<path d="{teeth}" fill="none" stroke="{BLUE}" stroke-width="2.2"/>'
@@ -53,7 +53,7 @@ def crack_dial() -> str:
 
 
 def two_spectra() -> str:
-    """Return lines of a simulation beside those of a recording, which has sidebands."""
+    """Return SVG of a simulation's spectral lines beside those of a recording, which has sidebands."""
     lines = [(60, 60, 0), (140, 78, 1), (220, 44, 2)]
     made = ""
     for at, height, n in lines:
@@ -67,21 +67,21 @@ def two_spectra() -> str:
 TO_TRY: tuple[tuple[str, str, str, Callable[[], str], str], ...] = (
     (
         "Find the damaged tooth",
-        "A recording beside one of the same gearbox when it was healthy: which tooth, how sure, on what evidence.",
+        "A recording compared with one of the same gearbox when healthy: which tooth, how certain, on what evidence.",
         "Open the recording",
         ring_of_teeth,
         "analysis",
     ),
     (
         "Dial a crack into a gearbox",
-        "A simulated pair that follows its sliders: pull the crack to 4\u00a0mm and watch the sensors.",
+        "A simulated gear pair that responds to sliders: set the crack to 4\u00a0mm and watch the sensors.",
         "Open the laboratory",
         crack_dial,
         "laboratory",
     ),
     (
         "Why does my simulation differ?",
-        "A recording against the simulation of its rig: where they differ, which effect is missing, what it explains.",
+        "A recording against a simulation of its rig: where they differ, which effect is missing, what it explains.",
         "Find the reason",
         two_spectra,
         "gap",
@@ -90,7 +90,7 @@ TO_TRY: tuple[tuple[str, str, str, Callable[[], str], str], ...] = (
 
 
 def show() -> None:
-    """Show mark and purpose, own and recent files, three things to try, samples."""
+    """Show the title and purpose, the user's own and recent files, three things to try, and samples."""
     st.html(
         '<div class="hero"><h1>Gear vibration, from the recording to the reason</h1>'
         "<p>gearsig reads a recording, names the damaged tooth or bearing with its evidence, and says why a simulation "
@@ -115,22 +115,22 @@ def show() -> None:
 
 
 def show_own() -> None:
-    """Take a recording of the user's, with its rig file if there is one, or one of those that were open last."""
+    """Take a recording from the user, with its rig file if there is one, or one of those opened last."""
     words, files = st.columns((5, 7), gap="medium", vertical_alignment="center")
     with words:
         st.subheader("Open your own recording", anchor=False)
         st.caption(
-            "With its rig file (TOML), if you have one: give both at once. Without one, the machine is described in a "
-            "form afterwards. Files stay on this machine."
+            "If you have a rig file (TOML), add both at once. Without one, describe the machine in a form afterwards. "
+            "Files stay on this computer."
         )
         tokens = state.tokens(state.RECORDING_FILE)
         for kept in [file for token in tokens if (file := kept_file(token)) is not None][:5]:
             if st.button(as_typed(kept.name), key=f"recent {kept.sha256}", icon=":material/history:", type="tertiary"):
                 open_own(kept)
     with files:
-        file, has_rig = choose_with_rig("Recording, and its rig file", "start file", about=f"{FORMAT_NAMES}.")
+        file, has_rig = choose_with_rig("Recording and its rig file", "start file", about=f"{FORMAT_NAMES}.")
         if file is None and has_rig:
-            st.caption(":material/upload_file: Now the recording that the rig file belongs to.")
+            st.caption(":material/upload_file: Now add the recording that this rig file describes.")
         elif file is not None and has_rig:
             open_own(file)
         elif file is not None:
@@ -141,14 +141,14 @@ def show_own() -> None:
 
 
 def open_own(file: ChosenFile) -> None:
-    """Go on with a file on the analysis page."""
+    """Open a file on the analysis page."""
     open_file(file)
     state.go_to("analysis")
 
 
 def show_samples() -> None:
-    """Show the samples that show most."""
-    st.subheader("Samples, each with what it shows", anchor=False)
+    """Show the first `N_SHOWN` samples, which are the most instructive."""
+    st.subheader("Samples and what each one shows", anchor=False)
     with st.container(key="samples", gap="small"):
         shown = samples()[:N_SHOWN]
         for first in range(0, len(shown), 2):

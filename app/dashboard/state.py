@@ -21,12 +21,12 @@ OF_LABORATORY = "Laboratory"
 _CHOSEN, _SIMULATED, _FILES, _OPENED, _TOKENS = "chosen", "simulated", "kept files", "opened files", "tokens"
 _GAP_STARTS, _PAGES = "gap starts", "pages"
 Content = Path | memoryview
-"""Of a file: on this machine, or in memory."""
+"""Content of a file: a path on this computer, or bytes in memory."""
 
 
 @dataclass(frozen=True)
 class PulseFile:
-    """Times of tachometer pulses that the user gives beside a recording.
+    """Times of tachometer pulses that the user gives with a recording.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class PulseFile:
 
 @dataclass(frozen=True)
 class AnalysisRequest:
-    """A recording and everything else that decides its analysis: equal requests have equal answers.
+    """A recording and everything else that determines its analysis: equal requests give equal answers.
 
     Parameters
     ----------
@@ -53,17 +53,17 @@ class AnalysisRequest:
     sha256 : str
         Of the file's bytes.
     rig_name, rig_text : str
-        A rig file; an empty text for none.
+        Name and text of the rig file; an empty text for none.
     sampling_rate_hz, speed_rpm : float or None
-        What the user states of a file that does not.
+        Stated by the user for a file that does not state it.
     reference_name, reference_sha256 : str
-        Of the recording that is compared with; empty for none.
+        Of the recording it is compared with; empty for none.
     torque_nm : float or None
-        What the user states where the rig does not.
+        Stated by the user in place of the rig's.
     reference_rate_hz : float or None
-        Sampling rate that the user states of the reference, where it is another one than the recording's.
+        Sampling rate that the user states for the reference, if it differs from the recording's.
     pulses : PulseFile or None
-        What tells the speed, in place of what the rig or the file says.
+        Source of the speed, in place of what the rig or the file states.
     """
 
     name: str
@@ -81,7 +81,7 @@ class AnalysisRequest:
 
 @dataclass(frozen=True)
 class Chosen:
-    """A request, and where its bytes are: files of this machine (samples), or in memory (uploads)."""
+    """A request and its content: files on this computer (samples), or bytes in memory (uploads)."""
 
     request: AnalysisRequest
     content: Content
@@ -90,7 +90,7 @@ class Chosen:
 
 @dataclass(frozen=True)
 class ChosenFile:
-    """A recording that the user chose, a sample or a file of their own, with the text of its rig file; or a rig file.
+    """A recording that the user chose, a sample or their own file, with the text of its rig file; or a rig file.
 
     Parameters
     ----------
@@ -108,32 +108,32 @@ class ChosenFile:
     pulses: PulseFile | None = None
 
     def request(self, *, sampling_rate_hz: float | None = None, speed_rpm: float | None = None) -> AnalysisRequest:
-        """Return the request to read it, with what the file does not state."""
+        """Return the request to read it, with the values that the file does not state."""
         known = self.name, self.sha256, self.rig_name, self.rig_text
         return AnalysisRequest(*known, sampling_rate_hz, speed_rpm, pulses=self.pulses)
 
 
 def pages() -> dict[str, StreamlitPage]:
-    """Return the pages of the dashboard by their modules, as this run of `main` lists them."""
+    """Return the pages of the dashboard by module name, as this run of `main` lists them."""
     kept: dict[str, StreamlitPage] = st.session_state.setdefault(_PAGES, {})
     return kept
 
 
 def go_to(page: str) -> None:
-    """Show another page, of that module."""
+    """Switch to the page of a module."""
     st.switch_page(pages()[page])
 
 
 def token_of(kind: str, sha256: str, known: str = "") -> str:
-    """Return what names an own file in the addresses of this session, and is guessed by nobody else.
+    """Return the token that names a user's file in the addresses of this session; nobody else can guess it.
 
     Parameters
     ----------
     kind : str
-        What the file is given for: the same file may be kept with a machine here and without one there.
+        The file's purpose: the same file may be kept with a machine for one and without one for another.
     sha256 : str
     known : str
-        The token that the page's address names the file by, where this session begins with it.
+        The token that already names the file in the page's address, if the session starts from that address.
     """
     token: str = _tokens().setdefault((kind, sha256), known or secrets.token_urlsafe(16))
     return token
@@ -155,7 +155,7 @@ def remember(chosen: Chosen | None) -> None:
 
 
 def chosen() -> Chosen | None:
-    """Return what was chosen last in this session, on whatever page."""
+    """Return what was chosen last in this session, on any page."""
     result: Chosen | None = st.session_state.get(_CHOSEN)
     return result
 
@@ -178,14 +178,14 @@ def start_gap() -> None:
 
 
 def take_start_of_gap() -> bool:
-    """Return whether the gap page is to start by itself, once."""
+    """Return, once, whether the gap page should start automatically."""
     return bool(st.session_state.pop(_GAP_STARTS, False))
 
 
 def carry_over(key: str, default: object = None) -> None:
-    """Let a widget that several pages show keep its value from one to the next.
+    """Let a widget that several pages share keep its value from one page to the next.
 
-    On a page that is shown for the first time, Streamlit gives a widget its own default, whatever the session holds.
+    When a page is first shown, Streamlit gives a widget its default, whatever the session holds.
     """
     if key in st.session_state or default is not None:
         st.session_state[key] = st.session_state.get(key, default)
@@ -203,7 +203,7 @@ def open_files(kind: str, files: tuple[ChosenFile, ...]) -> None:
 
 
 def uploader_key(kind: str) -> str:
-    """Return the key of an uploader of one kind, another one whenever files were opened in place of its own."""
+    """Return the key of an uploader of one kind, which changes whenever files are opened in place of its own."""
     n_opened = st.session_state.get(source_key(_OPENED, kind), 0)
     return f"{kind} {n_opened}" if n_opened else kind
 
@@ -215,7 +215,7 @@ def kept_files(kind: str) -> tuple[ChosenFile, ...]:
 
 
 def zooms() -> dict[str, list[float]]:
-    """Return what the figures of this session were zoomed to, by their keys."""
+    """Return the zoomed ranges of this session's figures, by their keys."""
     kept: dict[str, list[float]] = st.session_state.setdefault(ZOOMS, {})
     return kept
 
@@ -226,7 +226,7 @@ def source_key(name: str, source: str) -> str:
 
 
 def view_key(name: str, source: Analysis | str) -> str:
-    """Key of a widget that shows one recording: its choices do not outlive the recording; or one view by its name."""
+    """Key of a widget that shows one recording, so that its choices end with that recording, or one named view."""
     if isinstance(source, str):
         return source_key(name, source)
     recording = source.recording

@@ -1,4 +1,4 @@
-"""The page's colours: in the terms of Streamlit's settings, and of its own figures on light and dark ground."""
+"""The page's colours: Streamlit's theme settings, and those of its own figures on light and dark backgrounds."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import streamlit as st
 from gearsig.plot import CURSOR_COLOURS, FAULT, MEASURED, QUIET
 
 DARK_PAPER = "#15171B"
-"""Ground of the dark page; figures that are turned over end on it."""
+"""Background of the dark page, and of figures inverted for it."""
 
 THEME_OPTIONS = (
     "theme.light.primaryColor=#0072B2",
@@ -19,7 +19,7 @@ THEME_OPTIONS = (
 )
 
 # --------------------
-# Colours of the page's own figures: those of the reports, and lighter ones of the same hues on dark ground.
+# Colours of the page's own figures: those of the reports, and lighter ones of the same hues on dark backgrounds.
 # --------------------
 
 

@@ -1,4 +1,4 @@
-"""Work that may take longer than a moment: in a thread beside the page, kept for equal requests, and cancelled."""
+"""Longer computations: run in a thread beside the page, cached for equal requests, and cancelled on demand."""
 
 from __future__ import annotations
 
@@ -25,25 +25,25 @@ from app.dashboard.compiled import is_being_made
 P = ParamSpec("P")
 R = TypeVar("R")
 LOOK_EVERY_S = 0.05
-"""A page that waits hears of clicks and sliders as often."""
+"""Interval at which a waiting page checks for clicks and slider changes."""
 SPINNER_AFTER_S, CANCEL_AFTER_S = 0.4, 2.0
-"""What takes less has neither: to put them in and to take them away is the browser's work, too."""
+"""Shorter work shows neither spinner nor Cancel: inserting and removing them also costs the browser time."""
 GRACE_S = 2.0
-"""What no page waits for any more goes on for so long, in case that somebody comes back to it."""
+"""How long work continues after the last page stopped waiting for it, in case somebody comes back."""
 _CANCELLED = "cancelled work"
 
 
 class Cancelled(BaseException):
-    """Raised inside of work that is not wanted any more; like `KeyboardInterrupt`, no error."""
+    """Raised inside work that is no longer wanted; like `KeyboardInterrupt`, it is not an error."""
 
 
 class Work(Generic[R]):
-    """A computation in a thread of its own.
+    """A computation in its own thread.
 
     Parameters
     ----------
     compute : callable
-        Without arguments; may raise, and be stopped wherever a key press (Ctrl-C) could stop it.
+        Takes no arguments; may raise, and may be stopped wherever Ctrl-C could stop it.
     """
 
     def __init__(self, compute: Callable[[], R]) -> None:
@@ -66,12 +66,12 @@ class Work(Generic[R]):
             self._result = None
 
     def wait(self, seconds: float | None = None) -> bool:
-        """Wait until it is complete, at most so long; whether it is."""
+        """Wait until it is complete, or for at most `seconds`; return whether it is complete."""
         self._thread.join(seconds)
         return not self._thread.is_alive()
 
     def cancel(self) -> None:
-        """Stop it at its next step in Python: compiled kernels, imports and compilations end first."""
+        """Stop it at its next step in Python: compiled kernels, imports and compilations finish first."""
         with self._lock:
             if self._is_over or self.is_cancelled:
                 return
@@ -94,7 +94,7 @@ class Work(Generic[R]):
         return not self._thread.is_alive() and (self._error is not None or self.is_cancelled)
 
     def result(self) -> R:
-        """Return what came out, once it is complete; raise what it raised."""
+        """Return the result once it is complete, or raise the error it raised."""
         if self._error is not None:
             raise self._error
         if self.is_cancelled:
@@ -103,7 +103,7 @@ class Work(Generic[R]):
 
 
 def _may_hold_a_lock(frame: FrameType | None) -> bool:
-    """Whether a thread is importing, compiling, or taking a lock: broken off there, it could keep the lock for ever."""
+    """Whether a thread is importing, compiling, or taking a lock: interrupted there, it might never release a lock."""
     if frame is not None and frame.f_code.co_filename.endswith("threading.py"):
         return frame.f_code.co_name not in ("join", "_wait_for_tstate_lock")
     while frame is not None:
@@ -120,7 +120,7 @@ def _later(seconds: float, function: Callable[[], None]) -> None:
 
 
 def let_user_act() -> None:
-    """End this run of the page if the user has done something meanwhile: Streamlit does so where its state is used."""
+    """End this run of the page if the user has acted meanwhile: Streamlit does so whenever its state is accessed."""
     st.session_state.get(_CANCELLED)
 
 
@@ -129,17 +129,17 @@ _is_tidied_soon = Event()
 
 
 def collect_garbage_later() -> None:
-    """Collect garbage in a moment: Streamlit would after each run of a page, which makes the next one wait 0.1 s."""
+    """Schedule garbage collection: Streamlit would collect after each run of a page, delaying the next one by 0.1 s."""
     if not _is_tidied_soon.is_set():
         _is_tidied_soon.set()
         _later(COLLECT_AFTER_S, _tidy)
 
 
 def _tidy() -> None:
-    """Collect garbage, and give back what is free.
+    """Collect garbage, and return free memory to the operating system.
 
-    Each computation has a thread of its own, each thread a heap of its own in glibc, and what is freed in there stays
-    with the process: of 1.1 GB after 200 uploads only 0.4 GB were in use.
+    Each computation has its own thread, each thread its own heap in glibc, and memory freed there stays with the
+    process: of 1.1 GB after 200 uploads, only 0.4 GB were in use.
     """
     _is_tidied_soon.clear()
     gc.collect()
@@ -151,19 +151,20 @@ _give_back = getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == 
 
 
 class CachedFunction(Generic[P, R]):
-    """A function whose last answers are kept and shared between sessions; each is computed beside the page.
+    """A function whose latest answers are cached and shared between sessions; each is computed beside the page.
 
     Parameters
     ----------
     function : callable
-        Frozen answers, nothing of Streamlit in it.
+        Returns immutable answers and does not use Streamlit.
     n_kept : int
+        Number of answers kept.
     words : str
         Shown while it computes.
     key : callable
-        Arguments → what tells them apart.
+        Arguments → a key that identifies them.
     grace_s : float
-        See `GRACE_S`; 0 where a newer request makes the older one worthless.
+        See `GRACE_S`; 0 where a newer request makes the older one obsolete.
     """
 
     def __init__(
@@ -174,7 +175,7 @@ class CachedFunction(Generic[P, R]):
         self._lock = Lock()
 
     def begin(self, *arguments: P.args, **named: P.kwargs) -> Work[R]:
-        """Return the work of a request: kept, going on, or begun now."""
+        """Return the work for a request: cached, in progress, or started now."""
         return self._begin(self._key(*arguments, **named), lambda: self._function(*arguments, **named))
 
     def _begin(self, key: Hashable, compute: Callable[[], R]) -> Work[R]:
@@ -188,7 +189,7 @@ class CachedFunction(Generic[P, R]):
         return work
 
     def __call__(self, *arguments: P.args, **named: P.kwargs) -> R:
-        """Return the answer; until it is there the page says what goes on, and offers to cancel."""
+        """Return the answer; until it is ready, the page says what is running and offers to cancel it."""
         key = self._key(*arguments, **named)
         name = f"{self._function.__qualname__} {hash(key):x}"
         is_page = get_script_run_ctx(suppress_warning=True) is not None
@@ -203,17 +204,17 @@ class CachedFunction(Generic[P, R]):
                 work.n_waiting -= 1
                 if not work.wait(0.0):
                     _cancel_unwatched(work, self._grace_s)
-            if not work.is_cancelled:  # else by another page that did not know of this one
+            if not work.is_cancelled:  # otherwise another page cancelled it, unaware of this one
                 return work.result()
 
     @contextmanager
     def ahead(self, *requests: Any) -> Iterator[None]:
-        """Compute answers while something else is shown; where that is broken off, so are they.
+        """Compute answers while something else is shown; if that is interrupted, so are they.
 
         Parameters
         ----------
         *requests
-            Of functions of one argument.
+            Each the argument of a function that takes one.
         """
         works = [self._begin(self._key(request), partial(cast("Any", self._function), request)) for request in requests]
         try:
@@ -224,13 +225,13 @@ class CachedFunction(Generic[P, R]):
             raise
 
     def is_answered(self, *arguments: P.args, **named: P.kwargs) -> bool:
-        """Whether a request was computed already, or failed."""
+        """Whether a request has already been computed, or has failed."""
         with self._lock:
             work = self._works.get(self._key(*arguments, **named))
         return work is not None and work.wait(0.0) and not work.is_cancelled
 
     def _wait(self, work: Work[R], name: str, *, is_page: bool) -> None:
-        """Wait; whatever the user does meanwhile ends this run of the page, and in time the work."""
+        """Wait; any user action meanwhile ends this run of the page and, after the grace period, the work."""
         if not is_page:  # within other work
             while not work.wait(LOOK_EVERY_S):
                 pass
@@ -244,7 +245,7 @@ class CachedFunction(Generic[P, R]):
             return
         words = self._words
         if is_being_made():
-            words += " The first answers after an installation wait until their code is compiled."
+            words += " After an installation, the first answers wait until their code is compiled."
         with st.spinner(words, show_time=True):
             place, is_offered = st.empty(), False
             while not work.wait(LOOK_EVERY_S):
@@ -263,7 +264,7 @@ class CachedFunction(Generic[P, R]):
 
 
 def _cancel(name: str, work: ref[Work[Any]]) -> None:
-    """Cancel what the button was shown for; Streamlit keeps what a button passes on until the session ends."""
+    """Cancel a button's work, referenced weakly: Streamlit keeps a button's arguments until the session ends."""
     st.session_state[_CANCELLED] = name
     if (known := work()) is not None:
         known.cancel()
@@ -281,7 +282,7 @@ def _cancel_unwatched(work: Work[Any], grace_s: float) -> None:
 
 
 def _offer_again(name: str) -> None:
-    """Say that it was cancelled; the rest of the page waits for the user."""
+    """Say that the work was cancelled; the rest of the page waits for the user."""
     st.info("Cancelled. Change something, or start it again.", icon=":material/stop_circle:")
     st.button("Start again", key=f"again {name}", icon=":material/play_arrow:", on_click=_again)
     st.stop()
@@ -294,7 +295,7 @@ def _again() -> None:
 def kept(
     n_kept: int, words: str, *, key: Callable[..., Hashable] | None = None, grace_s: float = GRACE_S
 ) -> Callable[[Callable[P, R]], CachedFunction[P, R]]:
-    """Compute a function beside the page, with a way to cancel it, and keep its last answers; see `CachedFunction`.
+    """Decorate a function to compute beside the page, cancellable, and to cache its answers; see `CachedFunction`.
 
     Examples
     --------

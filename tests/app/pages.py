@@ -61,7 +61,7 @@ def at(page: str, query: Mapping[str, Any], **values: Any) -> AppTest:
 
 
 def upload(page: AppTest, name: str, content: bytes, rig: str = "") -> AppTest:
-    page.sidebar.radio(key=state.ORIGIN).set_value("Own file").run()
+    page.sidebar.radio(key=state.ORIGIN).set_value("Your file").run()
     page.sidebar.file_uploader(key=state.RECORDING_FILE).upload(name, content)
     if rig:
         page.sidebar.file_uploader(key=state.RIG_FILE).upload("machine.toml", rig.encode())

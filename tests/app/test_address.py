@@ -267,7 +267,7 @@ def test_the_described_machine_of_a_laboratorys_recording_survives_a_reload() ->
 
 
 def test_an_own_healthy_reference_survives_a_reload() -> None:
-    page = analysis("damaged_tooth", view="Spectrum", reference="Own file")
+    page = analysis("damaged_tooth", view="Spectrum", reference="Your file")
     healthy = SAMPLES["healthy"].recording
     labelled(page, "file_uploader", "Recording of the healthy").upload("mine.h5", healthy.read_bytes())
     page.run()

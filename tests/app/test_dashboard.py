@@ -297,7 +297,7 @@ def test_a_machine_without_a_name_is_described_all_the_same() -> None:
     sample = SAMPLES["damaged_tooth"]
     nameless = sample.rig.read_text("utf-8").partition("\n")[2]
     page = opened_file("a.csv.gz", sample.recording.read_bytes(), nameless)
-    assert "machine without a name" in shown_text(page)
+    assert "unnamed machine" in shown_text(page)
     page = opened_file("a.csv.gz", sample.recording.read_bytes())
     assert "machine not described" in shown_text(page)
 
@@ -355,7 +355,7 @@ def test_recording_and_rig_file_are_given_at_once_on_the_start_page() -> None:
     page = at("start", {})
     uploader = page.file_uploader(key="start file")
     uploader.upload("machine.toml", sample.rig.read_bytes()).run()
-    assert "Now the recording" in shown_text(page)
+    assert "Now add the recording" in shown_text(page)
     uploader = page.file_uploader(key="start file").upload("machine.toml", sample.rig.read_bytes())
     uploader.upload(sample.recording.name, sample.recording.read_bytes()).run()
     (file,) = state_of(page, state.RECORDING_FILE)
@@ -438,10 +438,10 @@ def test_broken_files_show_one_message(name: str, content: bytes, rig: str) -> N
 
 def test_nothing_is_open_before_a_file_is_given() -> None:
     page = opened()
-    page.sidebar.radio(key=state.ORIGIN).set_value("Own file").run()
+    page.sidebar.radio(key=state.ORIGIN).set_value("Your file").run()
     assert not page.exception
     assert not figures(page, of_verdict=True)
-    assert "Give a recording" in shown_text(page)
+    assert "Choose a recording" in shown_text(page)
 
 
 def test_no_long_signal_goes_to_the_browser_whole() -> None:
@@ -525,7 +525,7 @@ def test_a_reference_with_a_rig_file_of_its_own_is_read_with_its_channels() -> N
 
 def test_an_uploaded_reference_that_does_not_fit_is_one_message() -> None:
     page = opened()
-    next(w for w in page.sidebar.selectbox if w.label.startswith("Compared")).set_value("Own file").run()
+    next(w for w in page.sidebar.selectbox if w.label.startswith("Compared")).set_value("Your file").run()
     assert not page.error
     healthy = page.sidebar.file_uploader[0]
     rows = (b"%g;%d;%d" % (i / 1000, i * 37 % 101, i * 41 % 101) for i in range(3000))
@@ -538,7 +538,7 @@ def test_an_uploaded_reference_that_does_not_fit_is_one_message() -> None:
 
 def test_the_sampling_rate_of_an_uploaded_reference_is_asked_for() -> None:
     page = opened()
-    next(w for w in page.sidebar.selectbox if w.label.startswith("Compared")).set_value("Own file").run()
+    next(w for w in page.sidebar.selectbox if w.label.startswith("Compared")).set_value("Your file").run()
     assert all(w.label != "Its sampling rate (Hz)" for w in page.sidebar.number_input)
     rows = "\n".join(f"{i * 37 % 101};{i * 41 % 101}" for i in range(3000))
     page.sidebar.file_uploader[0].upload("bare.csv", f"b;c\n{rows}".encode())

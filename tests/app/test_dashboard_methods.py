@@ -341,7 +341,7 @@ def test_the_lowest_frequency_is_half_the_slowest_shaft_or_what_the_segment_allo
     low.set_value(1.0).run()
     assert not page.exception
     assert not page.error
-    assert "cannot be told from this segment" in page.info[0].value
+    assert "segment does not allow an answer" in page.info[0].value
     assert "the lowest frequency" in shown_text(page)
 
 

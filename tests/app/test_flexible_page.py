@@ -40,7 +40,7 @@ def test_publications_are_said_in_the_pages_own_words() -> None:
 def test_a_gear_is_shown_with_its_modes_and_stress() -> None:
     page = on("flexible")
     assert not page.exception
-    assert "stands under Numbers" in page.caption[-1].value
+    assert "is given under Numbers" in page.caption[-1].value
     assert not any("gearsig" in caption.value for caption in page.caption)
     shown = labelled(page, "selectbox", "Show")
     assert len(shown.options) == 7

@@ -139,7 +139,7 @@ def test_a_run_from_the_button_to_the_answer(stub) -> None:
     stub(**{SECONDS: "1"})
     page = press(opened(), "Diagnose")
     assert [button.label for button in page.button if button.disabled] == ["Diagnose"]
-    assert "which** effect that the simulator lacks" in shown_text(page)
+    assert "which** effect missing from the simulator" in shown_text(page)
     page = wait_for_the_end(page)
     assert not page.exception
     text = shown_text(page)
@@ -149,7 +149,7 @@ def test_a_run_from_the_button_to_the_answer(stub) -> None:
     assert labels[:3] == ["Report (HTML)", "JSON", "Twin (preset)"]
     assert labels[3:] == ["PNG", "SVG", "CSV"] * (len(labels[3:]) // 3)  # of pictures that do not zoom
     page.sidebar.multiselect(key="references of gap").set_value([]).run()
-    assert "what was chosen before" in shown_text(page)
+    assert "answer for the previous choice" in shown_text(page)
 
 
 @pytest.mark.slow
@@ -170,16 +170,16 @@ def test_a_result_is_shown_again_after_a_reload(stub, tmp_path, monkeypatch) -> 
     assert "tooth 21 of the driver (93 %)" in shown_text(again)
     assert next(button for button in again.get("download_button")).label == "Report (HTML)"
     again.sidebar.multiselect(key="references of gap").set_value([]).run()
-    assert "what was chosen before" in shown_text(again)
+    assert "answer for the previous choice" in shown_text(again)
     again.sidebar.multiselect(key="references of gap").set_value(page.session_state["references of gap"]).run()
-    assert "what was chosen before" not in shown_text(again)
+    assert "answer for the previous choice" not in shown_text(again)
     (kept,) = (tmp_path / "cache" / "gap-results").iterdir()
     whole = kept.read_bytes()
     kept.write_bytes(whole[: len(whole) // 2])
-    assert "which** effect that the simulator lacks" in shown_text(opened())
+    assert "which** effect missing from the simulator" in shown_text(opened())
     kept.write_bytes(whole)
     monkeypatch.setattr(view, "_code", lambda: "another state of it")
-    assert "which** effect that the simulator lacks" in shown_text(opened())
+    assert "which** effect missing from the simulator" in shown_text(opened())
 
 
 def test_only_so_many_results_are_kept(monkeypatch) -> None:
@@ -194,7 +194,7 @@ def test_only_so_many_results_are_kept(monkeypatch) -> None:
 
 
 def test_own_files_survive_a_reload() -> None:
-    page = at("gap", {"of": "Own files"})
+    page = at("gap", {"of": "Your files"})
     page.sidebar.file_uploader(key="gap recordings").upload("one.h5", CRACKED.read_bytes())
     page.sidebar.file_uploader(key="gap references").upload("two.h5", HEALTHY.read_bytes())
     page.sidebar.file_uploader(key="gap rigs").upload("rig.toml", RIG.encode())
@@ -242,14 +242,14 @@ def test_why_there_is_no_answer_is_said(stub, outcome, said) -> None:
 
 def test_why_nothing_can_be_started_is_said() -> None:
     page = opened()
-    page.sidebar.radio(key="of of gap").set_value("Own files").run()
+    page.sidebar.radio(key="of of gap").set_value("Your files").run()
     page.sidebar.file_uploader(key="gap recordings").upload("a.h5", CRACKED.read_bytes())
     page.sidebar.file_uploader(key="gap rigs").upload("one.toml", RIG.encode()).upload("two.toml", RIG.encode())
     page = press(page.run(), "Diagnose")
     assert not page.exception
     assert _JOB not in page.session_state
     assert len(page.error) == 1
-    assert "2 rig files are named as no recording: one.toml, two.toml" in shown_text(page)
+    assert "2 rig files are not named like a recording: one.toml, two.toml" in shown_text(page)
     assert not next(button for button in page.button if button.label == "Diagnose").disabled
 
 
@@ -285,7 +285,7 @@ def test_names_from_files_are_never_markup() -> None:
 
 def test_without_recordings_nothing_can_be_started() -> None:
     page = opened()
-    page.sidebar.radio(key="of of gap").set_value("Own files").run()
+    page.sidebar.radio(key="of of gap").set_value("Your files").run()
     assert not page.exception
     assert all(button.disabled for button in page.button if button.label in ("Diagnose", "Stop"))
     content = CRACKED.read_bytes()

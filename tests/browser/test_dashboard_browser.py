@@ -30,8 +30,8 @@ playwright = pytest.importorskip("playwright.sync_api")
 
 def open_files(page: playwright.Page, recording: Path | dict[str, object], rig: Path | None = None) -> None:
     page.get_by_role("link", name="Analysis").click()
-    page.get_by_text("Own file", exact=True).click()
-    page.get_by_text("Give a recording on the left").first.wait_for()
+    page.get_by_text("Your file", exact=True).click()
+    page.get_by_text("Choose a recording on the left").first.wait_for()
     settle(page)
     inputs = page.locator("[data-testid=stFileUploader] input[type=file]")
     if rig is not None:
@@ -185,8 +185,8 @@ def test_back_and_forward_restore_view_scale_zoom_and_recording(page: playwright
     open_view(page, "Envelope")
     assert soon(page, lambda: "view=Envelope" in page.url)
     assert page.evaluate("history.length") == n_entries + 3  # one for each thing that was done
-    page.get_by_text("Own file", exact=True).click()
-    page.get_by_text("Give a recording on the left").first.wait_for()
+    page.get_by_text("Your file", exact=True).click()
+    page.get_by_text("Choose a recording on the left").first.wait_for()
     settle(page)
     page.go_back()
     page.locator(".strip button[aria-pressed=true]").filter(has_text="Envelope").first.wait_for()

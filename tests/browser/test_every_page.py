@@ -66,7 +66,7 @@ def test_verdict_picture_and_the_strip_of_views_are_on_a_narrow_first_screen(
 @pytest.mark.parametrize("path", ["compare", "gap"])
 def test_a_broken_file_is_one_message_on_the_other_pages(page: playwright.Page, address: str, path: str) -> None:
     opened(page, address + path)
-    page.get_by_text("Own file").first.click()
+    page.get_by_text("Your file").first.click()
     settle(page)
     page.locator("[data-testid=stFileUploader] input[type=file]").first.set_input_files(BROKEN)
     settle(page)

@@ -143,7 +143,7 @@ def test_stop_and_start_again(gap: playwright.Page) -> None:
 
 def test_own_files_stay_while_another_page_is_shown(gap: playwright.Page) -> None:
     folder = sample_folder()
-    gap.get_by_text("Own files", exact=True).click()
+    gap.get_by_text("Your files", exact=True).click()
     settle(gap)
     inputs = gap.locator("input[type=file]")
     inputs.nth(0).set_input_files([folder / "root_crack_1mm.h5", folder / "root_crack_3mm.h5"])

@@ -97,8 +97,8 @@ def test_an_own_file_stays_open_while_the_laboratory_is_looked_at(page: playwrig
     rows = "\n".join(f"{i / 1000:g};{(i * 37) % 101}" for i in range(3000))
     content = f"time (s);a1\n{rows}\n".encode()
     page.get_by_role("link", name="Analysis").click()
-    page.get_by_text("Own file", exact=True).click()
-    page.get_by_text("Give a recording on the left").first.wait_for()
+    page.get_by_text("Your file", exact=True).click()
+    page.get_by_text("Choose a recording on the left").first.wait_for()
     uploader = page.locator("[data-testid=stFileUploader] input[type=file]").first
     uploader.set_input_files({"name": "mine.csv", "mimeType": "text/csv", "buffer": content})
     page.locator(".strip").first.wait_for()
@@ -111,4 +111,4 @@ def test_an_own_file_stays_open_while_the_laboratory_is_looked_at(page: playwrig
     settle(page)
     page.get_by_test_id("stMain").get_by_text("mine.csv").first.wait_for()
     page.get_by_role("button", name="Close", exact=True).click()
-    page.get_by_text("Give a recording on the left").first.wait_for()
+    page.get_by_text("Choose a recording on the left").first.wait_for()

@@ -137,7 +137,7 @@ def test_the_chosen_mode_goes_on_to_the_squeezed_transform(page: playwright.Page
     settle(page)
     panel.locator(".figure svg image").first.wait_for()
     panel.get_by_text("Segment and further settings").click()
-    panel.get_by_text("Colours span").first.wait_for()
+    panel.get_by_text("Colour range").first.wait_for()
 
 
 @pytest.mark.study

@@ -1,4 +1,4 @@
-"""Components in plain JavaScript, one file each with its style: what Streamlit has no widget for.
+"""Components in plain JavaScript, one script and one style each, for what Streamlit has no widget for.
 
 They share `numbers.js`.
 """
@@ -25,7 +25,7 @@ def component_of(name: str) -> Callable[..., object]:
 
 
 def element_key(key: str) -> str:
-    """Return the key that Streamlit knows a component by: two underscores on end, as names from files have, it refuses.
+    """Return the key of a component for Streamlit, which refuses two successive underscores, as file names may have.
 
     Examples
     --------

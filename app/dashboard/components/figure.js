@@ -1,6 +1,6 @@
-// A figure of lines or of a map over one axis. Dragging zooms, and the server is told the range that is looked at, so
-// that it sends the detail of it. Cursors, peak table and export need no server. A plane, of paths and points, is sent
-// whole and zoomed along both axes. Bars with names stand in rows over the axis.
+// A figure of lines or of a map over one axis. Dragging zooms, and the server is told the range shown, so that it sends
+// the detail. Cursors, peak table and export need no server. A plane, of paths and points, is sent whole and zoomed
+// along both axes. Named bars are drawn in rows over the axis.
 
 const NS = "http://www.w3.org/2000/svg";
 const LEFT = 74, RIGHT = 16, SCALE = 76, BOTTOM = 44, ROW = 16, MAX_ROWS = 4, N_HARMONICS = 12, N_SIDEBANDS = 5, N_PEAKS = 12, N_FEW = 300, MOST_SQUARE = 560, LABEL = 26;
@@ -45,9 +45,9 @@ class Figure {
     this.data = data;
     this.lines = data.lines.map((line) => ({ ...line, x: numbers(line.x), y: numbers(line.y), low: numbers(line.low), high: numbers(line.high) }));
     this.levels = data.map && bytes(data.map.levels);
-    this.hasScale = data.map && (!data.square || data.map.unit); // points of a recurrence are there or not
+    this.hasScale = data.map && (!data.square || data.map.unit); // points of a recurrence plot are present or not
     this.whole = data.whole;
-    // An answer to an earlier question does not undo a zoom that is under way.
+    // A reply to an earlier request must not undo a zoom in progress.
     if (!asked || same(asked, [...data.shown, ...(data.across ?? [])])) {
       this.view = data.shown;
       this.asked = null;
@@ -57,15 +57,15 @@ class Figure {
     this.draw();
   }
 
-  // ---------- what is looked at
+  // ---------- the range shown
 
   look(range, across = this.across) {
     const widest = this.whole[1] - this.whole[0];
     let [low, high] = range;
     const span = Math.max(high - low, widest * 1e-6);
     low = Math.max(this.whole[0], Math.min(low, this.whole[1] - span));
-    this.view = span < widest ? [low, low + span] : [...this.whole]; // low + span may round to less than all of it
-    this.across = across; // of a plane: the values shown
+    this.view = span < widest ? [low, low + span] : [...this.whole]; // low + span may round to less than the whole
+    this.across = across; // of a plane: the y range shown
     const asked = (this.asked = [...this.view, ...(across ?? [])]);
     this.draw();
     clearTimeout(this.timer);
@@ -161,13 +161,13 @@ class Figure {
   }
 
   moveTo(position, held = { of: "at", times: 1 }) {
-    const least = (3 / this.plotWidth) * (this.view[1] - this.view[0]);  // closer than that, they could not be told apart
+    const least = (3 / this.plotWidth) * (this.view[1] - this.view[0]);  // any closer, they could not be distinguished
     if (held.of === "step") this.step = Math.max((position - this.at) / held.times, least);
     else this.at = position / held.times;
     this.draw();
   }
 
-  // The highest value between two positions of the first line: [position, value].
+  // The highest value between two positions of a line, by default the one in front: [position, value].
   highest(low, high, line = this.lines.at(-1)) {
     if (!line) return null;
     let best = null;
@@ -236,7 +236,7 @@ class Figure {
     this.drawPeaks();
   }
 
-  // Bars below each other, with names left of them, or above them where there is little room; what they come to beside.
+  // Bars one below the other, with names on the left, or above where there is little room, and values on the right.
   drawRows(style) {
     const { data, svg } = this, isAbove = data.above || this.width < NARROW, beside = 16 + Math.max(...data.rows.map((row) => Math.max(7.8 * row.beside.length, 6.8 * row.below.length)));
     this.ink = style.getPropertyValue("--ink").trim() || style.color;
@@ -287,7 +287,7 @@ class Figure {
     this.drawPeaks();
   }
 
-  // What a row says, with its unit.
+  // The text of a row, with its unit.
   rowWords(row) {
     const { data } = this, unit = ` ${data.x_unit}`, said = [row.name];
     const isChange = row.start !== 0;
@@ -334,7 +334,7 @@ class Figure {
     label.setAttribute("transform", `translate(13,${top + plotHeight / 2}) rotate(-90)`);
   }
 
-  // Of the numbers along the x axis: as many as their own width leaves room for.
+  // Positions of the numbers along the x axis: as many as their width leaves room for.
   places() {
     if (this.data.log_x) return decades(...this.view);
     const steps = this.data.x_unit === "deg" ? DEGREES : null, n = (room) => Math.min(this.plotWidth / room, 12);
@@ -363,9 +363,8 @@ class Figure {
     add(inside, "path", { d: parts.join(""), fill: "none", stroke: line.colour, "stroke-width": line.dots ? (plane && this.lines.length > 1 && x.length > N_FEW ? 2.5 : 4.5) : plane ? 0.8 : 1.2, opacity: plane && !line.dots ? 0.6 : null, "stroke-linecap": line.dots ? "round" : null, "stroke-linejoin": "round", "stroke-dasharray": line.dotted ? "2 3" : null });
   }
 
-  // Cursors that the machine implies, and the rows of their labels: they come most important first. A sideband has its
-  // label in the row of the mesh lines only, so that none is named unless the others are. Quiet ones are named under the
-  // pointer alone.
+  // The machine's cursors, most important first, and the rows of their labels. A sideband is labelled only in the row of
+  // the mesh lines, so that none is named unless the others are. Quiet ones are named only at the pointer.
   placed() {
     const rows = Array.from({ length: MAX_ROWS }, () => []), labels = [];
     const seen = this.data.cursors.filter((cursor) => cursor.at >= this.view[0] && cursor.at <= this.view[1]);
@@ -443,7 +442,7 @@ class Figure {
     set(this.selection, { x: low, width: high - low, y: top, height: bottom - top });
   }
 
-  // ---------- reading off
+  // ---------- readout
 
   position(event) {
     const x = event.offsetX;
@@ -503,7 +502,7 @@ class Figure {
     Object.assign(this.tip.style, { left: left ? "" : `${event.offsetX + 14}px`, right: left ? `${this.width - event.offsetX + 14}px` : "", top: `${event.offsetY + 10}px` });
   }
 
-  // The highest local maxima of what is shown, of the line in front.
+  // The highest local maxima in the range shown, of the line in front.
   found() {
     const line = this.lines.at(-1), found = [];
     if (!line) return found;
@@ -560,19 +559,19 @@ class Figure {
       entry.append(key, name);
       left.append(entry);
     }
-    const isNarrow = this.root.clientWidth > 0 && this.root.clientWidth < 330; // one of several beside each other
+    const isNarrow = this.root.clientWidth > 0 && this.root.clientWidth < 330; // one of several side by side
     if (this.data.has_tools && !isNarrow) {
-      for (const [tool, label] of Object.entries(TOOLS).slice(0, this.data.dates ? 1 : 3)) // no harmonics of a date
-        right.append(button(label, () => this.choose(tool), `${label}: drag it along, or use the arrow keys${tool === "sidebands" ? ", with Shift for their distance" : ""}`, this.tool === tool));
+      for (const [tool, label] of Object.entries(TOOLS).slice(0, this.data.dates ? 1 : 3)) // a date has no harmonics
+        right.append(button(label, () => this.choose(tool), `${label}: drag, or use the arrow keys${tool === "sidebands" ? ", with Shift for the spacing" : ""}`, this.tool === tool));
       if (this.lines.length)
         right.append(button("Peaks", () => { this.peaks = !this.peaks; this.drawBar(); this.draw(); }, "Table of the highest peaks shown", this.peaks));
     }
-    right.append(button("Whole", () => this.look(this.whole, null), "Show all of it (double click, or key 0)"));
+    right.append(button("Reset zoom", () => this.look(this.whole, null), "Show the whole figure (double-click, or key 0)"));
     for (const kind of ["PNG", "SVG", "CSV"]) right.append(button(kind, () => this.save(kind), `Save what is shown as ${kind}`));
     this.bar.replaceChildren(left, right);
   }
 
-  // Of bars beside what they are compared with.
+  // Legend of bars beside what they are compared with.
   keys() {
     const { data } = this;
     if (!data.rows || !data.mark) return [];
@@ -625,16 +624,16 @@ const element = (name, looks = {}) => set(document.createElementNS(NS, name), lo
 const add = (parent, name, looks) => parent.appendChild(element(name, looks));
 const html = (name, kind = "") => Object.assign(document.createElement(name), { className: kind });
 const range = (low, high) => Array.from({ length: high - low + 1 }, (_, i) => low + i);
-// Of one range, or of a plane's two.
+// For one range, or a plane's two.
 const same = (a, b) => a.length === b.length && a.every((value, i) => Math.abs(value - b[i]) <= 1e-9 * Math.abs(a[i | 1] - a[i & ~1]) + 1e-15);
-// A number as files have it, and as it is read: with the sign of minus that axes have.
+// A number as written to files, and as displayed: with the minus sign of axes.
 const exact = (value) => String(Number(value.toPrecision(6)));
 const figure = (value) => withMinus(exact(value));
-// A place on an axis: a distance on one of orders has these as its unit.
+// A position on an axis with its unit, or as "order 2.5" on an axis of orders.
 const measure = (value, unit) => (unit === "orders" ? `order ${figure(value)}` : `${figure(value)} ${unit}`);
-// Decimals that tell a map's colours apart.
+// Number of decimals that distinguish a map's colours.
 const digits = ({ low, high }) => Math.min(Math.max(Math.ceil(2 - Math.log10(high - low)), 1), 9);
-// A number beside a logarithmic axis; as a power of ten where some of them are far from one, then all of them.
+// A number on a logarithmic axis; if some of them are far from one, all as powers of ten.
 function short(value, powers) {
   const exponent = Math.round(Math.log10(value));
   if (!powers || Math.abs(Math.log10(value) - exponent) > 1e-9) return String(Number(value.toPrecision(2)));
@@ -652,7 +651,7 @@ function text(parent, x, y, words, looks) {
   return made;
 }
 
-// So many lines at most, the last cut where it must be.
+// At most so many lines, the last cut if necessary.
 function wrapped(words, n, mostLines) {
   if (words.length <= n || mostLines < 2) return [cut(words, n)];
   const at = words.lastIndexOf(" ", n), first = at > 0 ? at : Math.floor(n);
@@ -671,7 +670,7 @@ function lowerBound(x, value) {
   return low;
 }
 
-// At whole multiples of a round step, or of one of `steps` where the span takes it.
+// At whole multiples of a round step, or of one of `steps` if the span allows.
 function ticks(low, high, n, steps = null) {
   const rough = (high - low) / Math.max(n, 1), power = 10 ** Math.floor(Math.log10(rough));
   const round = power * [1, 2, 5, 10].find((times) => times * power >= rough * 0.999);
@@ -680,7 +679,7 @@ function ticks(low, high, n, steps = null) {
   return range(first, Math.min(last, first + 50)).map((k) => k * step);
 }
 
-// Days since 1970: steps of hours and days; of weeks, which begin on Mondays; from there on starts of months or years.
+// Days since 1970, in steps of hours, days or weeks, which begin on Mondays; beyond that, starts of months or years.
 function days(low, high, n) {
   const rough = (high - low) / Math.max(n, 1), step = [1 / 24, 1 / 4, 1, 2, 7, 14].find((length) => length >= rough);
   if (step) {

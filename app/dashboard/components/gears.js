@@ -76,7 +76,7 @@ class Gears {
     const style = getComputedStyle(this.root);
     this.ink = style.color;
     this.paper = style.getPropertyValue("--st-background-color");
-    this.button.textContent = this.playing ? "Stop" : "Turn";
+    this.button.textContent = this.playing ? "Stop" : "Rotate";
     this.signal.setAttribute("aria-valuenow", this.at.toFixed(2));
     const parts = [`mesh cycle ${this.at.toFixed(2)}`, `tooth ${(((Math.floor(this.at) % this.data.teeth[0]) + this.data.teeth[0]) % this.data.teeth[0]) + 1} of the driver enters`];
     for (const line of this.lines) parts.push(`${line.name}: ${(value(line, line.force, this.at) / 1000).toFixed(2)} kN`);
@@ -112,7 +112,7 @@ class Gears {
     this.write(context, `driven, ${teeth[1]} teeth`, 10, 0.64 * height);
   }
 
-  // Words over a drawing, with a rim of paper around the letters.
+  // Text over a drawing, with an outline in the background colour around the letters.
   write(context, words, x, y) {
     context.font = `13px ${getComputedStyle(this.root).fontFamily}`;
     context.lineJoin = "round";
@@ -139,7 +139,7 @@ class Gears {
   }
 }
 
-// One gear, of which only the teeth near the mesh are seen; the cracked tooth in the colour of faults.
+// One gear, of which only the teeth near the mesh are seen; the cracked tooth is in the colour of faults.
 function wheel(context, x, radius, n, angleOf, cracked, colours, ink) {
   const step = (2 * Math.PI) / n, root = radius - 1.25 * MODULE, tip = radius + MODULE;
   const profile = [[root, -0.5], [root, -0.33], [radius - 0.4 * MODULE, -0.28], [radius, -0.24], [tip, -0.13], [tip, 0.13], [radius, 0.24], [radius - 0.4 * MODULE, 0.28], [root, 0.33], [root, 0.5]];

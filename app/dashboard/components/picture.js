@@ -1,7 +1,7 @@
-// A vector picture that is zoomed by dragging, and a ring of teeth that is read off. It is shown as an image, in which
-// nothing can run.
+// A vector picture that is zoomed by dragging, and a ring of teeth with a readout. It is shown as an image, in which no
+// script can run.
 
-const LEAST = 1 / 40; // of the whole width
+const LEAST = 1 / 40; // minimum range shown, over the whole width
 
 export default function ({ data, parentElement, setStateValue }) {
   const root = parentElement.querySelector(".picture");
@@ -18,7 +18,7 @@ class Picture {
     this.image = made("img", { alt: "", draggable: false });
     this.box = made("div", { className: "box", hidden: true });
     this.tip = made("div", { className: "tip", hidden: true });
-    this.button = made("button", { type: "button", textContent: "Whole", title: "Show all of it (double click, or key 0)", hidden: true });
+    this.button = made("button", { type: "button", textContent: "Reset zoom", title: "Show the whole picture (double-click, or key 0)", hidden: true });
     this.button.onclick = () => this.look(this.whole);
     this.frame.append(this.image, this.box, this.tip);
     root.style.position = "relative";
@@ -41,13 +41,13 @@ class Picture {
       this.whole = [x, x + width, y, y + height];
     }
     const shown = data.shown ?? this.whole;
-    // An answer to an earlier question does not undo a zoom that is under way.
+    // A reply to an earlier request must not undo a zoom in progress.
     if (!isNew && this.asked && !same(this.asked, shown)) return;
     this.asked = null;
     if (isNew || !same(this.view, shown)) this.show(shown);
   }
 
-  // left, right, top, bottom: widened to the whole's proportions, and kept within it.
+  // left, right, top, bottom: widened to the proportions of the whole picture, and kept within it.
   show([left, right, top, bottom]) {
     const [x, x1, y, y1] = this.whole, across = x1 - x, down = y1 - y;
     const share = Math.min(Math.max((right - left) / across, (bottom - top) / down, LEAST), 1);

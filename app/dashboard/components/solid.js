@@ -1,4 +1,4 @@
-// A solid of flat quadrilaterals that is turned by dragging, coloured by a value at its corners, and swings in a mode.
+// A solid of flat quadrilaterals, rotated by dragging, coloured by a value at its corners, and animated in a mode.
 
 const LIGHT = [-0.3, -0.6, 0.74]; // from the upper left, towards the eye; y points down
 
@@ -55,7 +55,7 @@ class Solid {
     this.draw();
   }
 
-  // What lies at a place, from the middle in pixels, stays there.
+  // What lies at `from`, in pixels from the middle, stays there.
   magnify(factor, from) {
     const zoom = Math.min(Math.max(this.zoom * factor, 0.5), 20), grows = zoom / this.zoom;
     this.at = this.at.map((place, axis) => (zoom > 1 ? from[axis] - grows * (from[axis] - place) : 0));
@@ -85,7 +85,7 @@ class Solid {
     this.canvas.height = height * dense;
     const context = this.canvas.getContext("2d");
     context.setTransform(dense, 0, 0, dense, width * dense / 2, height * dense / 2);
-    this.button.textContent = this.swinging ? "Stop" : "Swing";
+    this.button.textContent = this.swinging ? "Stop" : "Animate";
     const { points, quads, motion, values } = this, n = points.length / 3;
     const scale = (0.46 * Math.min(width, height) * this.zoom) / this.size, share = this.data.stretch * Math.sin(this.phase);
     const [cy, sy, cp, sp] = [Math.cos(this.yaw), Math.sin(this.yaw), Math.cos(this.pitch), Math.sin(this.pitch)];
@@ -98,7 +98,7 @@ class Solid {
       y[i] = this.at[1] - scale * (sp * along + cp * pz);
       depth[i] = sp * pz - cp * along;
     }
-    // From the back to the front; faces that look away are hidden by others of a closed solid.
+    // From back to front; faces that point away are hidden by others of a closed solid.
     const seen = [];
     for (let q = 0; q < quads.length; q += 4) {
       const [a, b, c, d] = [quads[q], quads[q + 1], quads[q + 2], quads[q + 3]];

@@ -1,4 +1,4 @@
-"""The gap page: from recordings and a simulator to the effect that it lacks; where, which, how far, what next."""
+"""The gap page: from recordings and a simulator to the effect it lacks; where, which, how far, what next."""
 
 from __future__ import annotations
 
@@ -74,29 +74,29 @@ from gearsig.report import (
 from sims.simulator import sources_digest
 
 WELCOME = """
-The page says **where** recordings differ from the simulation of their rig, **which** effect that the simulator lacks
-causes it, **how far** the gap shrinks with it, and what to record next. Sizes are in *structural floors*: one floor is
-how far even healthy machines differ, so that a gap below one means nothing.
+This page says **where** recordings differ from the simulation of their rig, **which** effect missing from the simulator
+causes the gap, **how far** the gap shrinks when it is added, and what to record next. Sizes are in *structural floors*:
+one floor is how far even healthy machines differ, so a gap below one means nothing.
 
-The answer is surest with recordings at several speeds and loads, and with one of the same rig when it was healthy. The
-first answer for a rig takes about a minute on two free cores; its simulations are kept, and the next answer at the same
-speed and load takes a quarter of that.
+The answer is most certain with recordings at several speeds and loads, and with one of the same rig when it was
+healthy. The first answer for a rig takes about a minute on two free cores; its simulations are kept, and the next
+answer at the same speed and load takes a quarter of that.
 """
 
 # --------------------
-# Run a diagnosis beside the page, with progress and a stop; keep its result for whoever asks the same again.
+# Run a diagnosis beside the page, with progress and a Stop button; keep its result for equal requests.
 # --------------------
 
 
 _JOB, _FINISHED, _STOPPED, _REFUSED = "gap job", "gap result", "gap stopped", "gap refused"
 EVERY_S = 0.5
 N_KEPT, MAX_KEPT_BYTES = 24, 200_000_000
-"""Results that are kept, and how large one may be."""
+"""Number of results kept, and the maximum unpacked size of one."""
 
 
 @dataclass(frozen=True)
 class Finished:
-    """A result: of which choice, in words, in figures and as files."""
+    """The result for one choice: its report, figures and files."""
 
     key: str
     report: GapReport
@@ -115,7 +115,7 @@ class Finished:
 
 @dataclass
 class _Running:
-    """A job, and what it diagnoses."""
+    """A job, and the choice that it diagnoses."""
 
     choice: Choice
     job: Job
@@ -123,12 +123,12 @@ class _Running:
 
 
 def show_running(choice: Choice) -> Finished | None:
-    """Show the buttons and what goes on; return the kept result of the choice, else the last one of this session.
+    """Show the buttons and progress; return the kept result of the choice, else the last one of this session.
 
     Raises
     ------
     GearsigError
-        Why the job that has just ended has no result, or why none could be started.
+        If the job that has just ended has no result, or if none could be started.
     """
     if state.take_start_of_gap() and choice.recordings and kept_result(choice) is None:
         _start(choice)
@@ -155,7 +155,7 @@ def show_running(choice: Choice) -> Finished | None:
     if running is not None:
         _show_progress(running)
     elif st.session_state.pop(_STOPPED, False):
-        st.info("Stopped. Nothing was kept but what had been prepared for this rig.", icon=":material/stop_circle:")
+        st.info("Stopped. Only what had been prepared for this rig was kept.", icon=":material/stop_circle:")
     finished: Finished | None = st.session_state.get(_FINISHED)
     if running is None and choice.recordings and (finished is None or finished.key != choice.key):
         finished = kept_result(choice) or finished
@@ -164,14 +164,14 @@ def show_running(choice: Choice) -> Finished | None:
 
 
 def forget() -> None:
-    """Stop what runs and forget the result."""
+    """Stop a running job and forget the result."""
     _stop()
     for key in (_FINISHED, _STOPPED):
         st.session_state.pop(key, None)
 
 
 def _start(choice: Choice) -> None:
-    """Start a job; why none can be started is kept for the page, which runs only afterwards."""
+    """Start a job; an error that prevents it is kept for the page, which runs only afterwards."""
     forget()
     folder = private_folder()
     try:
@@ -221,9 +221,9 @@ def _finished(choice: Choice, report: GapReport, files: Mapping[str, bytes]) -> 
 
 
 def _place_of(choice: Choice) -> Path:
-    """Return where the result of a choice is kept: another one for other files, settings, or another state of the code.
+    """Return the path where the result of a choice is kept, which depends on its files, its settings and the code.
 
-    Whoever asks has the files themselves: their hashes are in the name.
+    Only a user who has the files can ask for it: the name depends on their hashes.
     """
     rigs = [file.rig_text for file in choice.recorded]
     code = f"{gearsig.__version__} {_code()} {sources_digest()}"
@@ -233,13 +233,13 @@ def _place_of(choice: Choice) -> Path:
 
 @cache
 def _code() -> str:
-    """Return what stands for the code of the diagnosis."""
+    """Return a hash of the diagnosis code."""
     sources = sorted(Path(gearsig.gap.__path__[0]).rglob("*.py"))
     return sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()
 
 
 def _keep_result(choice: Choice, files: Mapping[str, bytes]) -> None:
-    """Keep the files of a result; the oldest results give way."""
+    """Keep the files of a result, and delete the oldest results beyond `N_KEPT`."""
     path = _place_of(choice)
 
     def write(file: IO[bytes]) -> None:
@@ -254,7 +254,7 @@ def _keep_result(choice: Choice, files: Mapping[str, bytes]) -> None:
 
 
 def kept_result(choice: Choice) -> Finished | None:
-    """Return the kept result of a choice, None where there is none that can be read."""
+    """Return the kept result of a choice, None if there is none or it cannot be read."""
     try:
         with ZipFile(_place_of(choice)) as archive:
             if sum(entry.file_size for entry in archive.infolist()) > MAX_KEPT_BYTES:
@@ -273,8 +273,8 @@ LOOKS: dict[GapOutcome, tuple[str, Colour, str]] = {
     GapOutcome.UNDECIDED: ("undecided", "gray", ":material/balance:"),
 }
 WITHOUT_FLOORS = (
-    "Nothing was simulated, so that a gap has no size and no shares. Levels are those of the strongest line over the "
-    "noise beside it, or over the reference where that shows it as well."
+    "Nothing was simulated, so the gap has no size and no shares. Levels are those of the strongest line above the "
+    "noise around it, or above the reference where that shows the line as well."
 )
 NOT_SIMULATED = (
     "No simulator could be set to this rig: no effect was added, no severity was fitted, and there is no twin."
@@ -296,7 +296,7 @@ def show_finished(finished: Finished) -> None:
 
 
 def _show_verdict(report: GapReport) -> None:
-    """Say the kind of fault first, which is surer, then the effects of that kind that it may be."""
+    """Show the kind of fault first, which is more certain, then the possible effects of that kind."""
     words, colour, icon = LOOKS[report.outcome]
     st.badge(words, icon=icon, color=colour)
     kind = report.kind
@@ -311,14 +311,14 @@ def _show_verdict(report: GapReport) -> None:
 
 
 LIKELY = 0.05
-"""Effects of the kind that are named with it."""
+"""Minimum probability of the effects that are named with their kind."""
 N_BARS, MIN_PROBABILITY = 5, 0.01
 TABS = ("Where", "Which", "How far", "Next and facts")
 TAB = "gap tab"
 
 
 def _show_panels(report: GapReport) -> None:
-    """Show where, which and how far side by side, each as bars with its sentence, and the way to all of it."""
+    """Show where, which and how far side by side, each as bars with its sentence and a button to its tab."""
     sentences = dict(verdict_rows(report))
     places = [
         ChartRow(place.title, 0.0, 100.0 * place.share, beside=percent(place.share))
@@ -420,7 +420,7 @@ def _show_where(finished: Finished) -> None:
 
 
 def _show_pictures_of_places(finished: Finished) -> None:
-    """Show what shows the first place best, then offer the other pictures by their kinds."""
+    """Show the picture that shows the first place best, then offer the others by kind."""
     report = finished.report
     first = report.places[0] if report.places else None
     beside_reference = [curves for curves in report.spectra if len(curves.orders) and len(curves.reference)]
@@ -460,7 +460,7 @@ def _show_pictures_of_places(finished: Finished) -> None:
 
 
 def _show_spectra(curves: SpectrumCurves, beside: str, *, scored: bool) -> None:
-    """Show the spectra of a recording and of what it is compared with, below them the gap over the same orders."""
+    """Show the spectra of a recording and of what it is compared with, and below them the gap over the same orders."""
     x = curves.orders
     named = (
         (curves.measured, "measured", 0),
@@ -550,7 +550,7 @@ def _show_how_far(finished: Finished) -> None:
     elif len(rows) > 1:
         st.caption(
             "What remains of the whole gap as effects are added to the simulator, in structural floors, on data that "
-            "no severity was fitted to. What the verdict says shrinks more: it is of those features alone that the "
+            "no severity was fitted to. The gap in the verdict shrinks more: it covers only the features that the "
             "effect changes."
         )
         labels, left, intervals, taken = zip(*rows, strict=True)
@@ -559,7 +559,7 @@ def _show_how_far(finished: Finished) -> None:
             {"simulator": simulators, "remaining gap": left, "90 % interval": intervals, "change": taken}
         )
     else:
-        st.markdown("No effect was added to the simulator. The gap stays as it is.")
+        st.markdown("No effect was added to the simulator, so the gap is unchanged.")
     _show_figures(finished, "how far")
 
 
@@ -571,7 +571,7 @@ def _show_next(finished: Finished) -> None:
     if not report.next_steps and not rows:
         st.markdown(as_typed(dict(verdict_rows(report)).get("Next", "")))
     if rows:
-        st.markdown("What to record next, to tell the likeliest causes apart. Distances are in structural floors.")
+        st.markdown("What to record next to distinguish the likeliest causes. Distances are in structural floors.")
         columns = zip(("at", "tells apart", "distance there", "now"), zip(*rows, strict=True), strict=True)
         show_wrapping_table({name: list(values) for name, values in columns})
     names = ("recording", "speed (rpm)", "torque (N·m)", "revolutions", "length (s)", "sampling rate (Hz)")
@@ -606,7 +606,7 @@ def _show_figure(finished: Finished, figure: GapFigure) -> None:
 
 
 def ring_of(curves: AngleCurves) -> Ring:
-    """Return levels of teeth, in dB over the measured median tooth, to be read off around the circle."""
+    """Return tooth levels around the circle, in dB relative to the measured median tooth."""
     named = {"measured": curves.measured, "simulated": curves.before, "with the effect": curves.after}
     levels = {name: 10.0 * np.log10(np.maximum(energy, 1e-6)) for name, energy in named.items() if len(energy)}
     return Ring(levels, curves.teeth if curves.has_mark else 0, "dB")
@@ -623,10 +623,10 @@ def show() -> None:
     finished = show_running(choice)
     if finished is None:
         st.markdown(WELCOME)
-        with suppress(GearsigError):  # said when it is started
+        with suppress(GearsigError):  # shown when the diagnosis is started
             show_checks((True, text) for text in (set_alike(choice) if choice.recordings else ()))
         return
     if finished.key != choice.key:
-        now = "Diagnose again for what is chosen now" if choice.recordings else "Give recordings on the left"
-        st.info(f"This is the answer to what was chosen before. {now}.")
+        now = "Diagnose again for the current choice" if choice.recordings else "Choose recordings on the left"
+        st.info(f"This is the answer for the previous choice. {now}.")
     show_finished(finished)

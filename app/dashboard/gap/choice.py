@@ -1,4 +1,4 @@
-"""The choice on the gap page: recordings, references, rig files, and how the diagnosis gets them as files."""
+"""The choice on the gap page: recordings, references and rig files, and how they reach the diagnosis as files."""
 
 from __future__ import annotations
 
@@ -27,20 +27,20 @@ from gearsig.rig import recording_stem
 
 @dataclass(frozen=True)
 class Choice:
-    """Recordings, references and rig files, on this machine (samples) or in memory (uploads).
+    """Recordings, references and rig files, on this computer (samples) or in memory (uploads).
 
     Parameters
     ----------
     recordings, references : tuple of ChosenFile
     rigs : tuple of ChosenFile
-        Rig files; one named as a recording is that recording's own, the other one is everybody's.
+        Rig files; one named like a recording is that recording's own, the other one applies to all.
     model : str
     torque_nm, sampling_rate_hz : float or None
-        What the files do not state.
+        Stated by the user where the files do not.
     reference_rate_hz : float or None
-        Sampling rate of the references, where it is another one.
+        Sampling rate of the references, if it differs.
     run_up : ChosenFile or None
-        Of the healthy machine; beside a reference.
+        Run-up of the healthy machine, in addition to a reference.
     """
 
     recordings: tuple[ChosenFile, ...]
@@ -83,12 +83,12 @@ class Choice:
 
 
 def common_rig(choice: Choice) -> ChosenFile | None:
-    """Return the rig file that is no recording's own, or the only one there is; None where there is none.
+    """Return the rig file that applies to all recordings, or the only one; None if there is none.
 
     Raises
     ------
     InputError
-        If there are several, or several that are one recording's own.
+        If there are several, or several for one recording.
     """
     if len(choice.rigs) == 1:  # all recordings are of one rig, whatever its file is called
         return choice.rigs[0]
@@ -96,14 +96,14 @@ def common_rig(choice: Choice) -> ChosenFile | None:
     common = [rig for rig in choice.rigs if rig not in named]
     if len(common) > 1:
         raise InputError(
-            f"{len(common)} rig files are named as no recording: {', '.join(rig.name for rig in common)}",
-            allowed="one for all recordings, and one named as each recording",
+            f"{len(common)} rig files are not named like a recording: {', '.join(rig.name for rig in common)}",
+            allowed="one for all recordings, and one named like each recording",
         )
     return common[0] if common else None
 
 
 def set_alike(choice: Choice) -> tuple[str, ...]:
-    """Say what the simulator is set to, so that teeth, speeds and angles are the same on both sides.
+    """Return sentences on how the simulator is set, so that teeth, speeds and angles are the same on both sides.
 
     Raises
     ------
@@ -117,15 +117,15 @@ def set_alike(choice: Choice) -> tuple[str, ...]:
         return ()
     pairs = ", ".join(f"{pair.driver_teeth}/{pair.driven_teeth}" for pair in rig.pairs)
     facts = [f"Teeth: {pairs}, as in the rig file"] if pairs else []
-    facts.append("Speed: each recording's own, by its revolutions")
-    facts.append("Angle: turned until the same teeth meet, by marks where there are any")
+    facts.append("Speed: each recording's own, from its revolutions")
+    facts.append("Angle: rotated until the same teeth meet, using marks where there are any")
     if choice.references:
-        facts.append("Compared with the same machine when it was healthy: only what has changed since counts")
+        facts.append("Compared with the same machine when it was healthy: only changes since then count")
     return tuple(facts)
 
 
 def own_rig(source: ChosenFile, rigs: tuple[ChosenFile, ...]) -> ChosenFile | None:
-    """Return the rig file that is named as a recording (`run.5Nm.csv.gz`: `run.5Nm.toml`), None if there is none.
+    """Return the rig file that is named like a recording (`run.5Nm.csv.gz`: `run.5Nm.toml`), None if there is none.
 
     Raises
     ------
@@ -135,7 +135,7 @@ def own_rig(source: ChosenFile, rigs: tuple[ChosenFile, ...]) -> ChosenFile | No
     named = [rig for rig in rigs if recording_stem(rig.name) == recording_stem(source.name)]
     if len(named) > 1:
         raise InputError(
-            f"{len(named)} rig files are named as this recording: {', '.join(rig.name for rig in named)}",
+            f"{len(named)} rig files are named like this recording: {', '.join(rig.name for rig in named)}",
             where=source.name,
             allowed="one",
             remedy="remove all but one of them",
@@ -144,7 +144,7 @@ def own_rig(source: ChosenFile, rigs: tuple[ChosenFile, ...]) -> ChosenFile | No
 
 
 def files_of(choice: Choice, folder: Path) -> GapRequest:
-    """Write the uploads into a folder and return what the diagnosis is asked.
+    """Write the uploads into a folder and return the request for the diagnosis.
 
     Raises
     ------
@@ -161,7 +161,7 @@ def files_of(choice: Choice, folder: Path) -> GapRequest:
             raise InputError(
                 "no rig file is given",
                 where=file.name,
-                remedy="upload one for all recordings, or one of the recording's name; the Analysis page makes it",
+                remedy="upload one for all recordings, or one with the recording's name; the Analysis page can make it",
             )
     paths = [_written(file, folder / str(i), choice.rigs) for i, file in enumerate(choice.recorded, 1)]
     n, n_compared = len(choice.recordings), len(choice.recordings) + len(choice.references)
@@ -179,7 +179,7 @@ def files_of(choice: Choice, folder: Path) -> GapRequest:
 
 
 def _written(source: ChosenFile, folder: Path, rigs: tuple[ChosenFile, ...]) -> Path:
-    """Return the file of a source; an upload gets a folder of its own, with its own rig file beside it."""
+    """Return the path of a source; an upload gets a separate folder, with its own rig file next to it."""
     if isinstance(source.content, Path):
         return source.content
     folder.mkdir()
@@ -196,7 +196,7 @@ def _written(source: ChosenFile, folder: Path, rigs: tuple[ChosenFile, ...]) -> 
 # --------------------
 
 
-SAMPLES, FILES = "Samples", "Own files"
+SAMPLES, FILES = "Samples", "Your files"
 FIRST_SAMPLE, FIRST_REFERENCE = "root_crack_3mm", "root_crack_0mm"
 ChosenFiles = tuple[tuple[ChosenFile, ...], tuple[ChosenFile, ...], tuple[ChosenFile, ...]]
 """Recordings, references, rig files."""
@@ -247,9 +247,9 @@ def _choose_samples() -> ChosenFiles:
         )
         return chosen
 
-    about = "Several operating conditions (speeds, loads) of one rig tell more than one."
+    about = "Several operating conditions (speeds, loads) of one rig reveal more than one does."
     recordings = choose("Recordings of one rig", [], FIRST_SAMPLE, about, "recordings")
-    about = "The same rig when it was healthy. The answer becomes much surer."
+    about = "The same rig when it was healthy. It makes the answer much more certain."
     references = choose("Healthy references", recordings, FIRST_REFERENCE, about, "references")
     st.caption(SIMULATED)
     chosen, healthy = (tuple(sample_file(known[name]) for name in names) for names in (recordings, references))
@@ -257,20 +257,20 @@ def _choose_samples() -> ChosenFiles:
 
 
 def _choose_files() -> ChosenFiles:
-    about = "Several operating conditions (speeds, loads) tell more than one."
+    about = "Several operating conditions (speeds, loads) reveal more than one does."
     recordings = choose_files("Recordings of one rig", "gap recordings", about=about, name="recordings")
     about = (
-        "What is known of the machine: teeth, bearings, speed source. A rig file named as a recording overrides speed "
-        "and torque of that recording."
+        "What is known about the machine: teeth, bearings, speed source. A rig file named like a recording overrides "
+        "the speed and torque of that recording."
     )
     rigs = choose_files("Rig file (TOML)", "gap rigs", about=about, of_rigs=True, name="rigs")
-    about = "The same rig when it was healthy. The answer becomes much surer."
+    about = "The same rig when it was healthy. It makes the answer much more certain."
     return recordings, choose_files("Healthy references", "gap references", about=about, name="references"), rigs
 
 
 def _choose_run_up() -> ChosenFile | None:
     about = (
-        "The same rig run up or down when it was healthy, with a tachometer: it measures the path to the sensors, by "
-        "which faults of teeth are told apart."
+        "The same rig run up or down when it was healthy, with a tachometer: it measures the path to the sensors, "
+        "which distinguishes tooth faults."
     )
     return choose_file("Healthy run-up", "gap run-up", about=about, name="run-up")

@@ -1,4 +1,4 @@
-"""The fault laboratory: faults are switched on, and the machine answers, healthy beside faulty."""
+"""The fault laboratory: the user switches faults on and sees the machine respond, healthy beside faulty."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from gearsig.errors import GearsigError
 from sims.presets import Preset
 
 LENGTHS_S = (2.0, 5.0, 10.0, 20.0)
-"""Of recordings to keep."""
+"""Lengths offered for saved recordings."""
 
 
 def show() -> None:
-    """Choose a machine, simulate, show; a drive that starts and stops has controls and figures of its own."""
+    """Choose a machine, simulate, show; a drive that starts and stops has its own controls and figures."""
     preset = choose_preset()
     if preset.model == DRIVE_MODEL:
         show_drive(preset)
@@ -39,16 +39,16 @@ def show() -> None:
 
 
 def show_pair(preset: Preset) -> None:
-    """Choose, simulate, show a pair that runs at a steady speed."""
+    """Choose, simulate and show a pair that runs at a steady speed."""
     wait_for_rest()
     setup = choose_setup(preset)
-    # Its results fade at once while another machine is simulated: none is taken for the new one's.
+    # Results fade at once while another machine is simulated, so that none is mistaken for the new one's.
     with st.container(key="results"):
         show_results(setup)
 
 
 def show_results(setup: Setup) -> None:
-    """Show healthy and faulty machine: at once by a short recording, which says so, until the whole one is there."""
+    """Show healthy and faulty machine: at once from a short recording, marked as such, until the whole one is ready."""
     wait_for_compiled_code()
     preview = preview_of(setup)
     if preview is None or all_simulated(setup):
@@ -59,17 +59,17 @@ def show_results(setup: Setup) -> None:
     with simulated.ahead(*wholes):  # while the page draws
         show_machines(preview, *machines, whole_s=setup.duration_s)
     for whole in wholes:
-        with suppress(GearsigError):  # the preview has said it
+        with suppress(GearsigError):  # the preview has already shown it
             simulated(whole)
     st.rerun()
 
 
 def wait_for_compiled_code() -> None:
-    """Say what goes on while the simulators are compiled; whatever the user does ends the waiting."""
+    """Say that the simulators are being compiled; any user action ends the wait."""
     if not is_being_made():
         return
     with st.spinner("Compiling the simulators, once after an installation …", show_time=True):
-        st.caption("About a minute. The other pages can be used meanwhile.")
+        st.caption("This takes about a minute. You can use the other pages meanwhile.")
         while is_being_made():
             sleep(0.1)
             let_user_act()
@@ -77,7 +77,7 @@ def wait_for_compiled_code() -> None:
 
 
 def find_machines(setup: Setup) -> tuple[LaboratoryRun, LaboratoryRun | None]:
-    """Simulate both machines; what is said meanwhile has a place of its own, so that nothing below it moves."""
+    """Simulate both machines; messages meanwhile have their own place, so that nothing below them moves."""
     with st.container():
         return simulated(setup.healthy), faulty_of(setup, simulated)
 
@@ -103,7 +103,7 @@ def show_machines(
 
 
 def choose_channel(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> str:
-    """Return the sensor that numbers and spectra are of; beside it stands which colour is which."""
+    """Return the sensor chosen for numbers and spectra, and show the legend of colours beside it."""
     channels = healthy.vibration_channels
     with st.container(horizontal=True, vertical_alignment="center", horizontal_alignment="distribute"):
         channel = address.ask_one(

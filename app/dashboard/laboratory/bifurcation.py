@@ -1,4 +1,4 @@
-"""How the motion changes over one parameter: a bifurcation diagram of the machine that is set."""
+"""How the motion changes with one parameter: a bifurcation diagram of the machine as set."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ TEETH = ("teeth_driver", "teeth_driven")
 
 @dataclass(frozen=True)
 class Range:
-    """Values of what is varied."""
+    """The varied parameter and its values."""
 
     name: str
     title: str
@@ -48,7 +48,7 @@ class Range:
 
 
 def parameters_of(setup: Setup) -> dict[str, str]:
-    """Return what can be varied, with a title and a unit: operation, the effects that are on, parameters."""
+    """Return what can be varied, name → title with unit: operation, active effects, parameters."""
     titles = {SPEED: "Speed (rpm)", TORQUE: "Torque (N·m)"}
     for setting in setup.effects:
         severity = effect(setting.name).severity
@@ -62,7 +62,7 @@ def parameters_of(setup: Setup) -> dict[str, str]:
 
 
 def choose_range(run: LaboratoryRun, name: str, places: Sequence[DeltaGenerator]) -> Range:
-    """Let the user choose from, to, and how many."""
+    """Let the user choose the first and last value and the number of values."""
     low, high = _suggested(run, name)
     start, stop, number = places
     key = f"bifurcation {run.setup.preset} {name}"
@@ -76,7 +76,7 @@ def choose_range(run: LaboratoryRun, name: str, places: Sequence[DeltaGenerator]
 
 
 def branch_of(run: LaboratoryRun, chosen: Range, *, signal: str, section: str) -> Branch:
-    """Return what is run at each value: the machine as it is set, but for what is varied."""
+    """Return what is run at each value: the machine as set, except for what is varied."""
     setup = run.setup
     options = next((s.options for s in setup.effects if s.name == chosen.name), {})
     sweep = Sweep(
@@ -95,7 +95,7 @@ def branch_of(run: LaboratoryRun, chosen: Range, *, signal: str, section: str) -
 
 
 def motion_s(run: LaboratoryRun, request: BifurcationRequest) -> float:
-    """Motion that is simulated in all, about."""
+    """Return the approximate length of all motion to be simulated, in s."""
     branch, setup = request.branch, run.setup
     settle_s = RAMP_S + DECAYS * slowest_decay_s(run.machine, Operation.steady(setup.speed_rpm, setup.torque_nm))
     varied = branch.sweep.axes[0].name == SPEED
@@ -132,17 +132,17 @@ def _titled(title: str, unit: str) -> str:
 
 
 MAX_MOTION_S = 240.0
-"""Motion that is simulated at most: a minute or two of waiting."""
+"""Maximum length of motion that is simulated: a minute or two of waiting."""
 DIRECTIONS = {"both": "up and down", "up": "up", "down": "down", "rest": "from rest"}
 SECTION_WORDS = {"mesh": "mesh cycle", "shaft": "revolution"}
 PASS_S = 2.5
-"""A fragment hears of a click only when it has run: it runs for so long, shows what there is, and goes on."""
+"""A fragment notices a click only after a run: each run takes this long, shows what there is, and starts the next."""
 ASKED, DONE = "bifurcation asked", "bifurcation done"
 Branches = dict[str, list[KeptValue]]
 
 
 def show_bifurcation(run: LaboratoryRun) -> None:
-    """Choose what is varied; run it on demand; show picture and table, or what is wrong with what was asked for."""
+    """Choose what is varied, run it on demand, and show the figure and data, or what is wrong with the request."""
     try:
         _choose_and_show(run)
     except GearsigError as error:
@@ -162,8 +162,8 @@ def _choose_and_show(run: LaboratoryRun) -> None:
     looks = {"name": "once", "first": "mesh", "format_func": SECTION_WORDS.__getitem__, "required": True}
     section = address.ask_one(left.segmented_control, "A point once per", SECTIONS, **looks)
     about = (
-        "Up and down: each value goes on from where the last one ended. Where both differ, two motions are possible, "
-        "and it is the past that decides."
+        "Up and down: each value continues from where the last one ended. Where the two differ, two motions are "
+        "possible, and the history decides between them."
     )
     looks = {"name": "direction", "format_func": DIRECTIONS.__getitem__, "required": True, "help": about}
     direction = address.ask_one(middle.segmented_control, "Direction", list(DIRECTIONS), **looks)
@@ -175,7 +175,7 @@ def _choose_and_show(run: LaboratoryRun) -> None:
 
 
 def _run_and_show(run: LaboratoryRun, request: BifurcationRequest, chosen: Range) -> None:
-    """Run what is missing if that was asked for, showing it as it comes; what is complete stays when it is stopped."""
+    """Run missing values on request, showing them as they come; complete ones stay after a stop."""
     question = repr(request.definition())
     known, branches = st.session_state.get(DONE, ("", {}))
     if known != question:
@@ -197,13 +197,13 @@ def _run_and_show(run: LaboratoryRun, request: BifurcationRequest, chosen: Range
     if any(measured_of(values) for values in branches.values()):
         _show(request, branches, chosen)
     else:
-        st.caption("Nothing is drawn yet: a value takes about half a second, in either direction.")
+        st.caption("Nothing is drawn yet: each value takes about half a second per direction.")
     if is_running:
         _go_on()
 
 
 def _go_on() -> None:
-    """Run again: the view alone, or the page where the page is what ran (after a change of tab)."""
+    """Run again: the view alone, or the whole page if that is what ran (after a change of tab)."""
     try:
         st.rerun(scope="fragment")
     except StreamlitAPIException:
@@ -211,7 +211,7 @@ def _go_on() -> None:
 
 
 def _fill(request: BifurcationRequest, branches: Branches) -> None:
-    """Run values for a while."""
+    """Run values for up to about `PASS_S`."""
     n, bar, until = request.n_values, st.progress(0.0, "Simulating …"), monotonic() + PASS_S
     for name in request.branches:
         values = request.branch.values[:: -1 if name == "down" else 1]
@@ -234,14 +234,14 @@ def _show(request: BifurcationRequest, branches: Branches, chosen: Range) -> Non
     n_done = _n_done(branches)
     show_figure(figure_of(request.branch, branches), f"Poincaré points over {chosen.title}", "bifurcation")
     st.caption(
-        "Upper panel: one point per cycle; a single point is a motion that repeats each cycle, two a motion that takes "
-        "two cycles, a smear one that never repeats. Lower panel: how large the motion is. Shaded: two motions are "
-        "possible, as far as the values tried tell: a range that begins or ends where the sweep does may go on."
+        "Upper panel: one point per cycle; a single point is a motion that repeats each cycle, two points one that "
+        "takes two cycles, a smear one that never repeats. Lower panel: how large the motion is. Shaded: two motions "
+        "are possible, as far as the values tried show; a range that reaches an end of the sweep may extend further."
         + ("" if n_done == request.n_values else f" So far {n_done} of {request.n_values} values.")
     )
     reasons = [value for kept in branches.values() for value in kept if value.reason]
     if reasons:
-        st.warning(f"{len(reasons)} values gave nothing; at {reasons[0].value:.5g}: {as_typed(reasons[0].reason)}")
+        st.warning(f"{len(reasons)} values gave no result; at {reasons[0].value:.5g}: {as_typed(reasons[0].reason)}")
     sweep = request.branch.sweep
     points = points_csv(request.branch, branches)
     download("Points (CSV)", points, f"bifurcation_{sweep.preset}_{sweep.axes[0].name}.csv")

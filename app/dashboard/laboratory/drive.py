@@ -1,4 +1,4 @@
-"""A drive that starts, stops and strikes back: what it does, and what a recording of it tells."""
+"""A drive that starts and stops, with impacts on both flanks: what it does, and what its recording shows."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ CRACK = "root_crack"
 
 @dataclass(frozen=True)
 class DriveFault:
-    """An effect of the drive: the end of its slider, what it does, and where it sits if that can be chosen."""
+    """An effect of the drive: the end of its slider, what it does, and where it is if that can be chosen."""
 
     highest: float
     about: str
@@ -50,7 +50,7 @@ class DriveFault:
 FAULTS = {
     CRACK: DriveFault(
         2.0,  # modules
-        "Pairs of the cracked tooth lose stiffness, on the drive flank, where the load opens the crack.",
+        "Pairs with the cracked tooth lose stiffness on the drive flank, where the load opens the crack.",
         "tooth",
         "Cracked tooth of the pinion",
         20,
@@ -58,11 +58,11 @@ FAULTS = {
     "backlash": DriveFault(500.0, "Both flanks move apart: longer flights, harder impacts."),
     "tooth_wear": DriveFault(
         200.0,
-        "Worn off the drive flanks where it is most: at their ends, by sliding; nothing at the pitch point.",
+        "Maximum depth worn off the drive flanks: at their ends, by sliding; none at the pitch point.",
     ),
-    "sliding_friction": DriveFault(0.2, "Coefficient of the flanks, beside the healthy one."),
+    "sliding_friction": DriveFault(0.2, "Friction coefficient of the flanks, added to the healthy one."),
     "torque_ripple": DriveFault(
-        20.0, "Pistons of the motor, part of its torque.", "order", "Ripples per revolution", 50
+        20.0, "From the motor's pistons, as a share of its torque.", "order", "Ripples per revolution", 50
     ),
 }
 
@@ -70,13 +70,13 @@ FAULTS = {
 Parameters = list[tuple[str, ParameterValue]]
 RATES_HZ = (1000.0, 4000.0, 10000.0)
 COUNTS = [2**bits for bits in range(10, 25, 2)]
-ABOUT_LAWS = "What they really give: 0.947, 0.954 and 0.952 for a restitution of 0.95; 0.470, 0.725 and 0.663 for 0.5."
+ABOUT_LAWS = "What they actually give: 0.947, 0.954, 0.952 for a restitution of 0.95; 0.470, 0.725, 0.663 for 0.5."
 
 
 def choose_drive(preset: Preset) -> Setup:
-    """Return what the user set in the sidebar; what is not offered is the preset's.
+    """Return the setup chosen in the sidebar; what is not offered is the preset's.
 
-    From what is changed most to what is seldom changed: how it runs, its teeth, its load, its faults, its measurement.
+    In order of how often they are changed: operation, teeth, load, faults, measurement.
     """
     with st.sidebar:
         mode, torque_nm, speed_rpm = _choose_running(preset)
@@ -106,12 +106,12 @@ def _choose_running(preset: Preset) -> tuple[str, float, float]:
     """Return the mode, the torque of the motor and the speed that the flow of oil allows."""
     mode = address.ask_one(st.segmented_control, "Mode", MODES, name="mode")
     torque_nm = choose_number("Torque of the motor (N·m)", "torque of the drive", preset.torque_nm, 300.0)
-    label, key = "Speed that the flow allows (rpm)", "speed of the drive"
+    label, key = "Speed that the oil flow allows (rpm)", "speed of the drive"
     return mode, torque_nm, choose_number(label, key, preset.speed_rpm, 300.0, low=10.0)
 
 
 def _choose_teeth(preset: Preset) -> Parameters:
-    """Return how the flanks strike back, how far apart they are, how they rub."""
+    """Return the flanks' damping law, restitution, half backlash and friction."""
     law = address.ask_one(
         st.selectbox,
         "Damping law",
@@ -130,19 +130,19 @@ def _choose_teeth(preset: Preset) -> Parameters:
 
 
 def _choose_load(preset: Preset) -> Parameters:
-    """Return what stops the gripper, what it holds, and what strikes it."""
+    """Return brake, press, workpiece and friction of the gripper."""
     highest = {
         "brake_nm": ("Brake (N·m)", 300.0),
         "press_nm": ("Blow of the press (N·m)", 6000.0),
-        "piece_mass_kg": ("Mass of the piece (kg)", 2000.0),
-        "piece_offset_mm": ("Piece off centre (mm)", 200.0),
+        "piece_mass_kg": ("Mass of the workpiece (kg)", 2000.0),
+        "piece_offset_mm": ("Workpiece off centre (mm)", 200.0),
         "load_friction_nm": ("Friction of the gripper (N·m)", 600.0),
     }
     return [choose_parameter(preset, name, label, high) for name, (label, high) in highest.items()]
 
 
 def _choose_measurement(preset: Preset) -> tuple[float, float, Parameters]:
-    """Return length and sampling rate of the recording, and how finely and quietly its angles are read."""
+    """Return length (s) and sampling rate (Hz) of the recording, and resolution and noise of its angles."""
     # a cycle lasts three seconds: a shorter recording shows none
     length_s = choose_number("Length (s)", "length of the drive", 6.0, 30.0, low=3.5)
     looks = {"format_func": "{:g}".format, "key": "rate of the drive", "name": "rate"}
@@ -172,7 +172,7 @@ def _choose_effect(name: str, chosen: Preset) -> EffectSetting:
 
 @dataclass(frozen=True)
 class DriveRun:
-    """What one setup gives.
+    """The results of one setup.
 
     Parameters
     ----------
@@ -203,7 +203,7 @@ def run_drive(setup: Setup) -> DriveRun:
     Raises
     ------
     InputError
-        If a value does not fit.
+        If a value is not allowed.
     """
     recording = setup.record()
     motion = motions.measure_motion(recording)
@@ -225,13 +225,13 @@ NUMBERS = {
     "hardest impact": "m/s",
     "impact loss per cycle": "J",
 }
-"""Indicators on top of the page, with the unit for people."""
+"""Indicators at the top of the page, with the unit shown."""
 TOGETHER = "Healthy beside faulty"
 VIEWS = ("Motion", "Force between the teeth", "Impacts", "Indicators")
 
 
 def show_views(healthy: DriveRun, faulty: DriveRun | None) -> None:
-    """Show one of the views, of either drive."""
+    """Show one of the views, for either drive."""
     with st.container(horizontal=True, horizontal_alignment="distribute", vertical_alignment="center"):
         view = address.ask_one(
             st.segmented_control,
@@ -321,8 +321,8 @@ def _show_drives(setup: Setup) -> None:
     with head:
         show_title(setup, is_shown=faulty is not None)
         st.caption(
-            "Forging manipulator: pinion and wheel with gripper and piece. Every number is read from the recording, as "
-            "of a measured one."
+            "Forging manipulator: pinion and wheel with gripper and workpiece. Every number is computed from the "
+            "recording, as for a measured one."
         )
     with buttons:
         show_saving(setup if faulty else setup.healthy)

@@ -1,4 +1,4 @@
-"""One simulation of the page: the recording, and the motion behind it that no sensor shows."""
+"""One simulation of the laboratory: the recording, and the motion behind it that no sensor shows."""
 
 from __future__ import annotations
 
@@ -46,12 +46,12 @@ MOTION = (
     "mesh_force_n",
 )
 MOTION_HZ = 80_000.0
-"""Points of the motion per second that are kept, at least."""
+"""Minimum number of points of the motion kept per second."""
 
 
 @dataclass(frozen=True)
 class LaboratoryRun:
-    """A setup and what it gives.
+    """A setup and its results.
 
     Parameters
     ----------
@@ -74,8 +74,8 @@ class LaboratoryRun:
 
     @property
     def rig(self) -> Rig:
-        """Rig of the recording; a simulated one always has it."""
-        assert self.recording.rig is not None  # noqa: S101 - said to the type checker
+        """Rig of the recording; a simulated one always has one."""
+        assert self.recording.rig is not None  # noqa: S101 - for the type checker
         return self.recording.rig
 
     @property
@@ -91,12 +91,12 @@ class LaboratoryRun:
 
 
 def run_setup(setup: Setup) -> LaboratoryRun:
-    """Simulate once, and take both from it: the recording, sample by sample that of `sims.simulate`, and the motion.
+    """Simulate once, for both the recording, sample by sample that of `sims.simulate`, and the motion.
 
     Raises
     ------
     InputError
-        If a value is out of its range, or the machine allows less.
+        If a value is out of range, or exceeds what the machine allows.
     """
     from sims.cracked import CrackedPair
     from sims.reduced_fe import ReducedPair, simulate_pair
@@ -122,7 +122,7 @@ def run_setup(setup: Setup) -> LaboratoryRun:
 
 
 def _shown_part(response: Response | FlexResponse, duration_s: float) -> Response:
-    """Keep the signals that are shown, as many points as that takes, from the recording's start to its end."""
+    """Keep the signals that are shown, thinned to what that needs, from the recording's start to its end."""
     every = max(int(1.0 / (MOTION_HZ * response.interval_s)), 1)
     time = response.time_s
     first, last = (int(i) for i in np.searchsorted(time, (0.0, duration_s)))
@@ -131,25 +131,25 @@ def _shown_part(response: Response | FlexResponse, duration_s: float) -> Respons
 
 
 def lines_per_period(run: LaboratoryRun, n_per_revolution: float) -> FloatArray:
-    """Times at which the driver has turned by another 1/n of a revolution (a Poincaré section's strobe)."""
+    """Return the times (s) at which the driver has turned another 1/n of a revolution: a Poincaré section's strobe."""
     turned = run.response["driver angle"] * n_per_revolution / (2.0 * np.pi)
     return times_of(run, turned, np.arange(np.ceil(turned[0]), np.floor(turned[-1]) + 1.0))
 
 
 def times_of(run: LaboratoryRun, phase: FloatArray, values: FloatArray | Sequence[float]) -> FloatArray:
-    """Times at which a rising phase takes values."""
+    """Return the times (s) at which a rising phase takes given values."""
     result: FloatArray = np.interp(values, phase, run.response.time_s)
     return result
 
 
-# Each holds some MB: a recording and eight signals of the motion at 80 kHz. An older setting of a slider is of no use.
+# Each holds some MB: a recording and eight signals of the motion at 80 kHz. Older settings of a slider are of no use.
 simulated = kept(24, "Simulating …", grace_s=0.0)(run_setup)
 PREVIEW_REVOLUTIONS, PREVIEW_S = 2.0, 0.1
-"""Of the slower shaft, and seconds at least."""
+"""Length of a preview: revolutions of the slower shaft, and at least so many seconds."""
 
 
 def preview_of(setup: Setup) -> Setup | None:
-    """Return the setup with a recording that is short enough to follow a slider; None where it is already."""
+    """Return the setup with a recording short enough to follow a slider; None if it already is."""
     teeth = [preset_number(preset(setup.model, setup.preset), name) for name in ("teeth_driver", "teeth_driven")]
     slower_per_s = setup.revolutions_per_s * min(teeth[0] / teeth[1], 1.0)
     if slower_per_s <= 0.0:
@@ -159,7 +159,7 @@ def preview_of(setup: Setup) -> Setup | None:
 
 
 def all_simulated(setup: Setup) -> bool:
-    """Whether healthy and faulty machine are at hand at full length, or it is known why not."""
+    """Whether healthy and faulty machine are available at full length, or it is known why not."""
     try:
         return all(simulated.is_answered(s) for s in (setup.healthy, with_all_options(setup)))
     except GearsigError:
@@ -172,7 +172,7 @@ def with_all_options(setup: Setup) -> Setup:
 
 
 def faulty_of(setup: Setup, simulate: Callable[[Setup], R]) -> R | None:
-    """Return the run with every effect complete; None, with the reason on the page if there is one, without."""
+    """Return the run with every effect complete; None without effects or, with the reason shown, without a result."""
     try:
         return None if setup.is_healthy else simulate(with_all_options(setup))
     except GearsigError as error:
@@ -184,13 +184,13 @@ N_MESH_HARMONICS, N_SIDEBANDS, N_BEARING_HARMONICS, N_SHAFT_HARMONICS = 5, 3, 4,
 
 
 def affected_sides(setup: Setup) -> tuple[str, ...]:
-    """Sides whose shaft modulates the mesh: those of the effects; both, where none says so."""
+    """Return the sides whose shafts modulate the mesh: those that the effects name, or both if none is named."""
     named = {str(s.options.get("gear") or s.options.get("shaft") or "") for s in setup.effects}
     return tuple(side for side in SIDES if side in named) or SIDES
 
 
 def spectrum_cursors(run: LaboratoryRun) -> tuple[Cursor, ...]:
-    """Return mesh harmonics, sidebands of the shafts concerned, and shaft lines, in Hz."""
+    """Return mesh harmonics, sidebands of the affected shafts, and shaft lines, in Hz."""
     rig, setup = run.rig, run.setup
     shafts = dict(zip(SIDES, run.machine.shaft_names, strict=True))
     concerned = {shafts[side] for side in affected_sides(setup)}
@@ -212,7 +212,7 @@ def _hum_cursors(setup: Setup) -> tuple[Cursor, ...]:
 
 
 def envelope_cursors(run: LaboratoryRun) -> tuple[Cursor, ...]:
-    """Return the lines of shafts concerned, and harmonics of the lines of bearings with a defect, in Hz."""
+    """Return the lines of the affected shafts, and harmonics of the lines of defective bearings, in Hz."""
     concerned = {run.machine.shaft_names[SIDES.index(side)] for side in affected_sides(run.setup)}
     lines = order_lines(run.rig, n_shaft_harmonics=N_SHAFT_HARMONICS, n_sidebands=0)
     shaft_lines = [line for line in lines if line.kind == "shaft" and line.element in concerned]
@@ -226,21 +226,21 @@ def envelope_cursors(run: LaboratoryRun) -> tuple[Cursor, ...]:
 
 
 def shaft_lines_hz(run: LaboratoryRun) -> list[float]:
-    """Return the first orders of the shafts concerned, in Hz."""
+    """Return the first orders of the affected shafts, in Hz."""
     shafts = dict(zip(SIDES, run.machine.shaft_names, strict=True))
     turns = [(run.rig.ratio(shafts[side]) or 0.0) * run.setup.revolutions_per_s for side in affected_sides(run.setup)]
     return [k * f for f in turns if f > 0 for k in range(1, N_BEARING_HARMONICS + 1)]
 
 
 def bearing_lines_hz(run: LaboratoryRun) -> dict[str, float]:
-    """Return the frequencies at which rolling elements strike defects, less slip: name → Hz."""
+    """Return the frequencies at which rolling elements strike defects, corrected for slip: name → Hz."""
     lines_hz = {}
     for support in run.machine.bearings:
         if support.defect is None:
             continue
         name = {"outer": "BPFO", "inner": "BPFI"}[support.defect.race]
         orders, turns = support.bearing.orders(), run.rig.ratio(support.bearing.shaft) or 1.0
-        # A cage that slips falls behind: fewer elements pass the standing race, and as many more the turning one.
+        # A slipping cage falls behind: fewer elements pass the stationary race, and as many more the rotating one.
         slip = support.defect.slip * orders["BPFO"]
         order = orders[name] + (slip if name == "BPFI" else -slip)
         lines_hz[f"{name} {support.bearing.name}"] = order * turns * run.setup.revolutions_per_s
@@ -269,7 +269,7 @@ ENDINGS = (".h5", ".csv", ".parquet", ".mat", ".wav")
 
 
 def show_saving(setup: Setup, lengths_s: Sequence[float] = ()) -> None:
-    """Offer the simulated recording as files, and the way to the analysis page.
+    """Offer the simulated recording as files, and to be opened on the analysis page.
 
     Parameters
     ----------
@@ -288,7 +288,7 @@ def show_saving(setup: Setup, lengths_s: Sequence[float] = ()) -> None:
             twin = st.toggle("With its healthy twin", key="twin of the saved recording", persist_state="session")
             made = partial(zipped, (setup, setup.healthy) if twin else (setup,), ending)
             download("Download", made, f"{setup.file_stem}.zip", type="primary")
-            st.caption("A zip with the recording, its rig file, and what was put in (truth).")
+            st.caption("A zip file with the recording, its rig file, and the truth: what was put in.")
         if st.button("Open in Analysis", icon=":material/troubleshoot:"):
             with st.spinner("Simulating the recording …"):
                 state.open_simulated(chosen_of(setup))

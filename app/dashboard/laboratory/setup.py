@@ -1,4 +1,4 @@
-"""The set-up on the page: a machine, how it runs, its effects, and how it is measured."""
+"""The setup on the page: a machine, how it runs, its effects, and how it is measured."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ if TYPE_CHECKING:
 
 
 MODEL = "cracked"
-"""Whose motion the bifurcation can follow."""
+"""The model whose motion the bifurcation diagram can follow."""
 MODELS = (MODEL, "reduced-fe")
 DRIVE_MODEL = "forging"
-"""The drive that starts and stops, with a page of its own."""
+"""The drive that starts and stops, with its own controls and figures."""
 
 
 @dataclass(frozen=True)
 class Setup:
-    """Everything that decides a simulation: equal setups give equal recordings.
+    """Everything that determines a simulation: equal setups give equal recordings.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class Setup:
     speed_rpm, torque_nm : float
         Of the input shaft, constant.
     parameters : tuple of (name, value)
-        What differs from the preset, in the healthy machine as well.
+        Values that differ from the preset's, also in the healthy machine.
     effects : tuple of EffectSetting
     duration_s, sampling_rate_hz : float
     seed : int
@@ -81,7 +81,7 @@ class Setup:
         return self.speed_rpm / 60.0
 
     def record(self) -> Recording:
-        """Simulate the recording that the command line makes of the same settings."""
+        """Simulate the recording that the command line makes from the same settings."""
         return sims.simulate(
             self.model,
             preset=self.preset,
@@ -108,13 +108,13 @@ class Setup:
 
 
 def effect_text(setting: EffectSetting) -> str:
-    """Name an effect with its severity, e.g. "crack in a tooth root, 2 mm"."""
+    """Return an effect's title with its severity, e.g. "crack in a tooth root, 2 mm"."""
     known = effect(setting.name)
     return f"{known.title}, {setting.severity:.4g} {shown_unit(known.severity.unit)}".rstrip()
 
 
 def shown_unit(unit: str) -> str:
-    """Write a unit of the catalogue as people read it."""
+    """Return a unit of the catalogue in readable form."""
     from gearsig.formatting import unit_text
     from gearsig.gap import severity_unit
 
@@ -125,13 +125,13 @@ PREFIX, SUFFIX, TYPED = "lab ", " typed", "lab typed values"
 
 
 def show_typed_toggle() -> None:
-    """Let the user type numbers instead of pulling sliders; the values carry over."""
+    """Let the user type numbers instead of moving sliders; the values carry over."""
     st.toggle(
         "Type the numbers",
         key=TYPED,
         on_change=_carry_over,
         persist_state="session",
-        help="Exact values, also beyond the sliders. What is not possible is said on the page.",
+        help="Exact values, also beyond the sliders' ends. The page says if a value is not possible.",
     )
 
 
@@ -148,7 +148,7 @@ def choose_number(label: str, name: str, default: float, high: float, *, low: fl
     high, low : float
         Ends of the slider; a value that was typed beyond them widens it.
     about : str
-        Shown on demand.
+        Help text shown on demand.
     """
     key, in_address = PREFIX + name, name.replace("severity of ", "").replace(" ", "-")
     step = slider_step(low, high)
@@ -168,7 +168,7 @@ def choose_number(label: str, name: str, default: float, high: float, *, low: fl
 
 
 def slider_values() -> dict[str, float]:
-    """Return what the sliders of `choose_number` stand at in this run, by the class that Streamlit gives each."""
+    """Return the values of the `choose_number` sliders in this run, by the CSS class that Streamlit gives each."""
     return {
         "st-key-" + re.sub(r"[^a-zA-Z0-9_-]", "-", str(key)): value
         for key, value in st.session_state.items()
@@ -181,7 +181,7 @@ HELD_S, REST_S = 0.4, 0.15
 
 
 def wait_for_rest() -> None:
-    """Let a slider come to rest whose last change was a moment ago; a key that is held changes it 30 times a second."""
+    """Wait until a slider that has just changed comes to rest; a key that is held changes it 30 times a second."""
     values, now_s = slider_values(), monotonic()
     past, changed_s = st.session_state.get(_LAST_CHANGE, (values, 0.0))
     if values == past:
@@ -207,7 +207,7 @@ def preset_number(preset: Preset, name: str) -> float:
 
 
 def slider_step(low: float, high: float) -> float:
-    """Return the step of a slider: some 150 of them from end to end."""
+    """Return the step of a slider: about 150 steps from end to end."""
     return nice_step((high - low) / 150.0)
 
 
@@ -241,7 +241,7 @@ Options = tuple[tuple[str, float | str], ...]
 
 
 def greatest_severity(chosen: Preset, name: str, high: float, options: Options = ()) -> float:
-    """Return the greatest severity up to `high` that a machine takes, rounded down to the slider's step.
+    """Return the maximum severity up to `high` that a machine allows, rounded down to the slider's step.
 
     Parameters
     ----------
@@ -252,7 +252,7 @@ def greatest_severity(chosen: Preset, name: str, high: float, options: Options =
     high : float
         Above 0: where the slider ends if the machine allows it.
     options : tuple of (name, value)
-        Of the effect, e.g. on which gear it is. Where they fit no severity at all, the end stays: the page says why.
+        Of the effect, e.g. on which gear it is. If they allow no severity at all, the end stays: the page says why.
     """
     greatest = _greatest(chosen.model, chosen.name, name, high, options)
     step = slider_step(0.0, greatest)
@@ -293,7 +293,7 @@ def _meshed(machine: Machine, gears: tuple[ReducedGear, ...]) -> bool:
 
 @lru_cache(maxsize=16)
 def _machine(model: str, preset_name: str) -> tuple[Machine, tuple[ReducedGear, ...]]:
-    """Healthy machine of a preset, and its reduced gears."""
+    """Return the healthy machine of a preset, and its reduced gears."""
     from sims.cracked import CrackedPair
     from sims.reduced_fe import ReducedPair
 
@@ -306,8 +306,8 @@ def _machine(model: str, preset_name: str) -> tuple[Machine, tuple[ReducedGear, 
 
 CRACK, EFFECTS = "root_crack", "effects of the laboratory"
 WIDEST = 5.0
-"""Sliders end at so many times the typical value: the catalogue's ranges reach far beyond it. Where the machine ends
-earlier, they do."""
+"""Sliders end at so many times the typical value, as the catalogue's ranges reach far beyond it, or earlier if the
+machine allows less."""
 GROUP_WORDS = {
     "tooth-local": "tooth",
     "flank": "flanks",
@@ -319,9 +319,9 @@ GROUP_WORDS = {
 
 
 def choose_effects(preset: Preset, meaningful: Collection[str]) -> list[EffectSetting]:
-    """Return the effects that are on, of those the model knows.
+    """Return the active effects, of those the model knows.
 
-    The root crack's slider is always there, and stands at 0 first; others start at their typical value.
+    The root crack's slider is always shown and starts at 0; others start at their typical value.
     """
     crack = _choose_severity(effect(CRACK), preset, start=0.0)
     further = {name: known for name, known in effects().items() if name in meaningful and name != CRACK}
@@ -331,9 +331,9 @@ def choose_effects(preset: Preset, meaningful: Collection[str]) -> list[EffectSe
         list(further),
         format_func=lambda name: f"{GROUP_WORDS.get(further[name].group, further[name].group)}: {further[name].title}",
         key=EFFECTS,
-        placeholder="Choose what is wrong …",
+        placeholder="Choose effects …",
         persist_state="session",
-        help="Any number at once. Each gets a slider of its own.",
+        help="Any number at once. Each gets its own slider.",
     )
     address.keep("effects", ",".join(names), "")
     chosen = [
@@ -364,12 +364,12 @@ def _choose_severity(chosen: Effect, preset: Preset, *, start: float) -> EffectS
 
 
 def _as_written(of: Effect, text: str) -> str:
-    """Return a text of an effect as Markdown; the catalogue's hold no marks, and screen readers tell escapes."""
+    """Return an effect's text as Markdown; the catalogue's needs no escapes, which screen readers would read out."""
     return as_typed(text) if is_user_effect(of.name) else text
 
 
 def _options_so_far(of: Effect) -> tuple[tuple[str, float | str], ...]:
-    """Options as they stood when the page ran last: their widgets come below the slider."""
+    """Return the options as of the page's last run: their widgets come below the slider."""
     values = {option.name: st.session_state.get(_option_key(of, option)) for option in of.options}
     return tuple((name, value) for name, value in values.items() if isinstance(value, float | int | str))
 
@@ -379,7 +379,7 @@ def _option_key(of: Effect, option: Option) -> str:
 
 
 def _choose_option(of: Effect, option: Option) -> float | str | None:
-    """Return the value of an option; None where it is left to be drawn."""
+    """Return the value of an option; None if it is to be drawn at random."""
     unit = shown_unit(option.unit)
     words = option.name.removesuffix("_deg").removesuffix("_percent").removesuffix("_um").removesuffix("_hz")
     label = _as_written(of, words.replace("_", " ").capitalize() + (f" ({unit})" if unit else ""))
@@ -390,7 +390,7 @@ def _choose_option(of: Effect, option: Option) -> float | str | None:
         first = option.default if option.default in choices else choices[0]
         return str(address.ask_one(st.selectbox, label, choices, first=first, **looks))
     low = (option.low or 0) if option.whole else None
-    looks |= {"placeholder": "drawn" if option.default is None else address.text_of(option.default)}
+    looks |= {"placeholder": "random" if option.default is None else address.text_of(option.default)}
     number = address.ask_number(st, label, low, first=option.default, whole=option.whole, **looks)
     return None if number is None else float(number)
 
@@ -404,7 +404,7 @@ MOST_SEEDS = 10**6
 
 
 def choose_setup(preset: Preset) -> Setup:
-    """Return what the user set in the sidebar; what the sliders do not offer is the preset's."""
+    """Return the setup chosen in the sidebar; what the sliders do not offer is the preset's."""
     with st.sidebar:
         speed, torque = _choose_operation(preset)
         with st.expander("Flanks and oil", icon=":material/opacity:"):
@@ -418,7 +418,7 @@ def choose_setup(preset: Preset) -> Setup:
 
 
 def shown_name(preset: str) -> str:
-    """Write a preset's name for people.
+    """Return a preset's name in readable form.
 
     Examples
     --------
@@ -450,7 +450,7 @@ def _choose_operation(preset: Preset) -> tuple[float, float]:
 
 
 def _choose_flanks(preset: Preset) -> Parameters:
-    st.caption("Of the healthy and the faulty machine alike.")
+    st.caption("For the healthy and the faulty machine alike.")
     rough = choose_parameter(preset, "roughness_um", "Flank roughness, rms (µm)", 2.0)
     if not any(p.name == "friction" for p in simulator(preset.model).parameters):
         return (rough,)
@@ -472,14 +472,14 @@ def _choose_measurement(preset: Preset, speed: float) -> tuple[Parameters, float
         "Length shown (s)",
         (AUTOMATIC, *DURATIONS_S),
         name="length",
-        help="A longer signal has a finer spectrum and takes longer to follow the sliders. Auto: eight revolutions of "
+        help="A longer signal gives a finer spectrum but follows the sliders more slowly. Auto: eight revolutions of "
         "the slower shaft, at most a second.",
     )
     looks: dict[str, Any] = {"name": "rate", "first": 20480.0, "format_func": "{:g}".format}
     rate = address.ask_one(st.selectbox, "Sampling rate (Hz)", (10240.0, 20480.0, 40960.0), **looks)
     loudest = max(2.0, 4.0 * preset_number(preset, "noise_mps2"))
     noise = choose_parameter(preset, "noise_mps2", "Background noise, rms (m/s²)", loudest)
-    about = "Another one draws other roughness, other noise, other angles. Healthy and faulty always share it."
+    about = "Another seed draws other roughness, noise and angles. Healthy and faulty machine always share it."
     seed = address.ask_number(st, "Seed", 0, MOST_SEEDS, name="seed", first=0, whole=True, help=about)
     limit = choose_parameter(preset, "sensor_range_mps2", "Range of the sensors (m/s²)", 5e3)
     length = float(duration) if isinstance(duration, float) else automatic_s(preset, speed)
@@ -487,7 +487,7 @@ def _choose_measurement(preset: Preset, speed: float) -> tuple[Parameters, float
 
 
 def automatic_s(preset: Preset, speed_rpm: float) -> float:
-    """Return the shortest of `DURATIONS_S` that shows enough revolutions, or the longest that is still quick."""
+    """Return the shortest of `DURATIONS_S` that shows enough revolutions, or the longest that is still fast."""
     ratio = preset_number(preset, "teeth_driver") / preset_number(preset, "teeth_driven")
     eight_revolutions_s = 8.0 * 60.0 / max(speed_rpm * min(ratio, 1.0), 1e-6)
     return next((d for d in DURATIONS_S if eight_revolutions_s <= d < MAX_AUTOMATIC_S), MAX_AUTOMATIC_S)

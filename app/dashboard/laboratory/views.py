@@ -47,7 +47,7 @@ def show_time(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
     looks = {"format_func": _shown, "width": 320}
     name = address.ask_one(row.selectbox, "Signal", names, name="signal", **looks)
     looks = {"first": "3 revolutions", "name": "shown"}
-    shown = address.ask_one(row.segmented_control, "Shown, of the input shaft", list(SEGMENTS), **looks)
+    shown = address.ask_one(row.segmented_control, "Range shown (input shaft)", list(SEGMENTS), **looks)
     end = _end_s(healthy, SEGMENTS[shown])
     healthy_line, label = signal_of(healthy, name, end)
     if faulty is None:
@@ -60,7 +60,7 @@ def show_time(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
         _show_line(healthy_line, "healthy", label, end, limits, height_px=HEIGHT_PX)
     with right:
         _show_line(faulty_line, "faulty", label, end, limits, height_px=HEIGHT_PX)
-    st.markdown("**What the effect adds**: faulty less healthy")
+    st.markdown("**What the effect adds**: faulty minus healthy")
     difference = faulty_line[1] - healthy_line[1]
     limits, line = padded_limits([difference]), (healthy_line[0], difference)
     _show_line(line, "difference", label, end, limits, cursors=runs.entries(faulty), height_px=HEIGHT_PX)
@@ -103,19 +103,19 @@ def _end_s(run: LaboratoryRun, revolutions: float) -> float:
 
 
 def telling_band_hz(recording: Recording, channel: str, expected_hz: Sequence[float]) -> tuple[float, float]:
-    """Return the band in whose envelope the expected lines stand highest above the median of the lines about them.
+    """Return the band (Hz) whose envelope spectrum has the expected lines highest above the median of the others.
 
     Parameters
     ----------
     recording : Recording
     channel : str
     expected_hz : sequence of float
-        Lines; those that the recording is too short for do not count.
+        Lines; those for which the recording is too short are ignored.
 
     Raises
     ------
     RefusalError
-        If no line is expected, or the signal is too short to tell them apart.
+        If no line is expected, or the signal is too short to resolve them.
     """
     values, rate = recording.values(channel), recording.sampling_rate_hz
     lines = np.array([f for f in expected_hz if f * recording.duration_s >= 3.0])
@@ -132,7 +132,7 @@ def telling_band_hz(recording: Recording, channel: str, expected_hz: Sequence[fl
 
 
 def _height(values: FloatArray, rate_hz: float, band_hz: tuple[float, float], lines_hz: FloatArray) -> float:
-    """Sum of the lines' amplitudes over the median amplitude, in the envelope of a band."""
+    """Return the sum of the lines' amplitudes over the median amplitude, in the envelope spectrum of a band."""
     spectrum = envelope_spectrum(band_envelope(values, rate_hz, band_hz))
     inside = spectrum.values[: spectrum.index_of(1.2 * float(lines_hz.max())) + 1]
     floor = float(np.median(inside))
@@ -153,7 +153,7 @@ def show_amplitude(healthy: LaboratoryRun, faulty: LaboratoryRun | None, channel
 
 
 def show_envelope(healthy: LaboratoryRun, faulty: LaboratoryRun | None, channel: str) -> None:
-    """Show the spectra of the envelope about the band in which the marked lines stand out most."""
+    """Show the envelope spectra of the band in which the marked lines stand out most."""
     both = [healthy] if faulty is None else [healthy, faulty]
     cursors = runs.envelope_cursors(both[-1])
     marked = [c.position for c in cursors if c.kind == "bearing"]
@@ -181,7 +181,7 @@ def _envelope_spectrum(recording: Recording, channel: str, band_hz: tuple[float,
 def _show_spectra(
     spectra: Sequence[Spectrum], cursors: Sequence[Cursor], name: str, quantity: str, scale: str, first_end: float
 ) -> None:
-    """Show both over each other, at first up to what is marked; another machine or speed begins anew."""
+    """Show both spectra overlaid, at first up to what is marked; another machine or speed resets the view."""
     end = min(first_end, float(spectra[0].positions[-1])) or float(spectra[0].positions[-1])
     show_spectrum(
         "the laboratory",
@@ -209,9 +209,9 @@ def show_mesh(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
         curves = [stiffness(run, cycles) * 1e-8 for run in both]
         _show_over_cycles(cycles, curves, "mesh stiffness (10⁸ N/m)", marks, "stiffness of the laboratory")
         if len(curves) > 1 and np.allclose(curves[0], curves[1], rtol=1e-6):
-            st.caption("What is switched on leaves the stiffness as it is.")
+            st.caption("The active effects do not change the stiffness.")
     else:
-        st.info("Without a load no tooth is pressed on another: there is no stiffness to show.")
+        st.info("Without a load the teeth are not pressed together: there is no stiffness to show.")
     st.markdown("**Dynamic mesh force** over the same teeth")
     forces = [_force_kn(run, cycles) for run in both]
     _show_over_cycles(cycles, forces, "mesh force (kN)", marks, "force of the laboratory")
@@ -225,7 +225,7 @@ def _show_over_cycles(cycles: FloatArray, curves: list[FloatArray], y: str, mark
 
 
 def stiffness(run: LaboratoryRun, cycles: FloatArray) -> FloatArray:
-    """Tangent stiffness at the static mesh force, N/m."""
+    """Return the tangent stiffness at the static mesh force, in N/m."""
     if run.pair is not None:
         return run.pair.maps(np.array([run.setup.torque_nm]), cycles).tangent_stiffness_n_per_m[:, 0]
     mesh = run.machine.mesh
@@ -234,7 +234,7 @@ def stiffness(run: LaboratoryRun, cycles: FloatArray) -> FloatArray:
 
 
 def _segment(run: LaboratoryRun) -> tuple[tuple[float, float], list[Cursor]]:
-    """Return the mesh cycles about the first faulty tooth that passes in the run; without one, the run's first."""
+    """Return the mesh cycles around the first faulty tooth that passes in the run; without one, the run's first."""
     teeth, cycles = runs.faulty_teeth(run.setup), run.mesh_cycles
     pair = run.machine.mesh.pair
     first = float(np.ceil(cycles[0])) + BEFORE
@@ -254,7 +254,7 @@ def _force_kn(run: LaboratoryRun, cycles: FloatArray) -> FloatArray:
 
 
 def _lines(x: FloatArray, curves: list[FloatArray]) -> list[ChartLine]:
-    """The faulty line lies above: where both coincide, nothing changed."""
+    """Return both lines, the faulty one in front: where they coincide, nothing changed."""
     lines = []
     for place, values in enumerate(curves):
         known = np.isfinite(values)
@@ -267,14 +267,14 @@ MESH_PERIOD = "mesh period"
 GEARS = {"Driver": "driver y", "Driven gear": "driven y"}
 STROBES = {MESH_PERIOD: None, "revolution of the input shaft": 1.0}
 MAX_POINTS = 10_000
-"""A browser without a graphics card draws so many at once."""
+"""Maximum number of points, which a browser without a graphics card can still draw at once."""
 REVOLUTIONS = 1.3
-"""Of the line, so that every tooth is on it; the points are of the whole run."""
+"""Length of the line, so that every tooth is on it; the points cover the whole run."""
 Portrait = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 
 
 def show_phase(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
-    """Show the portraits of one gear along the line of action."""
+    """Show the phase portraits of one gear along the line of action."""
     row = st.container(horizontal=True)  # which wraps where it is narrow
     gear = address.ask_one(row.segmented_control, "Gear", list(GEARS), name="gear")
     strobe = address.ask_one(row.segmented_control, "A point once per", list(STROBES), name="strobe")
@@ -292,7 +292,7 @@ def show_phase(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
             )
             show_lines(panel, f"phase of {name}", legend=True)
     st.caption(
-        "Along the line of action. A closed curve repeats every mesh period, and its points fall together; "
+        "Along the line of action. A closed curve repeats every mesh period, and its points coincide; "
         "scattered points mean a motion that does not repeat."
     )
 
@@ -309,16 +309,16 @@ def portrait(run: LaboratoryRun, signal: str, n_per_revolution: float) -> Portra
     return y[-n::every], v[-n::every], points[0], points[1]
 
 
-# The pair drawn and turning, in step with a cursor in its signal; both machines to listen to.
+# The pair drawn and turning, in step with a cursor in its signal; the sound of both machines.
 
 _gears = component_of("gears")
 N_POINTS = 3000
 LISTEN_HZ = 44100
-"""Rate of what is listened to: slow machines are heard at their own pace."""
+"""Sampling rate of the sound: slow machines are heard at their own pace."""
 
 
 def show_gears(healthy: LaboratoryRun, faulty: LaboratoryRun | None, channel: str) -> None:
-    """Show both gears about the mesh with the force between them, and the channel below; offer both as sound."""
+    """Show both gears near the mesh with the force between them, and the channel below; offer both as sound."""
     both = [healthy] if faulty is None else [healthy, faulty]
     pair, cycles = both[-1].machine.mesh.pair, both[-1].mesh_cycles
     teeth = runs.faulty_teeth(both[-1].setup)
@@ -351,11 +351,11 @@ def show_gears(healthy: LaboratoryRun, faulty: LaboratoryRun | None, channel: st
             "colours": {"measured": colours.measured, "fault": colours.fault},
         },
     )
-    st.caption("Turned a few hundred times slower. The arrow is the mesh force; the coloured tooth is the faulty one.")
+    st.caption("Slowed down a few hundred times. The arrow is the mesh force; the coloured tooth is the faulty one.")
     largest = max(float(np.abs(run.recording.values(channel)).max()) for run in both) or 1.0
     for column, run, name in zip(st.columns(2), both, ("Healthy", "Faulty"), strict=False):
         with column:
-            st.caption(f"{name}, as the sensor hears it")
+            st.caption(f"{name}, as heard by the sensor")
             st.audio(_sound(run, channel, largest), sample_rate=LISTEN_HZ)
 
 
@@ -367,7 +367,7 @@ def _over_cycles(run: LaboratoryRun, channel: str, cycles: FloatArray) -> FloatA
 
 
 def _sound(run: LaboratoryRun, channel: str, largest: float) -> FloatArray:
-    """Return two seconds of the channel, of the same loudness scale for both machines, repeated where it is shorter."""
+    """Return two seconds of the channel, on the same loudness scale for both machines, repeated if it is shorter."""
     values, rate_hz = run.recording.values(channel) / largest, run.recording.sampling_rate_hz
     n = round(LISTEN_HZ * min(2.0, len(values) / rate_hz))
     once = np.interp(np.arange(n) / LISTEN_HZ, np.arange(len(values)) / rate_hz, values)
@@ -412,7 +412,7 @@ NUMBERS: dict[str, tuple[str, Number]] = {
 
 
 def mark_slider_values() -> None:
-    """Say which numbers the results are of: the page's script fades them while a slider beside stands elsewhere."""
+    """Record which slider values the results are for: the page's script fades them while a slider differs."""
     st.html(f'<i class="of-page of-sliders" data-values="{escape(json.dumps(slider_values()))}"></i>')
 
 
@@ -424,10 +424,10 @@ def show_title(setup: Setup, *, is_shown: bool) -> None:
 
 
 def show_expectation(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> None:
-    """Show where theory expects what is on, and what to mind."""
+    """Show where theory expects the active effects, and the recording's warnings."""
     on = [effect(setting.name) for setting in faulty.setup.effects if setting.severity > 0] if faulty else []
     if not on:
-        st.markdown("Pull the crack slider or choose an effect: the faulty machine appears beside this one.")
+        st.markdown("Move the crack slider or choose an effect: the faulty machine then appears beside this one.")
     elif len(on) == 1:
         st.markdown(as_typed(on[0].signature))
     else:
@@ -439,7 +439,7 @@ def show_expectation(healthy: LaboratoryRun, faulty: LaboratoryRun | None) -> No
 
 
 def frequencies(run: LaboratoryRun) -> list[str]:
-    """Return the frequencies of mesh, shafts and struck bearings, for people."""
+    """Return the operating point and the frequencies of mesh, shafts and defective bearings, as texts."""
     turns, rig = run.setup.revolutions_per_s, run.rig
     pair = rig.pairs[0]
     words = [f"{run.setup.speed_rpm:g} rpm, {run.setup.torque_nm:g} N·m"]
@@ -472,13 +472,11 @@ def show_metrics(numbers: Mapping[str, tuple[str, float, float | None]]) -> None
 
 
 def show_legend() -> None:
-    """Say which colour is which, once for all charts."""
+    """Show the legend of colours, once for all charts."""
     colours = palette()
     swatch = '<span style="color:{}">━━</span> {}'
     words = (swatch.format(colours.measured, "healthy"), swatch.format(colours.fault, "faulty"))
-    st.html(
-        "&emsp;".join(words) + "&emsp;<small>same random numbers: what differs is the effect</small>", width="content"
-    )
+    st.html("&emsp;".join(words) + "&emsp;<small>same random numbers: only the effect differs</small>", width="content")
 
 
 def _with_unit(value: float, unit: str) -> str:
@@ -486,7 +484,7 @@ def _with_unit(value: float, unit: str) -> str:
 
 
 def change(old: float, new: float) -> str:
-    """Write a relative change, e.g. " (+12 %)"; nothing where the old value is 0.
+    """Return a relative change as text, e.g. " (+12 %)"; empty if the old value is 0.
 
     Examples
     --------

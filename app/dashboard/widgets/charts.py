@@ -1,4 +1,4 @@
-"""Figures that are zoomed and read off, with named cursors across them; pictures; ranges."""
+"""Zoomable figures with readouts and named cursors; pictures; ranges."""
 
 from __future__ import annotations
 
@@ -57,15 +57,16 @@ def show_differences(
     shown: tuple[float, float],
     words: str,
 ) -> None:
-    """Show differences in dB at places, grey where they are explained, over the range that another figure shows.
+    """Show differences in dB, grey where they are explained, over the range that another figure shows.
 
     Parameters
     ----------
     at, off : array, (n,)
+        Positions, and differences in dB.
     beyond : array of bool, (n,)
-        Which ones are not explained by scatter or floor.
+        Whether a difference is not explained by scatter or floor.
     name, words : str
-        Of the axes: what places are, and what less what.
+        Of the axes: what the positions are, and what is subtracted from what.
     key : str
     shown : (float, float)
     """
@@ -77,19 +78,19 @@ def show_differences(
         if chosen.any()
     ]
     panel = LinePanel(lines, name, f"{words} (dB)", padded_limits([off, np.zeros(1)]), x_limits=shown)
-    # its own zoom gives way to that of the figure above
+    # its own zoom yields to that of the figure above
     show_lines(panel, f"{key} {shown[0]:.4g} {shown[1]:.4g}", height_px=180, legend=True)
 
 
 def stems(x: FloatArray, y: FloatArray, name: str, colour: int) -> ChartLine:
-    """Return a line that rises from zero to each value, by ascending place."""
+    """Return a line that rises from zero to each value, in ascending order of x."""
     order = np.argsort(x)
     bottom_top_gap = np.stack([np.zeros(len(x)), y[order], np.full(len(x), np.nan)], axis=1)
     return ChartLine(np.repeat(x[order], 3), bottom_top_gap.ravel(), name, colour)
 
 
 def padded_limits(curves: Sequence[FloatArray], *, flat: float = 1.0) -> tuple[float, float]:
-    """Return limits about all known values of several curves, `flat` to both sides where they do not change."""
+    """Return limits around all finite values of several curves; if they are constant, `flat` to either side."""
     known = [curve for curve in curves if np.isfinite(curve).any()]
     low = min((float(np.nanmin(curve)) for curve in known), default=0.0)
     high = max((float(np.nanmax(curve)) for curve in known), default=1.0)
@@ -98,7 +99,7 @@ def padded_limits(curves: Sequence[FloatArray], *, flat: float = 1.0) -> tuple[f
 
 
 def show_panel(panel: LinePanel | LevelPanel, key: str, span_db: float) -> None:
-    """Show a panel that a method gives, to be zoomed; of levels that range below the largest has colours."""
+    """Show a method's panel, zoomable; in a map, levels down to `span_db` below the largest have colours."""
     if panel.title:
         st.caption(as_typed(panel.title))
     if isinstance(panel, LevelPanel):
@@ -108,7 +109,7 @@ def show_panel(panel: LinePanel | LevelPanel, key: str, span_db: float) -> None:
 
 
 def show_figure(figure: PictureFigure, words: str, key: str) -> None:
-    """Show a figure to be zoomed, as the picture that it is where it cannot; `words` are for those who do not see it.
+    """Show a figure as zoomable panels, or else as a picture; `words` describe it for those who cannot see it.
 
     Parameters
     ----------
@@ -132,14 +133,14 @@ def show_figure(figure: PictureFigure, words: str, key: str) -> None:
 
 _figure = component_of("figure")
 N_COLUMNS = 1600
-"""Points of a line sent to the browser: more than a page has pixel columns."""
+"""Columns of a long line sent to the browser: more than a page has pixel columns."""
 MAP_COLUMNS, MAP_ROWS = 900, 360
 
 
 def zoomed_range(key: str, whole: tuple[float, float], first: tuple[float, float] | None = None) -> tuple[float, float]:
-    """Return the range of its axis that the figure of that key was zoomed to, `first` until then.
+    """Return the axis range that the figure with this key was zoomed to, `first` until then.
 
-    The page's address keeps the last one, so that a view can be sent.
+    The page's address keeps the latest one, so that a view can be shared.
     """
     ends = _zoomed(key)
     is_whole = len(ends) == 2 and ends[0] <= whole[0] and ends[1] >= whole[1]
@@ -153,7 +154,7 @@ def zoomed_range(key: str, whole: tuple[float, float], first: tuple[float, float
 
 
 def _zoomed(key: str) -> list[float]:
-    """Return what a figure was zoomed to, low and high, of a plane those of its values as well; empty where it was not.
+    """Return what a figure was zoomed to: low and high, for a plane also those of y; empty if it was not zoomed.
 
     The session keeps it: Streamlit forgets the state of a figure that is not shown.
     """
@@ -168,7 +169,7 @@ def _asked_zoom(key: str) -> list[float]:
 
 
 def _ends(values: object) -> list[float]:
-    """Return the ends of a range as an address or a browser names them; empty where it is none."""
+    """Return the ends of a range that an address or a browser gives; empty if they are not valid."""
     with suppress(TypeError, ValueError):
         ends = [float(value) for value in values]  # type: ignore[attr-defined]
         if len(ends) in (2, 4) and np.all(np.isfinite(ends)) and ends[-2] < ends[-1] and ends[0] < ends[1]:
@@ -177,7 +178,7 @@ def _ends(values: object) -> list[float]:
 
 
 def _take_zoom(key: str) -> None:
-    """Keep what the user zoomed a figure to."""
+    """Keep the range that the user zoomed a figure to."""
     ends = _ends(st.session_state[element_key(key)]["range"])
     if ends:
         state.zooms()[key] = ends
@@ -201,7 +202,7 @@ def show_lines(
     front_first: bool = False,
     log_x: bool = False,
 ) -> None:
-    """Show lines with cursors and marked points; of long lines the extremes of each pixel column of what is shown.
+    """Show lines with cursors and marked points; long lines are reduced to the extremes of each pixel column shown.
 
     Parameters
     ----------
@@ -216,15 +217,15 @@ def show_lines(
     legend : bool
         Name several lines above the chart.
     whole : (float, float) or None
-        Limits that zooming out ends at; None: the axis' limits, which are else what is shown at first.
+        Limits of zooming out; None: the axis limits, which otherwise are the range shown at first.
     per_unit : (float, str) or None
-        What one unit of the x axis is in another unit, for the readout of cursors.
+        One unit of the x axis in another unit, for the readout of cursors.
     step : float or None
-        Distance of the sidebands that are offered first.
+        Sideband spacing that is offered first.
     front_first : bool
-        Name the line in front first: where later lines lie behind earlier ones to be seen.
+        Name the line in front, which is the last, first.
     log_x : bool
-        Whether the x axis is logarithmic: of third octaves.
+        Whether the x axis is logarithmic, as for third octaves.
     """
     lines, is_plane = panel.lines, panel.is_plane
     limits = panel.x_limits or (min(float(line.x.min()) for line in lines), max(float(line.x.max()) for line in lines))
@@ -259,7 +260,7 @@ def show_map(
     height_px: int = 420,
     shown: tuple[float, float] | None = None,
 ) -> None:
-    """Show levels over two axes, the largest of each pixel; zooming sends their detail.
+    """Show levels over two axes, the largest within each pixel; zooming sends their detail.
 
     Parameters
     ----------
@@ -267,7 +268,7 @@ def show_map(
     key : str
         Of the widget, unique on the page.
     dynamic_range_db : float
-        Shown below the largest level, where the panel does not say.
+        Range shown below the largest level, if the panel does not state one.
     also : (array of (n_y,), str) or None
         A second value of each row with its unit, e.g. the speed.
     height_px : int
@@ -287,7 +288,7 @@ def show_map(
     pooled, at = pooled_levels(part, y, MAP_COLUMNS, MAP_ROWS, logarithmic=panel.logarithmic)
     high = float(np.nanmax(values))
     low = high - (dynamic_range_db if panel.span is None else panel.span)
-    is_blank = np.isnan(pooled)  # which are sent as 0, where there are such
+    is_blank = np.isnan(pooled)  # sent as 0 if there are any
     shades = np.clip(255 * (pooled - low) / (high - low), float(is_blank.any()), 255)
     levels = np.where(is_blank, 0, shades).astype(np.uint8)
     first, last = float(x[start] - half), float(x[min(stop, len(x)) - 1] + half)
@@ -316,7 +317,7 @@ def show_map(
 
 
 def show_rows(panel: RowPanel, key: str, words: str, *, has_names_above: bool = False) -> None:
-    """Show bars below each other, to be zoomed along their axis and read off.
+    """Show bars one below the other, zoomable along their axis and with a readout.
 
     Parameters
     ----------
@@ -324,9 +325,9 @@ def show_rows(panel: RowPanel, key: str, words: str, *, has_names_above: bool = 
     key : str
         Of the widget, unique on the page.
     words : str
-        What it shows, for those who do not see it.
+        What it shows, for those who cannot see it.
     has_names_above : bool
-        Whether names stand above their bars, not left of them: where there is little room.
+        Whether names are above their bars instead of left of them, for little room.
     """
     ends = [
         end
@@ -373,7 +374,7 @@ def show_rows(panel: RowPanel, key: str, words: str, *, has_names_above: bool = 
 def _described(
     x: str, y: str, key: str, shown: tuple[float, float], whole: tuple[float, float], height_px: int = 0
 ) -> dict[str, object]:
-    """Return what the component is told of every figure; one that is tall enough has tools."""
+    """Return the data that the component gets for every figure; one that is tall enough has tools."""
     return {
         "x": one_line(x),
         "y": one_line(y),
@@ -390,14 +391,14 @@ def _described(
 
 
 def _unit_of(label: str) -> str:
-    if label.startswith("order of "):  # whose name may hold brackets
+    if label.startswith("order of "):  # the shaft's name may contain brackets
         return axis_unit("order")
     _, bracket, unit = label.rpartition(" (")
     return one_line(unit.removesuffix(")") if bracket else "")
 
 
 def _sent(line: ChartLine, shown: tuple[float, float] | None, *, alone: bool = True) -> dict[str, object]:
-    """Return a line as the component takes it, whole where `shown` is None; pale bands would hide other spectra."""
+    """Return a line as the component takes it, whole if `shown` is None; pale bands would hide other spectra."""
     x, y, *band = (line.x, line.y) if shown is None else _columns(line, shown)
     band = band if alone or line.band is not None else []
     curves = {name: encoded(values) for name, values in zip(("x", "y", "low", "high"), (x, y, *band), strict=False)}
@@ -415,7 +416,7 @@ def _shown_colour(colour: int | str) -> str:
         return colour
     on_paper = np.frombuffer(bytes.fromhex(colour.removeprefix("#")), np.uint8) / 255
     hue, lightness, saturation = rgb_to_hls(*on_paper)
-    # A scale of colours turned over ends in pale ones that nobody tells apart: they grow lighter by different amounts.
+    # Inverting a colour scale would give pale, indistinguishable colours: they are lightened by different amounts.
     shown = (
         on_dark_ground(on_paper) if saturation < 0.2 else np.array(hls_to_rgb(hue, 0.55 + 0.25 * lightness, saturation))
     )
@@ -423,14 +424,14 @@ def _shown_colour(colour: int | str) -> str:
 
 
 def encoded(values: FloatArray) -> str:
-    """Return numbers as a component takes them."""
+    """Return numbers as a component takes them: Base64 of little-endian float64."""
     return b64encode(np.ascontiguousarray(values, dtype="<f8").tobytes()).decode("ascii")
 
 
 def _columns(line: ChartLine, shown: tuple[float, float]) -> tuple[FloatArray, ...]:
     """Return (x, y) or (x, y, low, high) of what is shown: all points, or the extremes of each column at their places.
 
-    With one point beyond each end, so that the line goes on to the edge.
+    One point beyond each end is included, so that the line reaches the edge.
     """
     start = max(int(np.searchsorted(line.x, shown[0])) - 1, 0)
     stop = min(int(np.searchsorted(line.x, shown[1], side="right")) + 1, len(line.x))
@@ -447,7 +448,7 @@ def _columns(line: ChartLine, shown: tuple[float, float]) -> tuple[FloatArray, .
 
 
 N_NAMED = 6
-"""Lines of bearings that have their names above them: more would hide each other, and what is told of."""
+"""Number of bearing lines with labels above them: more would hide each other and the finding's."""
 
 
 def _cursor_rows(
@@ -458,8 +459,8 @@ def _cursor_rows(
 ) -> list[dict[str, object]]:
     """Return cursors as the component takes them, the most important first.
 
-    Of the bearings' within the range that is shown those of a finding have names, then those where `line` is highest;
-    the others are named under the pointer.
+    Of the bearing cursors within the range shown, those of a finding are labelled first, then those where `line` is
+    highest; the others are named at the pointer.
     """
     bearings = [c for c in cursors if c.kind == "bearing" and shown[0] <= c.position <= shown[1]]
     if line is not None:
@@ -480,7 +481,7 @@ def _cursor_rows(
 
 
 def _height_near(line: ChartLine, position: float) -> float:
-    """Return a line's highest value within a bearing's slip about a position."""
+    """Return a line's highest value within a bearing's slip around a position."""
     low, high = np.searchsorted(line.x, [(1 - LARGEST_SLIP) * position, (1 + LARGEST_SLIP) * position])
     return float(line.y[low : high + 1].max()) if low < len(line.y) else 0.0
 
@@ -488,13 +489,13 @@ def _height_near(line: ChartLine, position: float) -> float:
 DOTS_PER_INCH = 180
 DARK_GROUND = np.frombuffer(bytes.fromhex(DARK_PAPER.removeprefix("#")), np.uint8) / 255
 BRIGHTEST = 0.93
-# Turns the hue by half a circle and keeps the lightness: the matrix of hue-rotate(180deg) in the W3C's Filter Effects
-# Module, with which the reports turn their figures over, too.
+# Rotates the hue by half a circle and keeps the lightness: the matrix of hue-rotate(180deg) in the W3C's Filter Effects
+# Module, with which the reports also invert their figures.
 HALF_TURN = np.array([[-0.574, 1.430, 0.144], [0.426, 0.430, 0.144], [0.426, 1.430, -0.856]])
 
 
 def show_picture(svg: str, figure: PictureFigure, words: str, key: str, *, ring: Ring | None = None) -> None:
-    """Show a figure that no panel can show, to be zoomed, and offer it as files.
+    """Show a figure that panels cannot show as a zoomable picture, and offer it as files.
 
     Parameters
     ----------
@@ -503,7 +504,7 @@ def show_picture(svg: str, figure: PictureFigure, words: str, key: str, *, ring:
     figure : Figure
         Of matplotlib.
     words : str
-        What it shows, for those who do not see it.
+        What it shows, for those who cannot see it.
     key : str
         Unique on the page.
     ring : Ring or None
@@ -517,20 +518,20 @@ _picture = component_of("picture")
 
 
 def show_svg(svg: str, words: str, key: str, *, turned: bool = False, ring: Ring | None = None) -> None:
-    """Show a vector picture that is zoomed by dragging.
+    """Show a vector picture that can be zoomed by dragging.
 
     Parameters
     ----------
     svg : str
-        With a viewBox; shown as an image, in which nothing runs.
+        With a viewBox; shown as an image, in which no script runs.
     words : str
-        What it shows, for those who do not see it.
+        What it shows, for those who cannot see it.
     key : str
         Of the widget, unique on the page.
     turned : bool
-        Whether dark and light change places.
+        Whether dark and light are swapped.
     ring : Ring or None
-        What is read off around the picture's middle.
+        Curves that can be read off around the picture's middle.
     """
     left, _, width, _ = (float(number) for number in _VIEW_BOX.findall(svg)[0].split())
     zoomed_range(key, (left, left + width))  # which keeps it in the address
@@ -555,7 +556,7 @@ _VIEW_BOX = re.compile(r'viewBox="([^"]*)"')
 
 @dataclass(frozen=True)
 class Ring:
-    """Name → values over one revolution, clockwise from the top; `teeth` is 0 where they have no numbers."""
+    """Name → values over one revolution, clockwise from the top; `teeth` is 0 if they have no numbers."""
 
     curves: Mapping[str, FloatArray]
     teeth: int
@@ -577,18 +578,18 @@ def offer_picture(svg: str, drawn: Callable[[], PictureFigure], key: str) -> Non
 
 
 def file_stem(key: str) -> str:
-    """Return what the files of a figure are called, by the key of its widget."""
+    """Return the stem of a figure's file names, from the key of its widget."""
     return re.sub(r"[^\w-]+", "-", key.split(" of ", maxsplit=1)[0]).strip("-") or "figure"
 
 
 def on_dark_ground(colours: FloatArray) -> FloatArray:
-    """Return colours of paper, (…, 3) from 0 to 1, for a dark page: light and dark change places, hues stay."""
+    """Return a light page's colours, (…, 3) from 0 to 1, for a dark page: light and dark swap, hues stay."""
     turned: FloatArray = np.clip((1 - colours) @ HALF_TURN.T, 0, 1)
     return DARK_GROUND + (BRIGHTEST - DARK_GROUND) * turned
 
 
 def picture_bytes(figure: PictureFigure, *, dark: bool) -> bytes:
-    """Return the figure as PNG; `dark` turns light and dark over and keeps the hues."""
+    """Return the figure as PNG; `dark` swaps light and dark and keeps the hues."""
     from PIL import Image
 
     pixels, buffer = BytesIO(), BytesIO()
@@ -601,7 +602,7 @@ def picture_bytes(figure: PictureFigure, *, dark: bool) -> bytes:
 
 
 def download(label: str, data: Any, name: str, **looks: Any) -> None:
-    """Show a download button; the page is not run again for it.
+    """Show a download button, which does not rerun the page.
 
     Parameters
     ----------
@@ -623,7 +624,7 @@ _document = component_of("document")
 def offer_page(
     label: str, page: Callable[[], bytes], name: str, key: str, *, pdf: Callable[[], bytes] | None = None
 ) -> None:
-    """Offer a page of HTML as a file, and to be looked at before; it is made when it is asked for.
+    """Offer an HTML page as a file and for preview; it is made on request.
 
     Parameters
     ----------
@@ -636,7 +637,7 @@ def offer_page(
     key : str
         Unique on the page.
     pdf : callable or None
-        Returns the same to be printed.
+        Returns the same page for printing.
     """
     with st.container(horizontal=True, vertical_alignment="center"):
         download(label, page, name, type="primary")

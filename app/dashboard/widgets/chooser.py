@@ -1,4 +1,4 @@
-"""Choose recordings: samples, or files of one's own with their rigs."""
+"""Choose recordings: samples, or the user's own files with their rigs."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from streamlit.runtime.uploaded_file_manager import UploadedFile
 
 KINDS = f"{FORMAT_NAMES}; text also as .gz."
-SIMULATED = "Simulated, not measured: what is in them is known."
+SIMULATED = "Simulated, not measured: what they contain is known."
 
 # --------------------
 # One file or several.
@@ -43,7 +43,7 @@ def choose_sample(label: str, key: str, *, first: str = "", name: str = "") -> C
     first : str
         Stem of the sample that is chosen at first.
     name : str
-        In the address; empty where it is kept up elsewhere.
+        In the address; empty if the address is updated elsewhere.
     """
     offered = samples()
     at_first = next((sample for sample in offered if sample.rig.stem == first), offered[0])
@@ -61,7 +61,7 @@ def choose_sample(label: str, key: str, *, first: str = "", name: str = "") -> C
 def choose_files(
     label: str, key: str, *, about: str = KINDS, of_rigs: bool = False, several: bool = True, name: str = ""
 ) -> tuple[ChosenFile, ...]:
-    """Let the user give files; those from before another page was shown stay open until they are closed.
+    """Let the user give files; they stay open while other pages are shown, until the user closes them.
 
     Parameters
     ----------
@@ -72,12 +72,12 @@ def choose_files(
         Rig files instead of recordings.
     several : bool
     name : str
-        In the address, which names them by tokens of this session; empty where it is kept up elsewhere.
+        In the address, which names them by tokens of this session; empty if the address is updated elsewhere.
 
     Raises
     ------
     InputError
-        If a rig file is no text.
+        If a rig file is not text.
     """
     if name:
         _open_named(key, name)
@@ -105,12 +105,12 @@ def choose_files(
 def choose_file(
     label: str, key: str, *, about: str = KINDS, rig: str = "", about_rig: str = "", name: str = ""
 ) -> ChosenFile | None:
-    """Let the user give one recording, and its rig file where `rig` is the label of its uploader; see `choose_files`.
+    """Let the user give one recording and, if `rig` labels an uploader for it, its rig file; see `choose_files`.
 
     Raises
     ------
     InputError
-        If the rig file is no text.
+        If the rig file is not text.
     """
     files = choose_files(label, key, about=about, several=False, name=name)
     if rig:
@@ -125,12 +125,12 @@ def choose_file(
 
 
 def choose_with_rig(label: str, key: str, *, about: str = KINDS) -> tuple[ChosenFile | None, bool]:
-    """Let the user give one recording and its rig file at once; return it, and whether its rig file is there.
+    """Let the user give one recording and its rig file at once; return it, and whether its rig file was given.
 
     Raises
     ------
     InputError
-        If there are several of either, or the rig file is no text.
+        If there are several of either, or the rig file is not text.
     """
     given = st.file_uploader(label, accept_multiple_files=True, key=key, help=about)
     rigs = [file for file in given if file.name.lower().endswith(".toml")]
@@ -140,8 +140,8 @@ def choose_with_rig(label: str, key: str, *, about: str = KINDS) -> tuple[Chosen
             raise InputError(
                 f"{len(files)} {kind} are given: {', '.join(file.name for file in files)}",
                 allowed="one recording, and one rig file that describes its machine",
-                remedy="remove the others; times of tachometer pulses are given afterwards, under Machine, and "
-                "`gearsig report FOLDER` makes pages of many",
+                remedy="remove the others; add tachometer pulse times afterwards, under Machine; for reports on many "
+                "recordings use `gearsig report FOLDER`",
             )
     if not recordings:
         return None, bool(rigs)
@@ -152,7 +152,7 @@ def choose_with_rig(label: str, key: str, *, about: str = KINDS) -> tuple[Chosen
 
 
 def _open_named(key: str, name: str) -> None:
-    """Open the files that the page's address names, where this session holds none or Back asks for them."""
+    """Open the files that the page's address names, if this session holds none or Back asks for them."""
     tokens = address.all_asked(name)
     if not address.follows(key) and state.kept_files(key):
         return
@@ -185,9 +185,9 @@ def _chosen_file(file: UploadedFile, *, is_rig: bool) -> ChosenFile:
 
 
 def choose_reference_rate(key: str = "", *, of_several: bool = False, name: str = "reference_rate") -> float | None:
-    """Return the sampling rate in Hz that the user states of healthy references, None where the field is empty."""
+    """Return the sampling rate in Hz that the user states for healthy references, None if the field is empty."""
     label = "Sampling rate of the references (Hz)" if of_several else "Its sampling rate (Hz)"
-    about = "Of files that do not state it, where it is another one than the recording's."
+    about = "For files that do not state it, if it differs from the recording's."
     looks: dict[str, Any] = {"placeholder": "as the recording's", "help": about, "key": key}
     return address.ask_number(st, label, 0.0, name=name, **looks) or None
 
@@ -196,13 +196,13 @@ def choose_reference_rate(key: str = "", *, of_several: bool = False, name: str 
 # The recording of the analysis page, with its machine, its reference, and what its file does not state.
 # --------------------
 
-SAMPLE, FILE, NO_REFERENCE = "Sample", "Own file", "None"
+SAMPLE, FILE, NO_REFERENCE = "Sample", "Your file", "None"
 MACHINE = "described"
-"""In the address: the machine of a sample that was described otherwise than it is."""
+"""In the address: the machine of a sample, as the user has changed it."""
 
 
 def choose_recording(*, with_reference: bool = True) -> tuple[ChosenFile, Chosen] | None:
-    """Return the file that the user chose in the sidebar, and what is asked of it; None while there is nothing to open.
+    """Return the file that the user chose in the sidebar, with its request; None while there is nothing to open.
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ def choose_recording(*, with_reference: bool = True) -> tuple[ChosenFile, Chosen
     Raises
     ------
     InputError
-        If the rig file is no text.
+        If the rig file is not text.
     """
     with st.sidebar:
         made = state.simulated()
@@ -229,9 +229,9 @@ def choose_recording(*, with_reference: bool = True) -> tuple[ChosenFile, Chosen
             file = choose_file(
                 "Recording file",
                 state.RECORDING_FILE,
-                about=f"{KINDS} It stays on this machine.",
+                about=f"{KINDS} It stays on this computer.",
                 rig="Rig file (TOML), if you have one",
-                about_rig="What is known of the machine. Without one, fill in the form under Machine.",
+                about_rig="What is known about the machine. Without a rig file, fill in the form under Machine.",
             )
         if file is None:
             return None
@@ -240,7 +240,7 @@ def choose_recording(*, with_reference: bool = True) -> tuple[ChosenFile, Chosen
 
 
 def _follow_address() -> None:
-    """Open what the page's address names, where this session has nothing open yet or Back asks for it."""
+    """Open what the page's address names, if this session has nothing open yet or Back asks for it."""
     is_open = state.ORIGIN in st.session_state or state.SAMPLE in st.session_state
     if not address.follows(state.ORIGIN) and is_open:
         return
@@ -259,10 +259,10 @@ def _follow_address() -> None:
 
 
 def _keep_address(file: ChosenFile, origin: str) -> None:
-    """Name what is open in the page's address, with the machine as it stands in this session.
+    """Write what is open to the page's address, with the machine as it stands in this session.
 
-    A sample is named as such and its machine where it was changed; an own file, or one of the laboratory, by a token of
-    this session.
+    A sample is named as such, and so is its machine if it was changed; a user's file, or one of the laboratory, is
+    named by a token of this session.
     """
     described = replace(file, rig_text=text_as_stated(file), pulses=stated_pulses(file))
     named = {"sample": file.rig_name.removesuffix(".toml")} if origin == SAMPLE else {}
@@ -272,14 +272,14 @@ def _keep_address(file: ChosenFile, origin: str) -> None:
         named[MACHINE] = _kept_token(MACHINE, described)
     for name in ("sample", "file"):
         text = named.get(name, "")
-        if address.asked(name) not in ("", text):  # it is not open: nor are its channels
+        if address.asked(name) not in ("", text):  # what was asked for is not open, nor are its channels
             address.forget_asked()
     for name in ("sample", "file", MACHINE):
         address.put(name, *([named[name]] if name in named else []))
 
 
 def open_file(file: ChosenFile) -> None:
-    """Let the analysis page open a file of the user's."""
+    """Let the analysis page open a user's file."""
     state.open_files(state.RECORDING_FILE, (file,))
     st.session_state[state.ORIGIN] = FILE
 
@@ -314,8 +314,8 @@ def _described(file: ChosenFile, with_reference: bool) -> Chosen:
         name="torque",
         key=state.source_key("torque", file.sha256),
         placeholder="from the machine",
-        help="For the depth of a crack, instead of the rig's: of the shaft that its operating point names, else "
-        "of the reference shaft.",
+        help="For the depth of a crack, instead of the rig's torque: on the shaft that the rig's operating point "
+        "names, or else on the reference shaft.",
     )
     request = replace(request, torque_nm=torque_nm or None)
     if reference is None:
@@ -327,7 +327,7 @@ def _described(file: ChosenFile, with_reference: bool) -> Chosen:
 
 
 def _choose_reference(file: ChosenFile) -> tuple[ChosenFile | None, float | None]:
-    """Return the same machine when it was healthy, and the sampling rate in Hz that is stated of an own file of it."""
+    """Return a recording of the healthy machine, and the sampling rate in Hz that the user states for their file."""
     source = file.sha256
     offered = {s.title: s for s in samples() if s.recording.name != file.name}
     sample_reference = next((s.reference for s in samples() if s.recording == file.content), None)
@@ -341,7 +341,7 @@ def _choose_reference(file: ChosenFile) -> tuple[ChosenFile | None, float | None
         name="reference",
         key=state.source_key("reference", source),
         help="The same machine when it was healthy: same sensors, speed and load. Cracks of a millimetre show "
-        "against it, and every level is compared. It is read with the machine and the numbers stated for the other.",
+        "against it, and every level is compared. It is read with the machine and numbers stated for the recording.",
     )
     reference = sample_file(offered[name]) if name in offered else None
     if name == FILE:

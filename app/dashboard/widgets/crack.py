@@ -1,4 +1,4 @@
-"""Depth of a crack in a tooth root, with its interval and reasons, against a reference where there is one."""
+"""Depth of a crack in a tooth root, with its interval and reasons, against a reference if there is one."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from gearsig.severity import CrackEstimate, NoCrackSeen, ToothSearch, estimate_c
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-severity = cached(8, "Looking at every tooth …")(estimate_crack)
+severity = cached(8, "Examining every tooth …")(estimate_crack)
 
 
 def show_crack(page: MethodPage) -> None:
-    """Show the depth of a crack, or how deep one may be that does not show, or why neither can be estimated."""
+    """Show the depth of a crack, or how deep an undetected one may be, or why neither can be estimated."""
     st.caption(
-        "How deep a crack in a tooth root is, in mm with an interval; best beside a recording of the healthy gears."
+        "The depth of a crack in a tooth root, in mm with an interval; best against a recording of the healthy gears."
     )
     recording, then = page.analysis.recording, page.analysis.reference
     reference = None if then is None else then.recording
@@ -44,11 +44,11 @@ def show_crack(page: MethodPage) -> None:
     torque = _torque_text(page.analysis, torque_nm)
     beside = "Without a reference only deep cracks show: choose the healthy machine in the sidebar"
     if reference is not None:
-        beside = f"Beside {as_typed(reference.provenance.source)}"
+        beside = f"Compared with {as_typed(reference.provenance.source)}"
     st.caption(f"Analysed: 0 to {recording.duration_s:.4g} s, the whole recording. {torque}. {beside}.")
     try:
         estimate = severity(recording, reference=reference, torque_nm=torque_nm, channels=channels)
-    except RefusalError as refusal:  # which is an answer, too
+    except RefusalError as refusal:  # a refusal is also an answer
         remedy = f"\n\nWhat would help: {as_typed(refusal.remedy)}." if refusal.remedy else ""
         text = f"**The depth cannot be estimated**: {as_typed(refusal.reason)}.{remedy}"
         st.info(text, icon=":material/help:")
@@ -60,12 +60,12 @@ def show_crack(page: MethodPage) -> None:
         _show_search(page, estimate.searched)
     else:
         _show_figure(recording, reference, estimate, page.channel.channel)
-    with st.expander("What the answer rests on"):
+    with st.expander("What the answer is based on"):
         show_table({"feature": list(estimate.features), "value": list(estimate.features.values())})
 
 
 def _show_search(page: MethodPage, searched: Sequence[ToothSearch]) -> None:
-    """Show what was looked at, tooth by tooth, and the level from which a crack would be seen."""
+    """Show what was examined, tooth by tooth, and the level from which a crack would be seen."""
     panels = search_panels(searched)
     places = st.container(key="panels of the search for a crack").columns(max(len(panels), 1))
     for place, panel in zip(places, panels, strict=True):
@@ -74,26 +74,26 @@ def _show_search(page: MethodPage, searched: Sequence[ToothSearch]) -> None:
             show_lines(panel, page.key(f"search {panel.x}"), height_px=260, legend=True)
     if panels:
         st.caption(
-            "How far each place stands out of the others, all bands and channels together. At the dotted level the "
-            "clearest event of the gear would be seen as a crack; one above it that is unlike a crack gets no depth."
+            "How far each place stands out from the others, over all bands and channels. At the dotted level, the "
+            "gear's clearest event would be seen as a crack; an event above it that is unlike a crack gets no depth."
         )
 
 
 def _torque_text(analysis: Analysis, stated_nm: float | None) -> str:
-    """Return the torque that the depth rests on, and where to change it."""
+    """Return in words the torque that the depth is based on, and where to change it."""
     known = analysis.rig.operating_point.torque_nm if analysis.rig is not None else None
     place = "in the sidebar"
     if stated_nm is not None:
         return f"Torque {stated_nm:g} N·m, as stated {place}"
-    return f"Torque {known:g} N·m, of the rig; another one is stated {place}" if known else f"State the torque {place}"
+    return f"Torque {known:g} N·m, from the rig; state another one {place}" if known else f"State the torque {place}"
 
 
 def _show_answer(estimate: CrackEstimate | NoCrackSeen) -> None:
     if isinstance(estimate, NoCrackSeen):
         st.success(as_typed(estimate.text), icon=":material/check_circle:")
         st.caption(
-            "In 95 of 100 cases a deeper crack would have been seen. The chance of as clear an event as the clearest "
-            f"one here is {estimate.p_value:.2g} on healthy gears."
+            "In 95 of 100 cases a deeper crack would have been seen. On healthy gears, the chance of an event as clear "
+            f"as the clearest one here is {estimate.p_value:.2g}."
         )
     else:
         st.error(as_typed(estimate.text), icon=":material/error:")
@@ -122,7 +122,7 @@ def _show_figure(recording: Recording, reference: Recording | None, estimate: Cr
         show_error(error)
         return
     show_figure(figure, f"Mean revolution of {estimate.shaft}, with the cracked tooth", f"crack {channel}")
-    text = f"The mean revolution of shaft {as_typed(estimate.shaft)} without mesh harmonics, three times in a row; "
+    text = f"The mean revolution of shaft {as_typed(estimate.shaft)} without mesh harmonics, shown three times; "
     text += f"channel {as_typed(channel)}."
     if compared is not None:
         text += " The change is what differs from the reference at the same angle."
@@ -136,7 +136,7 @@ def crack_figure(recording: Recording, reference: Recording | None, estimate: Cr
     ----------
     recording : Recording
     reference : Recording or None
-        Only beside an estimate that names a tooth: angles then count from a mark in both.
+        Only with an estimate that names a tooth: angles then count from a mark in both.
     estimate : CrackEstimate
     channel : str
         An acceleration.
@@ -144,7 +144,7 @@ def crack_figure(recording: Recording, reference: Recording | None, estimate: Cr
     Raises
     ------
     RefusalError
-        If the channel's unit is no acceleration, or the rig lacks what the average needs.
+        If the channel's unit is not an acceleration, or the rig lacks what the average needs.
     """
     n_teeth = _teeth(recording, estimate)
     mean = _mean_residual(recording, estimate, channel)
@@ -173,7 +173,7 @@ def _mean_residual(
     ratio = rig.ratio(estimate.shaft) if rig is not None else None
     if scale is None or ratio is None:
         raise RefusalError(
-            f"there is no figure: the unit of channel {channel!r} is no acceleration",
+            f"there is no figure: the unit of channel {channel!r} is not an acceleration",
             remedy="state the unit in the rig's [[sensor]] table",
         )
     angle = find_shaft_angle(recording, rig).between(0.0, recording.duration_s)

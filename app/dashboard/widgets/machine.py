@@ -1,4 +1,4 @@
-"""The machine as a form: tables of shafts, gears, bearings and sensors, with the orders that follow and a drawing."""
+"""The machine as a form: tables of shafts, gears, bearings and sensors, with the resulting orders and a drawing."""
 
 from __future__ import annotations
 
@@ -74,13 +74,13 @@ FACTS: dict[str, tuple[str, ...]] = {
     "operating_point": ("speed_rpm", "speed_tolerance_percent", "torque_nm", "shaft"),
     "machine": ("power_kw", "shaft_height_mm", "mounting"),
 }
-"""Tables of a rig file that are one row of fields; an empty field is not in the file."""
+"""Tables of a rig file that are shown as one row of fields; an empty field is left out of the file."""
 ABOUT = {
-    "bearing": "A name of the catalogue; or number n, diameter d, pitch diameter D and contact angle α of the rolling "
-    "elements; or the orders that its maker states, which go before both.",
-    "operating_point": "Guides the search for the true speed; stands for it where neither a tachometer nor gears "
-    "tell it: then within ± 6 %.",
-    "machine": "For zones A to D of ISO 20816-3: rated power, or of a motor or generator its shaft height.",
+    "bearing": "A catalogue name; or number n, diameter d, pitch diameter D and contact angle α of the rolling "
+    "elements; or the orders that its maker states, which take precedence over both.",
+    "operating_point": "Guides the search for the true speed; used in its place, within ± 6 %, where neither a "
+    "tachometer nor gears give the speed.",
+    "machine": "For zones A to D of ISO 20816-3: rated power, or the shaft height of a motor or generator.",
 }
 SHORT_LABELS = {
     "driver_teeth": "teeth",
@@ -97,12 +97,12 @@ SHORT_LABELS = {
     "bsf_order": "BSF",
     "ftf_order": "FTF",
 }
-"""Of narrow columns, which tell their whole names under the pointer."""
+"""Labels of narrow columns, which show their full names at the pointer."""
 WIDEST_PX = 330
-"""No column is wider by itself, however long its texts."""
+"""Maximum initial width of a column, however long its texts."""
 SHAFT_KEYS = ("shaft", "driver", "driven")
 EMPTY = {"speed_tolerance_percent": f"{OperatingPoint.speed_tolerance_percent:g}", "shaft": "reference shaft"}
-"""What holds where a field is empty; elsewhere it is not known."""
+"""What applies if a field is empty; for other fields the value is not known."""
 SPEED_SOURCES: dict[str, tuple[str, ...]] = {
     "constant": ("speed_rpm",),
     "tachometer": ("channel", "pulses_per_revolution"),
@@ -110,12 +110,12 @@ SPEED_SOURCES: dict[str, tuple[str, ...]] = {
     "speed channel": ("channel", "rpm_per_unit"),
 }
 PULSE_TIMES = "pulse times"
-"""Source of a speed that belongs to one recording, so that no rig file has it: a file beside the recording."""
+"""Speed source that belongs to one recording and therefore to no rig file: a file given with the recording."""
 LARGEST_PULSE_FILE_MB = 50
 DEFAULTS: Table = {"pulses_per_revolution": 1, "units_per_revolution": 360.0, "rpm_per_unit": 1.0}
 LARGEST, MOST_ROWS = 2.0**53, 1000
 NUMBER = "%.10g"
-"""A number in a field as somebody would type it."""
+"""Format of a number in a field, as a user would type it."""
 _CHANGED = "machine changed"
 
 
@@ -125,19 +125,19 @@ def machine_text(file: ChosenFile) -> str:
 
 
 def stated(file: ChosenFile, name: str) -> float | None:
-    """Return a number that the user stated of a file, "rate" (Hz) or "speed" (rpm); None without one."""
+    """Return a number that the user stated for a file, "rate" (Hz) or "speed" (rpm); None without one."""
     value: float | None = st.session_state.get(state.source_key(f"stated {name}", file.sha256))
     return value
 
 
 def stated_pulses(file: ChosenFile) -> PulseFile | None:
-    """Return the times of tachometer pulses that the user gave beside a file, None without any."""
+    """Return the times of tachometer pulses that the user gave with a file, None without any."""
     given: PulseFile | None = st.session_state.get(_pulses_key(file), file.pulses)
     return given
 
 
 def text_as_stated(file: ChosenFile) -> str:
-    """Return the machine's text with what the user stated of the file, for whoever opens it again."""
+    """Return the machine's text with the values that the user stated for the file, for opening it again."""
     rate_hz, speed_rpm = stated(file, "rate"), stated(file, "speed")
     if rate_hz is None and speed_rpm is None:
         return machine_text(file)
@@ -153,30 +153,30 @@ def text_as_stated(file: ChosenFile) -> str:
 
 
 def show_machine(file: ChosenFile, channels: Sequence[str] = (), *, is_reported: bool = False) -> None:
-    """Show the form, what follows from it, and TOML to give and take.
+    """Show the form, what follows from it, and the rig file to edit, upload or download.
 
     Parameters
     ----------
     file : ChosenFile
     channels : sequence of str
-        Of the recording, where it could be read.
+        Of the recording, if it could be read.
     is_reported : bool
         Whether the page already says what is wrong with the machine as it stands.
     """
-    if st.session_state.pop(_CHANGED, False):  # the verdict above rests on it, not this part of the page alone
+    if st.session_state.pop(_CHANGED, False):  # the verdict above depends on it, not only this part of the page
         st.rerun()
     text = machine_text(file)
     try:
         table = parse_toml(text, file.rig_name)
         problem = "" if _fits_form(table) else "The form cannot show this rig file"
     except GearsigError:
-        problem = "The rig file is no TOML yet"
+        problem = "The rig file is not valid TOML"
     if problem:
-        st.info(f"{problem}: mend it as text.", icon=":material/edit:")
+        st.info(f"{problem}: edit it as text.", icon=":material/edit:")
         _show_text(file, text, is_open=True)
         return
     with st.container(key="machine"):
-        speed = st.container(key="machine-speed")  # alone it says most, and takes one number
+        speed = st.container(key="machine-speed")  # by itself the most useful entry, and only one number
         first, follows = st.columns((5, 8), gap="medium")
         edited = _form(file, table, text, channels, first, speed)
         with follows:
@@ -190,7 +190,7 @@ def show_machine(file: ChosenFile, channels: Sequence[str] = (), *, is_reported:
                 icon=":material/check:",
                 on_click=_take,
                 args=(file, changed),
-                disabled=isinstance(described, str),  # what is wrong stands beside the form
+                disabled=isinstance(described, str),  # the error is shown beside the form
             )
             st.button("Discard", on_click=_take, args=(file, text))
     _show_text(file, changed)
@@ -205,7 +205,7 @@ def _rig_of(table: Table) -> Rig | str:
 
 
 def _ask_stated(place: DeltaGenerator, file: ChosenFile, label: str, name: str, about: str) -> None:
-    """Ask for a number that goes before what the file says; it holds as soon as it is typed."""
+    """Ask for a number that overrides what the file says; it takes effect as soon as it is typed."""
     place.number_input(
         label,
         value=stated(file, name),
@@ -226,7 +226,7 @@ def _state(file: ChosenFile, name: str) -> None:
 
 
 def _forget_speed(file: ChosenFile) -> None:
-    """Take back a speed that was stated, in favour of what measures it."""
+    """Discard a stated speed in favour of a measured one."""
     if stated(file, "speed") is not None:
         st.session_state[state.source_key("asked speed", file.sha256)] = None
         _state(file, "speed")
@@ -244,7 +244,7 @@ def _give_pulses(file: ChosenFile, pulses: PulseFile | None) -> None:
 
 
 def _ask_pulses(place: DeltaGenerator, file: ChosenFile) -> None:
-    """Ask for the file of pulse times, and for the pulses of a revolution in `place`; both hold at once."""
+    """Ask for the file of pulse times and, in `place`, the pulses per revolution; both take effect at once."""
     known = stated_pulses(file)
     keys = tuple(state.source_key(f"asked {name}", file.sha256) for name in ("pulse file", "pulses per revolution"))
     number = 1 if known is None else known.pulses_per_revolution
@@ -252,13 +252,13 @@ def _ask_pulses(place: DeltaGenerator, file: ChosenFile) -> None:
     looks: dict[str, Any] = {"on_change": _count_pulses, "args": (file, number_key)}
     place.number_input(label, value=number, min_value=1, step=1, key=number_key, **looks)
     about = (
-        "Text with one time in a line, in seconds unless its heading states another unit, e.g. time [ms]; 0 is where "
-        "the recording begins. The pulses are those of the reference shaft."
+        "Text with one time per line, in seconds unless its heading states another unit, e.g. time [ms]; 0 is the "
+        "start of the recording. The pulses are those of the reference shaft."
     )
     looks = {"on_change": _take_pulses, "args": (file, *keys), "max_upload_size": LARGEST_PULSE_FILE_MB}
     given = st.file_uploader("File of pulse times", key=keys[0], help=about, **looks)
     if given is None and known is not None:
-        st.caption(f"Still given: {as_typed(known.name)}")
+        st.caption(f"Still in use: {as_typed(known.name)}")
 
 
 def _count_pulses(file: ChosenFile, key: str) -> None:
@@ -280,11 +280,11 @@ def _key(file: ChosenFile) -> str:
 
 
 def describe(file: ChosenFile, text: str, pulses: PulseFile | None = None) -> None:
-    """Take the text of a rig file for a file's machine in this session, and times of pulses where they are given."""
+    """Use the text of a rig file for a file's machine in this session, and times of pulses if they are given."""
     st.session_state[_key(file)] = text
     if pulses is not None:
         st.session_state[_pulses_key(file)] = pulses
-    # tables of the form begin anew from the text
+    # the form's tables restart from the text
     version = state.source_key("machine version", file.sha256)
     st.session_state[version] = st.session_state.get(version, 0) + 1
 
@@ -303,7 +303,7 @@ def _is_number(name: str) -> bool:
 
 
 def _fits_form(table: Table) -> bool:
-    """Whether what the form shows are tables of texts and numbers as its fields take them; a file may hold anything."""
+    """Whether the form's fields accept the texts and numbers that they would show; a file may hold anything."""
     single = ("speed", *FACTS)
     groups = {kind: table.get(kind, []) for kind in COLUMNS} | {kind: [table.get(kind, {})] for kind in single}
     names = (*COLUMNS.values(), *SPEED_SOURCES.values(), *FACTS.values())
@@ -329,7 +329,7 @@ def _form(
     first: DeltaGenerator,
     of_speed: DeltaGenerator,
 ) -> Table:
-    """Return the rig's table with what the form says; keys that the form does not show stay.
+    """Return the rig's table as edited in the form; keys that the form does not show are kept.
 
     Sampling rate and speed go into the place `of_speed`, name and shafts into `first`, the wider tables below both.
     """
@@ -358,14 +358,14 @@ def _form(
 
 
 def _shafts(rig: Table) -> list[str]:
-    """Return the shafts of a rig's table: those that are listed, else those that pairs and bearings name."""
+    """Return the shafts of a rig's table: those listed, or else those that pairs and bearings name."""
     listed = [row.get("name") for row in rig.get("shaft", [])]
     users = [row.get(key) for kind in ("pair", "bearing") for row in rig.get(kind, []) for key in SHAFT_KEYS]
     return list(dict.fromkeys(str(name) for name in listed or users if name))
 
 
 def _edit_facts(kind: str, known: Table, choices: Sequence[str], key: Callable[[str], str]) -> Table:
-    """Show a row of fields, and return what they say together with what they do not show."""
+    """Show a row of fields, and return their values together with the keys that they do not show."""
     edited = {name: value for name, value in known.items() if name not in FACTS[kind]}
     for place, name in zip(st.columns(len(FACTS[kind])), FACTS[kind], strict=True):
         label, value, own = capitalised(FORM_LABELS.get(name, name)), known.get(name), key(f"{kind} {name}")
@@ -382,7 +382,7 @@ def _edit_facts(kind: str, known: Table, choices: Sequence[str], key: Callable[[
 
 
 def _choose(place: DeltaGenerator, name: str, offered: Sequence[str], known: str | None, key: str) -> str | None:
-    """Ask for one of some names, or none; what the file says is among them, right or wrong."""
+    """Ask for one of some names, or none; the file's own value is among them, right or wrong."""
     names = list(dict.fromkeys([*offered, *([known] if known is not None else [])]))
     at = None if known is None else names.index(known)
     return place.selectbox(capitalised(name), names, at, placeholder=EMPTY.get(name, "not known"), key=key)
@@ -408,7 +408,7 @@ def _edit(kind: str, rows: list[Table], rig: Table, key: str, channels: Sequence
 
 
 def _rows(frame: DataFrame, before: list[Table]) -> list[Table]:
-    """Return the rows of an edited table as a rig file has them: what is empty is left out, whole numbers are whole."""
+    """Return the rows of an edited table as in a rig file: empty cells are left out, whole numbers are integers."""
     from pandas import isna
 
     rows = []
@@ -444,7 +444,7 @@ def _config(kind: str, rows: Sequence[Table], rig: Table, channels: Sequence[str
         looks |= {"help": whole} if name in SHORT_LABELS else {}
         if name == COLUMNS[kind][0] and kind != "shaft":  # a small window scrolls the wide tables
             looks["pinned"] = True
-        if name in choices:  # and what the file says besides, such as a bearing with its maker's name
+        if name in choices:  # plus unlisted values of the file, such as a bearing with its maker's name
             made[name] = column.SelectboxColumn(**looks, options=list(dict.fromkeys([*choices[name], *texts])))
         elif name.endswith(("_teeth", "elements")):
             made[name] = column.NumberColumn(**looks, step=1, format="%d")
@@ -456,25 +456,25 @@ def _config(kind: str, rows: Sequence[Table], rig: Table, channels: Sequence[str
 
 
 def _width_px(label: str, texts: Sequence[str]) -> int:
-    """Return the width at which neither a heading with its icon nor a text of the column is clipped."""
+    """Return the width in pixels at which neither a heading with its icon nor a text of the column is clipped."""
     longest = max(map(len, texts), default=12 if label == "name" else 0)
     return min(max(48 + 7 * len(label), 20 + 7 * longest), WIDEST_PX)
 
 
 SPEED_NAMES = re.compile(r"tach|keyphas|trig|enc|speed|rpm", re.IGNORECASE)
-"""What channels that tell a speed are usually called."""
+"""Usual names of channels that measure a speed."""
 
 
 def _edit_speed(
     file: ChosenFile, speed: Table, shafts: Sequence[str], key: Callable[[str], str], channels: Sequence[str]
 ) -> Table:
-    """Ask for the sampling rate and where the speed comes from, and return the table of the latter.
+    """Ask for the sampling rate and the source of the speed, and return the table of the source.
 
-    A constant speed that is typed here holds at once, as do times of pulses; one of the rig file, which may be of any
+    A constant speed typed here takes effect at once, as do times of pulses; one in the rig file, which may be of any
     shaft, is changed there.
     """
     row, known, source = st.columns(5), [*SPEED_SOURCES, PULSE_TIMES], str(speed.get("source", "none"))
-    about = "Of files that do not state it; it overrides what the file says."
+    about = "For files that do not state it; overrides what the file says."
     _ask_stated(row[0], file, "Sampling rate (Hz)", "rate", about)
     is_stated = stated(file, "speed") is not None
     first = "constant" if is_stated or source not in known else source
@@ -483,8 +483,8 @@ def _edit_speed(
     chosen = row[1].selectbox("Speed from", known, known.index(first), **looks)
     if chosen == "constant" and (is_stated or source != chosen):
         about = (
-            "Of the reference shaft, if it held still; refined by the signal. It overrides what the file says; without "
-            "it the speed is the file's, or found in the signal."
+            "Speed of the reference shaft, if it was constant; refined from the signal. It overrides what the file "
+            "says; without it, the speed is taken from the file or found in the signal."
         )
         _ask_stated(row[2], file, "Constant speed (rpm)", "speed", about)
         return speed if is_stated or source not in known else {}
@@ -519,12 +519,12 @@ def _edit_speed(
 
 
 # --------------------
-# What follows: a drawing of the train, and its orders.
+# What follows from the machine: a drawing of the gear train, and its orders.
 # --------------------
 
 
 def _show_consequences(table: Table, *, shown_already: Rig | str | None) -> None:
-    """Show what follows from a machine, or what is wrong with it where `shown_already` is not that already."""
+    """Show what follows from a machine, or what is wrong with it unless `shown_already` says so."""
     try:
         rig = rig_from_dict(table)
     except GearsigError as error:
@@ -532,7 +532,7 @@ def _show_consequences(table: Table, *, shown_already: Rig | str | None) -> None
             show_error(error)
         return
     if not rig.shafts:
-        st.caption(":material/account_tree: Name a shaft: its orders follow, and with teeth those of the mesh.")
+        st.caption(":material/account_tree: Name a shaft to see its orders; with teeth, those of the mesh follow.")
         return
     place = st.container(key="panels of the train")
     drawing, orders = place.columns((3, 4), vertical_alignment="center")
@@ -548,7 +548,7 @@ def _show_consequences(table: Table, *, shown_already: Rig | str | None) -> None
 
 
 def train_svg(rig: Rig, ink: str) -> str:
-    """Return a drawing of the shafts with their gears and bearings; names from files are escaped."""
+    """Return an SVG drawing of the shafts with their gears and bearings; names from files are escaped."""
     width, gap, left = 330, 74, 100
     radii = {
         (pair.name, shaft): gap
@@ -597,7 +597,7 @@ def train_svg(rig: Rig, ink: str) -> str:
 
 def _show_text(file: ChosenFile, text: str, *, is_open: bool = False) -> None:
     with st.expander("As a rig file (TOML)", icon=":material/code:", expanded=is_open):
-        given = st.file_uploader("Take over a rig file", type=["toml"], max_upload_size=1, key=f"take {_key(file)}")
+        given = st.file_uploader("Upload a rig file", type=["toml"], max_upload_size=1, key=f"take {_key(file)}")
         if given is not None and st.button("Use this rig file"):
             _take(file, text_of(given.name, given.getvalue()))
             st.rerun()
@@ -614,7 +614,7 @@ def text_of(name: str, content: bytes) -> str:
     Raises
     ------
     InputError
-        If it is no text.
+        If it is not text.
     """
     try:
         return content.decode("utf-8-sig")

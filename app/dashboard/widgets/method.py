@@ -1,4 +1,4 @@
-"""A method of the table: its form, its answer as figures that zoom, its waveforms and tables to take."""
+"""A method of `METHODS`: its form, its answer as zoomable figures, and its waveforms and tables for download."""
 
 from __future__ import annotations
 
@@ -50,32 +50,32 @@ if TYPE_CHECKING:
 
 MIN_SAMPLES, MOST_NUMBERS = 16, 16
 MOST_SIDE_BY_SIDE = 3
-"""Choices that are shown side by side; more are a list."""
+"""Maximum number of choices shown side by side; more become a list."""
 WIDTH_PX, MOST_WIDTH_PX = 210, 440
 
 
 def width_px(label: str, *texts: str, buttons_px: int = 60) -> int:
-    """Return the width of a field in which the longest of these texts can be read beside its buttons."""
+    """Return the width in pixels of a field that fits the longest of these texts beside its buttons."""
     longest = max(map(len, texts), default=0)
     return min(max(WIDTH_PX, 7 * len(label) + 30, buttons_px + 7 * longest), MOST_WIDTH_PX)
 
 
 @dataclass(frozen=True)
 class MethodPage:
-    """A method's page for one channel; `name` tells its widgets and files from those of other methods."""
+    """A method's page for one channel; `name` distinguishes its widgets and files from those of other methods."""
 
     analysis: Analysis
     channel: ChannelAnalysis
     name: str
 
     def key(self, widget: str) -> str:
-        """Key of a widget: its choice lasts while another method is shown, not when another recording is open."""
+        """Key of a widget: its choice survives a change of method, but not of recording."""
         return state.view_key(f"{self.name} {widget}", self.analysis)
 
     def ask(
         self, widget: Callable[..., Any], label: str, *values: Any, key: str = "", about: str = "", **looks: Any
     ) -> Any:
-        """Return what a widget of Streamlit gives; see `address.ask`.
+        """Return the value of a Streamlit widget; see `address.ask`.
 
         Parameters
         ----------
@@ -84,9 +84,9 @@ class MethodPage:
         *values, **looks
             As `address.ask` takes them.
         key : str
-            Within the page, where the label is not enough to know its state by.
+            Within the page, if the label does not identify the widget's state.
         about : str
-            Shown on demand.
+            Help text shown on demand.
         """
         looks |= {"key": self.key(key or label), "help": about or None, "persist_state": "session"}
         return address.ask(widget, label, *values, **looks)
@@ -104,14 +104,14 @@ class MethodPage:
         named: bool = True,
         as_written: bool = False,
     ) -> Any:
-        """Return the option chosen among few, `default` or else the first one at first.
+        """Return the option chosen among a few; at first `default`, or else the first option.
 
         Parameters
         ----------
         place : container
         label : str
         options : sequence of str, or mapping
-            A mapping gives the value of what is chosen, which the address names it by.
+            A mapping gives each option's value, by which the address names it.
         name : str
             In the address.
         default, key, about : str
@@ -164,7 +164,7 @@ class MethodPage:
         return (low, high) if high > low else (max(start, high - step), min(end, high + step))
 
     def segment(self, *, n_first: int) -> tuple[int, int]:
-        """Let the user choose what is analysed; return its first sample and the one after its last.
+        """Let the user choose the segment to analyse; return its first sample and the one after its last.
 
         Parameters
         ----------
@@ -180,7 +180,7 @@ class MethodPage:
 
 
 def ask_options(page: MethodPage, method: Method, prepared: PreparedRecording, more_of: Any) -> dict[str, Any]:
-    """Return the options that the user chose, a few widgets in a row; the seldom needed ones stand in `more_of`."""
+    """Return the options that the user chose in a row of widgets; rarely needed ones are shown in `more_of`."""
     known_angle = isinstance(page.analysis.shaft_angle, ShaftAngle)
     shown = [o for o in method.options if known_angle or o.name not in ("over_angle", "over", "shaft", "pair")]
     values = {option.name: option.default for option in method.options}
@@ -194,7 +194,7 @@ def ask_options(page: MethodPage, method: Method, prepared: PreparedRecording, m
 
 
 def _as_suggested(option: MethodOption, page: MethodPage) -> MethodOption:
-    """Return an option whose default is what the analysis of the whole recording suggests, where it does."""
+    """Return the option with the default that the analysis of the whole recording suggests, if any."""
     value = None if option.suggested is None else option.suggested(page.analysis)
     return option if value is None else replace(option, default=float(f"{value:.5g}"))
 
@@ -204,7 +204,7 @@ def _ask_in_rows(
 ) -> None:
     """Ask in a row that wraps: each widget is as wide as it needs to be, so that no choice is cut off.
 
-    In a narrow window a field takes at most half of the row, by the page's style.
+    In a narrow window the page's style limits a field to half of the row.
     """
     if not options:
         return
@@ -246,8 +246,8 @@ def _asked_name(page: MethodPage, option: MethodOption, known: Any) -> Any:
 
 
 def _asked_of_several(page: MethodPage, option: MethodOption) -> Any:
-    """Ask for one of many: of texts, or where none may be chosen, in a list; of numbers on a scale."""
-    free = option.default is None  # of which an empty text stands in the list: Streamlit takes None for no choice
+    """Ask for one of many: a list for texts, or if none may be chosen; otherwise a slider for numbers."""
+    free = option.default is None  # listed as an empty text: Streamlit takes None for no choice
     choices = ["", *option.choices] if free else list(option.choices)
     widget: Any = st.selectbox if option.kind == "choice" or free else st.select_slider
 
@@ -287,7 +287,7 @@ def _asked_span(page: MethodPage, option: MethodOption, known: Any) -> tuple[flo
 
 
 def two_numbers(text: str | None, label: str) -> tuple[float, float] | None:
-    """Return the numbers of "0.001, 0.004", None where the field is empty."""
+    """Return the two numbers of a text such as "0.001, 0.004", None if the field is empty."""
     if not text or not text.strip():
         return None
     try:
@@ -325,7 +325,7 @@ def _number(text: str, label: str) -> float:
     try:
         return float(text.replace(",", "."))
     except ValueError:
-        raise InputError(f"{text!r} is no number", where=label, allowed="numbers, such as 29 or 0.42") from None
+        raise InputError(f"{text!r} is not a number", where=label, allowed="numbers, such as 29 or 0.42") from None
 
 
 _WIDGETS: dict[str, Callable[[MethodPage, MethodOption, Any], Any]] = {
@@ -347,23 +347,23 @@ _WIDGETS: dict[str, Callable[[MethodPage, MethodOption, Any], Any]] = {
 P = ParamSpec("P")
 R = TypeVar("R")
 OVER_TIME, OVER_ANGLE = (".csv", ".h5", ".wav", ".parquet", ".mat"), (".csv",)
-"""What waveforms are written to: recordings, which run over time; signals over angle are plain columns."""
+"""File formats of waveforms: those over time are recordings, those over angle plain columns."""
 _SPOKEN = re.compile(r"(\*\*| )")
-"""Parts the words of a text in which ** makes bold."""
+"""Splits a text, in which ** makes bold, into words."""
 MEMORY_LIMIT_MB, N_PREPARED = 256.0, 4
-"""What is kept of a segment between two looks at it, and of how many segments."""
+"""Memory limit for what is kept of one segment, and the number of segments kept."""
 
 
 def cached(n_kept: int, words: str) -> Callable[[Callable[P, R]], CachedFunction[P, R]]:
-    """Compute a function beside the page and keep its last answers, told apart by the content of its arguments.
+    """Compute a function beside the page and cache its latest answers by the content of its arguments.
 
-    Answers are frozen, so that sessions may share them. Streamlit's own hash samples large arrays, and two segments of
-    one recording could be taken for each other: arguments are hashed whole here, about 1 GB/s.
+    Answers are immutable, so sessions may share them. Streamlit's own hash samples large arrays, so two segments of one
+    recording could be confused; here arguments are hashed whole, at about 1 GB/s.
 
     Parameters
     ----------
     n_kept : int
-        Answers kept; most are several times as long as the segment.
+        Number of answers kept; most are several times as long as the segment.
     words : str
         Shown while it computes.
 
@@ -375,7 +375,7 @@ def cached(n_kept: int, words: str) -> Callable[[Callable[P, R]], CachedFunction
 
 
 def content_key(value: object) -> str:
-    """Return a text that stands for the content of settings, arrays and dataclasses of them."""
+    """Return a hash of the content of settings, arrays and dataclasses of them."""
     digest = blake2b(digest_size=16)
     _feed(digest, value)
     return digest.hexdigest()
@@ -401,7 +401,7 @@ def _feed(digest: blake2b, value: object) -> None:
 
 @cached(N_PREPARED, "Preparing …")
 def _segment(part: Recording, angle: ShaftAngle | CannotTell) -> tuple[PreparedRecording, Lock]:
-    """Return a segment that methods share, and the lock under which one at a time works with it."""
+    """Return a segment that methods share, and the lock that lets one at a time use it."""
     return with_known_angle(part, angle, memory_limit_mb=MEMORY_LIMIT_MB), Lock()
 
 
@@ -409,7 +409,7 @@ def _segment(part: Recording, angle: ShaftAngle | CannotTell) -> tuple[PreparedR
 def answer_of(
     name: str, part: Recording, angle: ShaftAngle | CannotTell, channel: str, options: Mapping[str, Any]
 ) -> MethodAnswer:
-    """Return a method's answer; what it computes of a segment on the way is kept for other options."""
+    """Return a method's answer; its intermediate results for a segment are kept for other options."""
     prepared, lock = _segment(part, angle)
     with lock:
         return apply_method(name, prepared, channel, **options)
@@ -429,16 +429,16 @@ def show_method(name: str, analysis: Analysis, channel: ChannelAnalysis) -> None
             _show_refusal(error)
             figure = figure_of_refusal(error)
             if figure is not None:
-                st.caption("What was looked at:")
-                charts.show_figure(figure, "What was looked at", page.key("looked at"))
+                st.caption("What was examined:")
+                charts.show_figure(figure, "What was examined", page.key("looked at"))
     except GearsigError as error:
         show_error(error)
 
 
 def _show_refusal(error: RefusalError) -> None:
-    """Show that the recording allows no answer: a result like others, and no mistake of the user's."""
+    """Show that the recording allows no answer, which is a result like any other and not the user's mistake."""
     reason = capitalised(in_page_text(error.reason).rstrip("."))
-    lines = [f"**It cannot be told from this segment.** {as_typed(reason)}."]
+    lines = [f"**This segment does not allow an answer.** {as_typed(reason)}."]
     if error.remedy:
         lines.append(f"What to do: {as_typed(in_page_text(error.remedy).rstrip('.'))}.")
     st.info("\n\n".join(lines), icon=":material/help:")
@@ -458,7 +458,7 @@ def _show(name: str, page: MethodPage) -> None:
     analysed = st.empty()
     with few:
         options = ask_options(page, method, part_of(whole, start / rate, stop / rate), more)
-    # what takes longer than a few seconds is cut, which is said
+    # a segment that would take longer than a few seconds is shortened, and the page says so
     end = min(stop, start + (method.n_max if method.limit is None else min(method.n_max, method.limit(options))))
     text = f"Analysed: {start / rate:.4g} to {end / rate:.4g} s of {recording.duration_s:.4g} s, {end - start} samples"
     analysed.caption(f"{text}{'; a longer one would take too long.' if end < stop else '.'}")
@@ -466,7 +466,7 @@ def _show(name: str, page: MethodPage) -> None:
     angle = angle_or_none(part) or (
         analysis.shaft_angle
         if isinstance(analysis.shaft_angle, CannotTell)
-        else CannotTell("speed", "the shaft's angle is not known in this segment", "choose another one")
+        else CannotTell("speed", "the shaft's angle is not known in this segment", "choose another segment")
     )
     answer = answer_of(name, part.recording, angle, page.channel.channel, options)
     show_answer(page, answer, angle, more)
@@ -480,7 +480,7 @@ def show_answer(page: MethodPage, answer: MethodAnswer, angle: ShaftAngle | Cann
     span = 60.0
     if any(isinstance(panel, LevelPanel) and panel.span is None for panel in answer.panels):
         slider, read = more.slider, address.number(20, 120, whole=True)
-        span = float(page.ask(slider, "Colours span (dB)", 20, 120, step=5, name="colours", first=60, read=read))
+        span = float(page.ask(slider, "Colour range (dB)", 20, 120, step=5, name="colours", first=60, read=read))
     for number, panel in enumerate(answer.panels):
         charts.show_panel(panel, page.key(f"figure {number} {panel.x} {panel.y}"), span)
     if answer.path is not None:
@@ -508,7 +508,7 @@ def _show_space(page: MethodPage, path: np.ndarray) -> None:
         height=560, margin=dict.fromkeys("lrtb", 0), showlegend=False, scene={**titles, "aspectmode": "cube"}
     )
     st.plotly_chart(figure, width="stretch", key=page.key("space"), config={"displaylogo": False}, alt="Path in space")
-    st.caption("The last points of the path. Drag to turn it.")
+    st.caption("The last points of the path. Drag to rotate it.")
 
 
 # --------------------
@@ -519,7 +519,7 @@ def _show_space(page: MethodPage, path: np.ndarray) -> None:
 def first_length(page: MethodPage, waveforms: Waveforms, angle: ShaftAngle | CannotTell) -> float:
     """Return the length of a waveform's first view in s or revolutions: five mesh cycles, so that their shape is seen.
 
-    Three revolutions where no mesh is known, 3000 samples where the speed is not; or what the method asks for.
+    Three revolutions if no mesh is known, 3000 samples if the speed is not known; or what the method asks for.
     """
     if waveforms.first_length is not None:
         return waveforms.first_length
@@ -559,7 +559,7 @@ def _show_waveforms(page: MethodPage, waveforms: Waveforms, angle: ShaftAngle | 
 
 
 # --------------------
-# What is taken along: whole, not thinned as on the page.
+# Downloads: complete, not thinned as on the page.
 # --------------------
 
 
@@ -578,7 +578,7 @@ def _offer(page: MethodPage, answer: MethodAnswer) -> None:
             label = f"Waveforms: {len(waveforms.columns)} × {waveforms.n_samples} samples"
             _offer_file(page, label, partial(waveforms_file, waveforms, ending), "waveforms", ending)
             if ending == ".csv" and n > 2_000_000:
-                st.caption(f"About {20e-6 * n:.0f} MB as CSV; .h5 is less than half of it.")
+                st.caption(f"About {20e-6 * n:.0f} MB as CSV, and less than half of that as .h5.")
         for what, table in {"table": answer.table, **answer.tables}.items():
             _offer_file(page, f"{what.capitalize()} (CSV)", partial(table_csv, table), what, ".csv")
 

@@ -1,4 +1,4 @@
-"""Spectra with cursors, thinned to the segment that is shown; the synchronous average."""
+"""Spectra with cursors, thinned to the range that is shown; the synchronous average."""
 
 from __future__ import annotations
 
@@ -67,14 +67,14 @@ def show_spectrum(
     quantity: str = "",
     plain: bool = False,
 ) -> tuple[float, float]:
-    """Show spectra over each other and what can be changed about the view; return the segment that is shown.
+    """Show overlaid spectra and the settings of the view; return the range that is shown.
 
     Parameters
     ----------
     source : Analysis or str
         What the view is of, see `state.view_key`.
     spectra : Spectrum, or sequence of them
-        Of one axis and unit; the first lies in front.
+        Of one axis and unit; the first is in front.
     cursors : sequence of Cursor
         On the spectra's axis.
     name : str
@@ -84,18 +84,18 @@ def show_spectrum(
     marked : sequence of float
         Positions that findings name.
     shown : (float, float) or None
-        Segment shown at first.
+        Range shown at first.
     scale : str
         Chosen at first, one of `SCALES`.
     quantity : str
         Name of the values; empty: by their scaling.
     plain : bool
-        The figure alone, beside a verdict.
+        Show the figure alone, beside a verdict.
     """
     spectra = (spectra,) if isinstance(spectra, Spectrum) else spectra
     first = spectra[0]
     if scale == "Logarithmic" and is_sound_pressure(first.unit):
-        scale = "dB"  # in which sound is read
+        scale = "dB"  # as is usual for sound
     label, chosen = scale, list(KIND_NAMES)
     if not plain:
         label, chosen = _choose_looks(source, cursors, name, scale)
@@ -115,7 +115,7 @@ def show_spectrum(
     text = quantity or ("value" if first.scaling == "dimensionless" else first.scaling)
     in_db = f"{level_name(text, first.unit)} ({decibel_text(first.unit)})"
     values = displayed_values(first.values, first.scaling, scaled, first.unit)
-    # a finding names an order to less than a line: the tallest beside it is meant
+    # a finding's order may be off by a line or two: the tallest line near it is meant
     places = [(p, max(first.index_of(p) - 2, 0)) for p in marked]
     shafts = [cursor.position for cursor in cursors if cursor.kind == "shaft"]
     panel = LinePanel(
@@ -146,13 +146,13 @@ def show_spectrum(
     st.caption(
         f"Resolution {first.resolution:.4g} {first.axis_unit}, {capitalised(first.window)} window{averages}."
         f"{joined if many else ''}{circle_legend(marked)} "
-        "Drag to zoom, double click for all."
+        "Drag to zoom, double-click to show all."
     )
     return low, high
 
 
 def _other_unit(source: Analysis | str, spectrum: Spectrum) -> tuple[float, str] | None:
-    """Return Hz of an order, or orders of a hertz, for the readout of cursors, where the speed holds still."""
+    """Return Hz per order, or orders per hertz, for the readout of cursors, if the speed is constant."""
     if isinstance(source, str) or isinstance(source.shaft_angle, CannotTell) or not speed_is_constant(source):
         return None
     turns_hz = source.shaft_angle.mean_speed_rpm / 60.0
@@ -182,32 +182,32 @@ def _choose_looks(source: Analysis | str, cursors: Sequence[Cursor], name: str, 
 
 
 def _first_if_found(cursor: Cursor, marked: Sequence[float]) -> Cursor:
-    """Give the cursors of a finding the first right to their labels: of a bearing's its multiples, too."""
+    """Give the cursors of a finding priority for their labels, for a bearing including its multiples."""
     return replace(cursor, number=0) if any(_is_of(cursor, position) for position in marked) else cursor
 
 
 def _is_of(cursor: Cursor, position: float) -> bool:
-    if cursor.kind != "bearing":  # which does not slip
+    if cursor.kind != "bearing":  # only bearings slip
         return abs(cursor.position - position) <= 1e-3 * position
     return abs(cursor.position - max(cursor.number, 1) * position) <= LARGEST_SLIP * cursor.position
 
 
 KINDS = {
-    "change": "What differs from the reference at the same angle: what both have in common, such as the mesh, is gone.",
+    "change": "What differs from the reference at the same angle: what both share, such as the mesh, is removed.",
     "residual": "Without the mesh harmonics: a single damaged tooth stands out here.",
     "difference": "Without the mesh harmonics and their first sidebands: what is left is local.",
-    "average": "The mean revolution: mesh cycles, and whatever returns every turn.",
-    "regular": "What was taken out for the difference signal.",
+    "average": "The mean revolution: mesh cycles, and whatever repeats every revolution.",
+    "regular": "What was removed to obtain the difference signal.",
 }
 
 
 def show_average(analysis: Analysis, channel: ChannelAnalysis) -> None:
-    """Show one mean revolution of a chosen shaft: at first the signal that the verdict is seen in best."""
+    """Show the mean revolution of a chosen shaft, at first the signal that shows the verdict best."""
     averages, picture = channel.averages, verdict_picture(analysis)
     shown = picture if picture is not None and picture.about == "tooth" and picture.channel is channel else None
     shafts = list(dict.fromkeys(shaft for shaft, _ in channel.averages))
     if not shafts:
-        st.info("There is no synchronous average: it takes a known speed and enough revolutions.")
+        st.info("There is no synchronous average: it needs a known speed and enough revolutions.")
         return
     left, right = st.columns((1, 2), vertical_alignment="bottom")
     key, first = state.view_key("average shaft", analysis), shown.shaft if shown is not None else shafts[0]
@@ -222,11 +222,11 @@ def show_average(analysis: Analysis, channel: ChannelAnalysis) -> None:
     words = KINDS[average.kind]
     if average.kind != "change":
         words += " Band: ± 2 standard errors of the mean, from the scatter of the revolutions."
-    st.caption(f"{words} The same as a ring stands beside the verdict." if is_above else words)
+    st.caption(f"{words} The same signal is shown as a ring beside the verdict." if is_above else words)
 
 
 def show_revolutions(curves: Mapping[str, FloatArray], shaft: str, y: str, key: str) -> None:
-    """Show mean revolutions of a shaft over each other, by their names; the first lies in front."""
+    """Show named mean revolutions of a shaft, overlaid; the first is in front."""
     lines = [
         ChartLine(np.arange(len(values)) * 360.0 / len(values), values, name, colour)
         for colour, (name, values) in enumerate(curves.items())
@@ -236,7 +236,7 @@ def show_revolutions(curves: Mapping[str, FloatArray], shaft: str, y: str, key: 
 
 
 def teeth_choice(analysis: Analysis, shaft: str) -> int | None:
-    """Return the teeth of the gear on a shaft; the user chooses where there are several."""
+    """Return the number of teeth of the gear on a shaft; the user chooses if there are several gears."""
     gears = analysis.rig.gear_teeth(shaft) if analysis.rig is not None else {}
     if len(gears) < 2:
         return next(iter(gears.values()), None)
@@ -248,14 +248,14 @@ def teeth_choice(analysis: Analysis, shaft: str) -> int | None:
 
 
 def _show(analysis: Analysis, average: SynchronousAverage, n_teeth: int | None, *, is_above: bool) -> None:
-    """Show the ring of teeth beside the same over the angle, which alone is shown of a ring that the page has above."""
+    """Show the ring of teeth beside the average over the angle; without the ring if the page already shows it."""
     marks = marks_of(analysis.findings, average.shaft, n_teeth)
     cursors = [Cursor(mark.angle_deg, "finding", mark.label) for mark in marks]
     if is_above:
         _show_unrolled(analysis, average, n_teeth, cursors)
         return
     seen = f"; marked: {', '.join(mark.label for mark in marks)}" if marks else ""
-    words = f"Polar picture: {average.kind} of {average.channel} over one revolution of {average.shaft}{seen}"
+    words = f"Polar plot: {average.kind} of {average.channel} over one revolution of {average.shaft}{seen}"
     with st.container(key="average"):
         polar, unrolled = st.columns((6, 7), vertical_alignment="center")
         with polar:
@@ -277,11 +277,11 @@ def show_ring(
     *,
     numbered: bool,
 ) -> str:
-    """Show the ring of teeth in the page's colours, to be zoomed and read off; return it as SVG."""
+    """Show the ring of teeth, zoomable and with a readout, in the page's colours; return it as SVG."""
     colours = palette()
     looks = {"ink": colours.quiet, "line": colours.measured}
     svg = svg_ring(average, n_teeth=n_teeth, marks=marks, numbered=numbered, **looks)
-    # a place for each pixel of the ring, not for each sample
+    # a value for each pixel of the ring, not for each sample
     values = average.values[:: max(len(average.values) // N_COLUMNS, 1)]
     show_svg(svg, words, key, ring=Ring({"": values}, (n_teeth or 0) * numbered, unit_text(average.unit)))
     return svg
@@ -296,10 +296,10 @@ def offer_ring(
 
 
 def _show_unrolled(analysis: Analysis, average: SynchronousAverage, n_teeth: int | None, marks: list[Cursor]) -> None:
-    """Show the same over the angle, with its largest swing in words."""
+    """Show the average over the angle, with its largest swing in words."""
     values, error = average.values, 2 * average.standard_error
     angle = np.arange(len(values)) * 360 / len(values)
-    # the scatter of a change is that of two recordings, of which this one's alone is known here
+    # a change has the scatter of two recordings, of which only this one's is known here
     band = None if average.kind == "change" else (values - error, values + error)
     line = ChartLine(angle, values, average.kind, band=band)
     key = state.view_key(f"average {average.channel} {average.shaft} {average.kind}", analysis)

@@ -1,4 +1,4 @@
-"""Texts on a page: names from strangers as they were typed, errors in the page's words, warnings, tables, facts."""
+"""Texts on a page: names from files as they were typed, errors in the page's words, warnings, tables, facts."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ if TYPE_CHECKING:
 
 
 # --------------------
-# Text from strangers, shown as it was typed: file, channel and machine names are never markup.
+# Untrusted text, shown as it was typed: file, channel and machine names are never markup.
 # --------------------
 
 
 _MARKUP = re.compile(r"([!-/:-@\[-`{-~])")  # ASCII punctuation, all of which Markdown lets a backslash escape
 # Streamlit and its Markdown dialect replace these after the escapes are gone: emoji and icons (:name:), arrows (->),
-# addresses (http:, www., a@b). A word joiner, which has no width, breaks the pattern and leaves the looks.
+# addresses (http:, www., a@b). A word joiner, which has no width, breaks the pattern but keeps the appearance.
 _REPLACED = re.compile(r"(?<=[:@])(?=\S)|(?<=[-<>~=])(?=[-<>~=])|(?<=www)(?=\.)|(?<=www\.)", re.IGNORECASE)
 _JOINER = "\u2060"
-# Marks that turn the direction of the text around them, and invisible ones, may make a name look like another.
+# Marks that reverse the direction of text, and invisible ones, may make one name look like another.
 _INVISIBLE = re.compile(r"[\u200b-\u200f\u202a-\u202e\u2060-\u2069\ufeff]")
 _UNIT = re.compile(r"(?<=\d) (?=(?:%|dB|k?Hz|rpm|[mµ]?m|m/s|N·m|k?N|m?s|J|g|of)(?![\w·]))")
 
 
 def as_typed(text: object) -> str:
-    r"""Return Markdown that shows `text` letter by letter; where it wraps, numbers stay with their units.
+    r"""Return Markdown that shows `text` literally; where it wraps, numbers stay with their units.
 
     Examples
     --------
@@ -96,7 +96,7 @@ FORM_LABELS = {
     "rpm_per_unit": "rpm per unit",
     "sampling_rate_hz": "Sampling rate (Hz)",
 }
-"""What the form of the machine calls the keys of a rig file; of others their own name."""
+"""What the form of the machine calls the keys of a rig file; other keys keep their own names."""
 _PLACES = {
     "--fs or sampling_rate_hz in the rig file": "the sampling rate, below or under Machine",
     "--fs": "the sampling rate, below or under Machine",
@@ -131,7 +131,7 @@ _PLACES = {
     "Give the bearings in the rig file": "Describe the bearings under Machine",
     "/s^2": "/s²",
 }
-"""What the page calls the options of the command line, of functions and of rig files that messages name."""
+"""What the page calls the options of the command line, of functions and of rig files that appear in messages."""
 _ROW = re.compile(r"(?:[^\[\]]*: )?\[\[(\w+)\]\] (\d+)(?:: (\w+))?")
 _TABLE = re.compile(r"(?:(an?)|(?:the rig(?: file)?'s|its)) \[\[(\w+)\]\](?: tables?)?(?: in the rig file)?")
 _KEY = re.compile(rf"\b(?:{'|'.join(key for key in FORM_LABELS if '_' in key)})\b")
@@ -141,7 +141,7 @@ _FILE = re.compile(r"(?:rig|rig\.toml)|[^\[\]]*: (\w+)")
 
 
 def show_error(error: GearsigError) -> None:
-    """Show an error of the input; texts in it may come from the file."""
+    """Show an input error; texts in it may come from the file."""
     if not isinstance(error, InputError):
         st.error(as_typed(in_page_text(str(error))), icon=":material/help:")
         return
@@ -175,7 +175,7 @@ def place_in_form(where: str) -> str:
 
 
 def in_page_text(text: str) -> str:
-    """Return a text with the page's names of what the command line calls by its options, and rig files by their keys.
+    """Return a text with command-line options and rig-file keys replaced by the page's names for them.
 
     Examples
     --------
@@ -190,7 +190,7 @@ def in_page_text(text: str) -> str:
 
 
 def show_warnings(warnings: Sequence[str], *, quiet: bool = False) -> None:
-    """Show what an answer says about itself, as one warning or quietly as small print; names in it come from files."""
+    """Show an answer's warnings in one box, or quietly as small print; names in them come from files."""
     if not warnings:
         return
     lines = [as_typed(in_page_text(text)) for text in warnings]
@@ -202,7 +202,7 @@ def show_warnings(warnings: Sequence[str], *, quiet: bool = False) -> None:
 
 
 def show_checks(checks: Iterable[tuple[bool, str]]) -> None:
-    """Show what holds, and what does not, line by line; texts may come from files."""
+    """Show line by line which statements hold and which do not; texts may come from files."""
     with st.container(gap=None):
         for holds, text in checks:
             mark = ":green[:material/check:]" if holds else ":orange[:material/priority_high:]"
@@ -211,13 +211,13 @@ def show_checks(checks: Iterable[tuple[bool, str]]) -> None:
 
 def show_unknown_speed(reason: CannotTell) -> None:
     """Say why there is no speed and what would give it."""
-    remedy = f"\n\nWhat would give it: {as_typed(in_page_text(reason.remedy))}" if reason.remedy else ""
-    hint = "\n\nA constant speed, or a file of tachometer pulses' times, can be given under *Machine*."
+    remedy = f"\n\nWhat would help: {as_typed(in_page_text(reason.remedy))}" if reason.remedy else ""
+    hint = "\n\nA constant speed, or a file of tachometer pulse times, can be given under *Machine*."
     st.info(f"The speed is not known: {as_typed(reason.reason)}{remedy}{hint}", icon=":material/help:")
 
 
 # --------------------
-# Tables of results that are sorted and searched, tables of words whose cells wrap, and single facts.
+# Tables of results that can be sorted and searched, tables of text whose cells wrap, and single facts.
 # --------------------
 
 
@@ -228,13 +228,13 @@ def show_table(
     number: str = ".5g",
     **looks: Any,
 ) -> None:
-    """Show a table that is sorted by its numbers, however they are written: with the minus sign of axes and texts.
+    """Show a table that sorts by its numbers, although they are written with the minus sign of axes and texts.
 
     Parameters
     ----------
     columns : DataFrame, mapping of columns, or sequence of rows
     formats : mapping or None
-        Format of single columns, or what writes their numbers.
+        Formats of single columns, or functions that format their numbers.
     number : str
         Format of the other numbers.
     **looks
@@ -251,7 +251,7 @@ def show_table(
 
 
 def number_text(value: float, form: str) -> str:
-    """Write a number; nothing where it is not known, which the table marks itself.
+    """Return a number as text; empty if it is not known, which the table marks itself.
 
     Examples
     --------
@@ -262,7 +262,7 @@ def number_text(value: float, form: str) -> str:
 
 
 def show_wrapping_table(columns: Mapping[str, Sequence[Any]], *, border: bool | Literal["horizontal"] = True) -> None:
-    """Show a short table whose cells wrap; nothing where it has no rows. Texts may come from files."""
+    """Show a short table whose cells wrap; nothing if it has no rows. Texts may come from files."""
     import pandas as pd
 
     frame = pd.DataFrame({name: [as_typed(text) for text in texts] for name, texts in columns.items()})
@@ -271,7 +271,7 @@ def show_wrapping_table(columns: Mapping[str, Sequence[Any]], *, border: bool | 
 
 
 def show_facts(columns: Iterable[Any], facts: Mapping[str, str]) -> None:
-    """Show names with what is known of them, one in each column; texts may come from files."""
+    """Show names with their values, one in each column; texts may come from files."""
     for column, (name, text) in zip(columns, facts.items(), strict=True):
         column.caption(name)
         column.markdown(f"**{as_typed(text)}**")

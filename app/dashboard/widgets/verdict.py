@@ -1,4 +1,4 @@
-"""The answer on top of the page: in words, with the picture it rests on."""
+"""The verdict at the top of the page: in words, with the picture it rests on."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ ICONS: dict[Kind | Outcome, str] = {
 
 
 def show_verdict(analysis: Analysis) -> None:
-    """Show the verdict and beside it the picture that it rests on; below, folded, all findings with their evidence."""
+    """Show the verdict beside the picture that it rests on; below, collapsed, all findings with their evidence."""
     with st.container(key="verdict"):
         words, picture = st.columns((6, 5), gap="medium")
         with words:
@@ -84,7 +84,7 @@ def _show_words(analysis: Analysis) -> None:
     headline, rest = headline_of(analysis)
     facts = [
         f"**{as_typed(recording.provenance.source)}**",
-        as_typed(machine) or ("machine without a name" if is_described else "machine not described"),
+        as_typed(machine) or ("unnamed machine" if is_described else "machine not described"),
         f"{counted(n, 'channel')}",
         as_typed(f"{recording.duration_s:.4g} s at {recording.sampling_rate_hz:.6g} Hz"),
     ]
@@ -115,7 +115,7 @@ def _show_grounds(analysis: Analysis) -> None:
             _show_measures(card)
         ratio_db = finding.strength.ratio_db if finding.strength is not None else None
         strong = f"**{readable(ratio_db, 3)} dB** over its floor" if ratio_db is not None else ""
-        with st.container(key="verdict-brief"):  # the same in a line or two, for a small window
+        with st.container(key="verdict-brief"):  # the same in one or two lines, for a small window
             st.caption(" · ".join(filter(None, (places, strong, _sureness(card)))))
 
 
