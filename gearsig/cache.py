@@ -162,7 +162,7 @@ def read_arrays(path: Path, most_bytes: int) -> dict[str, Any] | None:
                 return None
         with np.load(path, allow_pickle=False) as data:
             return {name: data[name] for name in data.files}
-    except Exception:  # noqa: BLE001 - damaged bytes make its readers raise anything: zlib.error, TokenError, RuntimeError
+    except Exception:  # noqa: BLE001 - damaged files raise anything: zlib.error, TokenError, RuntimeError
         return None
 
 

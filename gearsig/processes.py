@@ -241,9 +241,7 @@ def _start_worker() -> None:
         fcntl.fcntl(parent.sentinel, fcntl.F_SETOWN, os.getpid())
         flags = fcntl.fcntl(parent.sentinel, fcntl.F_GETFL)
         fcntl.fcntl(parent.sentinel, fcntl.F_SETFL, flags | os.O_ASYNC)
-        if connection.wait(
-            [parent.sentinel], 0
-        ):  # the parent ended while this process started: no signal will come
+        if connection.wait([parent.sentinel], 0):  # the parent ended while this process started: no signal will come
             os._exit(1)
     Thread(target=_end_with_parent, daemon=True).start()
 
