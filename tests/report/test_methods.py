@@ -220,7 +220,7 @@ def test_options_of_other_methods_wrong_names_and_missing_speeds_are_refused() -
         apply_method("ordermap", recording())
     with pytest.raises(InputError, match="1 to 3"):
         apply_method("modes", recording(), n_modes=3, mode=4)
-    with pytest.raises(InputError, match="goes on to no transform"):
+    with pytest.raises(InputError, match="cannot be followed by a transform"):
         named_method("kurtogram+cwt")
     still = Recording(recording().samples, RATE_HZ, recording().channels)
     with pytest.raises((InputError, RefusalError)):
