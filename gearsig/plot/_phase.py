@@ -200,7 +200,7 @@ def divergence_figure(exponent: LyapunovExponent, *, title: str = "") -> Figure:
 
 
 def chaos_test_figure(test: ChaosTest, walk: FloatArray, c_rad: float, *, title: str = "") -> Figure:
-    """Draw K over c with its median, and beside it the path in the plane of p and q at one c, (n, 2)."""
+    """Draw K over c with its median, and beside it the walk in the plane of p and q at one c, (n, 2)."""
     figure, (left, right) = _two_panels()
     order = np.argsort(test.c_rad)
     left.plot(test.c_rad[order], test.k_of_c[order], ".-", color=style.MEASURED, markersize=4, linewidth=0.7)

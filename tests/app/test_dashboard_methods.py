@@ -407,7 +407,7 @@ def test_coherence_names_the_lines_that_stand_out() -> None:
     page = opened_at("Cyclic coherence", "outer_race")
     at, values = measured_line(page)
     assert values[np.abs(at - OUTER_RACE_HZ) <= 1.0].max() > 0.3
-    assert "stand above noise's level" in shown_text(page)
+    assert "above the level of noise" in shown_text(page)
     named = shown_text(page).split("for their slip: ")[1].split("Bearing lines whose peak")[0]
     assert "BPFO bearing" in named
     assert "not that there is damage" in shown_text(page)

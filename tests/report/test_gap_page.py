@@ -249,8 +249,9 @@ def test_it_says_what_is_compared_with():
     assert floors_text(gearless_report()) == ""
     first, *others = with_reference.conditions
     partly = replace(with_reference, conditions=(replace(first, reference="healthy_1.h5"), *others))
-    assert f"Without a reference at its operating point, with the simulated prediction: {others[0].name}" in floors_text(
-        partly
+    assert (
+        f"Without a reference at its operating point, with the simulated prediction: {others[0].name}"
+        in floors_text(partly)
     )
 
 
