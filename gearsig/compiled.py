@@ -59,8 +59,8 @@ class _KeptCode(FunctionCache):  # type: ignore[misc,unused-ignore]
 
 
 UNCOUNTED: dict[str, Any] = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
-"""Options of `numba.njit` that turn off reference counting of arrays: its atomic operation at each call took a fifth of
-the time of short steps. A kernel compiled with them that allocates an array fails to compile."""
+"""Options of `numba.njit` that turn off reference counting of arrays, an atomic operation whenever an array is passed
+on, which took a fifth of the time of short steps. A kernel with these options that allocates arrays cannot compile."""
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]

@@ -67,7 +67,7 @@ def one_pool(n_processes: int) -> Iterator[None]:
     The processes start with the first job and live until the block ends; if one is killed, the following jobs get
     fresh ones. A nested block has no effect.
     """
-    if any(pool._max_workers == n_processes for pool in _KEPT.get([])):  # type: ignore[attr-defined]  # nothing public tells it
+    if any(pool._max_workers == n_processes for pool in _KEPT.get([])):  # type: ignore[attr-defined]  # there is no public attribute
         yield
         return
     with process_pool(n_processes) as pool:
@@ -82,7 +82,7 @@ def start_early(function: Callable[..., object], *arguments: object) -> None:
     """Start the processes of `one_pool` now, each with a call that loads what jobs need; its result is ignored."""
     if active_cluster() is None and can_be_sent(arguments):
         for pool in _KEPT.get([]):
-            for _ in range(pool._max_workers):  # type: ignore[attr-defined]  # nothing public tells it
+            for _ in range(pool._max_workers):  # type: ignore[attr-defined]  # there is no public attribute
                 pool.submit(function, *arguments)
 
 
@@ -110,7 +110,7 @@ def begin(function: Callable[..., Result], *arguments: object) -> Callable[[], R
 def _jobs_pool(n_processes: int) -> Iterator[ProcessPoolExecutor]:
     """Open a pool, or reuse that of `one_pool`; a broken one is not used again."""
     kept = _KEPT.get([])
-    if not kept or kept[0]._max_workers != n_processes:  # type: ignore[attr-defined]  # nothing public tells it
+    if not kept or kept[0]._max_workers != n_processes:  # type: ignore[attr-defined]  # there is no public attribute
         with process_pool(n_processes) as pool:
             yield pool
         return

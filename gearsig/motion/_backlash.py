@@ -190,7 +190,7 @@ class TorqueTwist(Result, columns=("twist_rad", "torque_nm")):
         ∮ τ dδ per segment of motion: energy lost in tooth contact and friction; nan if the motion neither stops nor
         reverses, as the loop does not close then.
     loss_uncertainty_j : float
-        Difference between two ways of integrating it, over compression and over its rate; a large one means noise.
+        Difference between two ways of integrating it, over compression and over its rate: noise if it exceeds the loss.
     work_per_cycle_j : float
         ∫ τ dθ1 per segment of motion: work transmitted through the shaft; nan in the same case.
     n_cycles : int

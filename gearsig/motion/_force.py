@@ -176,7 +176,7 @@ def friction_share(motion: PairMotion, g: FloatArray, gear: int = 0) -> FloatArr
 
 
 def hand_over_force(motion: PairMotion, g: FloatArray) -> FloatArray:
-    """Return ∂V/∂θ1 / r_b1 in N: the additional driver force as pairs that enter or leave store or release energy.
+    """Return ∂V/∂θ1 / r_b1 in N: the additional driver force due to energy of pairs that enter or leave contact.
 
     V = Σ w(p_i) k |g|^(λ+1)/(λ+1) changes with the driver's angle through the weights of the pairs that enter and
     leave; over a whole pitch at constant depth the sum is zero.
