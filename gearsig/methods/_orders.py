@@ -30,7 +30,7 @@ from gearsig.rig import order_lines
 
 KINDS = ("mesh", "shaft", "bearing", "sideband")
 MIN_LENGTH, MAX_EFFORT = 2**16, 1_600_000
-"""Coupled orders take time as their number squared: maximum samples × orders², and minimum samples in any case."""
+"""Coupled orders take time as their number squared: minimum samples, and maximum samples × orders²."""
 HANN_BANDWIDTH = 1.5
 """Noise bandwidth of a Hann window in lines: blocks of 1.5/B revolutions have a bandwidth of B orders."""
 RESIDUAL = "residual without all chosen orders"
