@@ -15,7 +15,7 @@ Single methods take a recording and a channel's name, or a plain array and its s
 >>> round(float(gearsig.amplitude_spectrum(tone, 1000.0).values[50]), 9)
 1.0
 
-Everything else is in its room: `gearsig.orders.separate_shafts`, or `from gearsig.orders import separate_shafts`.
+Everything else is in a subpackage: `gearsig.orders.separate_shafts`, or `from gearsig.orders import separate_shafts`.
 """
 
 import os
@@ -24,19 +24,18 @@ from pathlib import Path
 
 import lazy_loader
 
-# `__init__.pyi` is the one table of names, for type checkers and at run time: a room is loaded when a name of it is
-# first used, so that `import gearsig` stays light.
+# `__init__.pyi` is the single table of names, for type checkers and at run time: a subpackage is loaded when one of its
+# names is first used, so that `import gearsig` stays light.
 __getattr__, _names, __all__ = lazy_loader.attach_stub(__name__, __file__)
 __version__ = "0.1.0"
 
 
 def _compiled_code_folder() -> None:
-    """Name a folder for Numba's compiled code where none of those that it would choose can be written.
+    """Set a folder for Numba's compiled code if none of Numba's own choices is writable.
 
-    Without one it refuses to compile: an installation of the administrator's, run by a user without a home folder, or
-    in a container that may only be read, would end with its error. The code is then compiled in each process anew, and
-    removed when that ends; its workers share it. A folder that outlives it and has a name that others can guess would
-    let them run code here.
+    Without a writable folder Numba refuses to compile: a system-wide installation run by a user without a home folder,
+    or in a read-only container, would fail. The folder is temporary: a process compiles into it, shares it with its
+    workers and removes it at the end. A permanent folder with a predictable name would let others run code here.
     """
     if sys.platform == "win32":
         return
@@ -57,7 +56,7 @@ def _compiled_code_folder() -> None:
 
 
 def _can_be_written(folder: Path) -> bool:
-    """Whether files can be made in a folder, which may have to be made first."""
+    """Whether files can be created in a folder, which may not exist yet."""
     existing = next(place for place in (folder, *folder.absolute().parents) if place.exists())
     return existing.is_dir() and os.access(existing, os.W_OK | os.X_OK)
 

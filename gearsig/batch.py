@@ -1,4 +1,4 @@
-"""Many recordings: analysed by local processes, or by any executor, into one folder of pages."""
+"""Analyse many recordings in local processes, or with any executor, into one folder of pages."""
 
 from __future__ import annotations
 
@@ -23,23 +23,23 @@ if TYPE_CHECKING:
 Progress = Callable[[int, int, "Entry | Failure"], object]
 
 RESULTS = ".results"
-"""Sub-folder that holds what the index says of each page, and of what the page was made: a later run goes on there."""
+"""Sub-folder with the index entry of each page and a hash of the page's inputs, so that a later run can resume."""
 
 
 @dataclass(frozen=True)
 class BatchResult:
-    """What became of the recordings.
+    """The outcome for all recordings.
 
     Parameters
     ----------
     entries : tuple of Entry
         Those analysed, in the order given.
     failures : tuple of Failure
-        Those that could not be, with the reason, in the order given.
+        Those that could not be analysed, with the reason, in the order given.
     index_path : Path
         The page that compares them.
     n_found : int
-        Of the entries, those whose pages stood there already.
+        Number of entries whose pages already existed.
     """
 
     entries: tuple[Entry, ...]
@@ -50,7 +50,7 @@ class BatchResult:
 
 @dataclass(frozen=True)
 class _Job:
-    """One recording and where its page goes; everything a worker needs."""
+    """One recording and the path of its page: all that a worker needs."""
 
     path: Path
     name: str
@@ -83,47 +83,47 @@ def report_many(
 ) -> BatchResult:
     """Analyse recordings and write a page for each, and an index that compares them.
 
-    A file that cannot be analysed does not stop the others: the index lists it with its reason; one that does not exist
-    is refused before anything is written. A page that was made of the same recording, rig and options by the same
-    gearsig is kept. While the pages are made, and after an interruption, the index says what is missing; the same call
-    goes on from there.
+    A file that cannot be analysed does not stop the others: the index lists it with the reason. A file that does not
+    exist raises before anything is written. A page made from the same recording, rig and options by the same version
+    of gearsig is kept. While the run lasts, and after an interruption, the index says how many pages are missing; the
+    same call resumes from there.
 
     Parameters
     ----------
     paths : sequence of str or Path
-        Files, folders with their sub-folders, "folder/*.csv".
+        Files, folders (with their sub-folders) or patterns such as "folder/*.csv".
     output_folder : str or Path
-        Made if it is not there. A recording's own page is replaced; one of the same name but of another recording, or
-        of no recording, is left, and the new one gets a number.
+        Created if it does not exist. A page of the same recording is replaced; any other file of that name is left,
+        and the new page gets a number.
     rig : Rig or None
-        Of all recordings; None: the rig file of the same name beside each, if there is one.
+        For all recordings; None: the rig file of the same name beside each, if there is one.
     sampling_rate_hz : float or None
         For files that do not state it.
     speed : SpeedSource or None
-        Of all recordings, instead of what file and rig say.
+        For all recordings, instead of what file and rig say.
     n_processes : int or None
-        Local processes; None: one per processor, not more than files. With 1, everything runs in this process. With
-        more, the caller's script needs the usual ``if __name__ == "__main__":``, as processes are spawned.
+        Local processes; None: one per processor, but not more than files. With 1, everything runs in this process.
+        With more, the caller's script needs the usual ``if __name__ == "__main__":``, as processes are spawned.
     executor : concurrent.futures.Executor or None
-        Runs the recordings instead, e.g. that of `gearsig.processes.cluster`; `n_processes` then says how many at
-        once. Its workers must see the same files under the same paths.
+        Runs the jobs instead, e.g. that of `gearsig.processes.cluster`; `n_processes` is then the number of jobs at
+        the same time. Its workers must see the same files under the same paths.
     on_progress : callable or None
         Called as ``on_progress(n_done, n_total, result)`` with an `Entry` or a `Failure`, in the order of completion.
     command : str
-        The command that makes the report again, for the pages.
+        The command that reproduces the report, to be shown on the pages.
     reference : str, Path, mapping or None
-        Recording of the same machine when it was healthy; all are compared with it but itself. Of several machines a
-        mapping of recordings to theirs.
+        Recording of the same machine when it was healthy; all others are compared with it. For several machines, a
+        mapping from each recording to its reference.
     reference_rate_hz : float or None
-        Sampling rate of the reference, where it differs and neither it nor a rig file beside it states it.
+        Sampling rate of the reference if it differs and neither the file nor a rig file beside it states it.
     torque_nm : float or None
         For the depth of cracks, instead of the rig's operating point.
     pdf : bool
-        Write each page and the index as PDF as well.
+        Also write each page and the index as PDF.
     methods : sequence of str or None
-        Further methods that the pages show; None: those that each recording calls for.
+        Further methods to show on the pages; None: those that suit each recording.
     memory_bytes : float
-        What the analysis of one recording may take; of a longer one the page shows the most severe part, see
+        Memory that the analysis of one recording may take; for a longer one the page shows the most severe part, see
         `gearsig.diagnosis.analyze_file`.
 
     Returns
@@ -133,15 +133,15 @@ def report_many(
     Raises
     ------
     InputError
-        If a file that is named does not exist, there are no recordings, `n_processes` is below 1, or the folder cannot
-        be made.
+        If a named file does not exist, there are no recordings, `n_processes` is below 1, or the folder cannot be
+        created.
     """
     from gearsig.cache import made_folder, remove_parts
     from gearsig.checks import count
     from gearsig.fleet import AnalysisOptions, find_recordings, no_recordings
     from gearsig.report import Entry, Failure, check_pdf, named_method, page_names, write_index
 
-    # What can be refused is refused before anything is written: no recordings, reference or typst, a wrong method.
+    # Raise before anything is written: no recordings, reference or typst, or an unknown method.
     files = [path for path, _ in find_recordings(paths)]
     if not files:
         raise no_recordings(paths)
@@ -151,13 +151,13 @@ def report_many(
     given = _references(reference, files)
     chosen = None if methods is None else tuple(method for method in methods if named_method(method))
     folder = made_folder(Path(output_folder))
-    # A recording is not compared with itself: the reference's own page says that it is one.
+    # A recording is not compared with itself: the reference's page says that it is the reference.
     healthy = {file.resolve(): path for file, path in given.items()}
     healthy_files = {path.resolve() for path in healthy.values()}
     names = [file.name for file in files]
     jobs = []
     for file, page in zip(files, page_names(files, folder), strict=True):
-        # Files of the same name are told apart by their folders.
+        # Files of the same name are distinguished by their folders.
         name = file_label(file, whole=not file.name or names.count(file.name) > 1)
         is_healthy = file.resolve() in healthy_files
         compared = None if is_healthy else healthy.get(file.resolve())
@@ -166,7 +166,7 @@ def report_many(
         its_rate_hz = reference_rate_hz if compared else None
         options = AnalysisOptions(rig, stated_hz, speed, compared, torque_nm, memory_bytes, its_rate_hz)
         jobs.append(_Job(file, name, path, options, command, is_reference=is_healthy, pdf=pdf, methods=chosen))
-    # Pages that were made of the same files and options by the same gearsig stay as they are.
+    # Pages made from the same files and options by the same version of gearsig are kept.
     made_of = _made_of()
     jobs = [replace(job, made_of=made_of(job)) for job in jobs]
     results: dict[int, Entry | Failure] = {n: kept for n, job in enumerate(jobs) if (kept := _kept(job)) is not None}
@@ -182,7 +182,7 @@ def report_many(
         return BatchResult(entries, failures, path, n_found)
 
     if missing:
-        index()  # an earlier one would speak of other pages
+        index()  # an earlier index would refer to other pages
     running = run_jobs(
         _report_one,
         (jobs[number] for number in missing),
@@ -190,7 +190,7 @@ def report_many(
         executor=executor,
         if_killed=_killed,
     )
-    # Also after an interruption the index says what is there and what is missing.
+    # The index is written after an interruption, too: it says what is there and what is missing.
     try:
         with closing(running):
             for place, result in running:
@@ -204,7 +204,7 @@ def report_many(
 
 
 def _references(given: str | Path | Mapping[Path, Path] | None, files: Sequence[Path]) -> Mapping[Path, Path]:
-    """Return the reference of each recording that has one, after a look whether it can be one."""
+    """Return the reference of each recording that has one, after checking that it can be read."""
     from gearsig.recording import n_samples_of
 
     references = given if isinstance(given, Mapping) else dict.fromkeys(files, Path(given)) if given else {}
@@ -214,7 +214,7 @@ def _references(given: str | Path | Mapping[Path, Path] | None, files: Sequence[
 
 
 def _made_of() -> Callable[[_Job], str]:
-    """Return a function that says of what a page is made, as a hash; empty where the recording cannot be looked at."""
+    """Return a function that hashes the inputs of a page; the hash is empty if a file is not accessible."""
     from functools import cache
 
     from gearsig import __version__
@@ -247,7 +247,7 @@ def _result_path(job: _Job) -> Path:
 
 
 def _kept(job: _Job) -> Entry | None:
-    """Return what the index says of a page that stands there already, None where it is another one or none."""
+    """Return the index entry of a page that already exists; None if there is none or its inputs differ."""
     from gearsig.report import Entry, from_plain
 
     try:
@@ -256,13 +256,13 @@ def _kept(job: _Job) -> Entry | None:
         if not job.made_of or data["made_of"] != job.made_of or not all(page.is_file() for page in pages):
             return None
         entry: Entry = from_plain(Entry, data["entry"], "entry")
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):  # damaged: made again
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):  # damaged: redo the page
         return None
     return entry
 
 
 def _report_one(job: _Job) -> Entry | Failure:
-    """Analyse one recording and write its page; every error becomes a reason."""
+    """Analyse one recording and write its page; any error becomes the reason of a `Failure`."""
     from gearsig.cache import write_text
     from gearsig.diagnosis import LongAnalysis
     from gearsig.report import Entry, entry_of, from_plain, plain, recording_mark, write_page
@@ -274,13 +274,13 @@ def _report_one(job: _Job) -> Entry | Failure:
         how: dict[str, Any] = {"command": job.command, "methods": job.methods, "pdf": job.pdf}
         write_page(analysis, job.page, index="index.html", mark=mark, **how)
         entry = plain(replace(entry_of(analysis, job.name, job.page.name), is_reference=job.is_reference))
-        with suppress(GearsigError):  # a page that the next run makes again
+        with suppress(GearsigError):  # the next run makes the page again
             write_text(_result_path(job), json.dumps({"made_of": job.made_of, "entry": entry}) + "\n")
-        kept: Entry = from_plain(Entry, entry, "entry")  # rounded as for a later run, which must say the same
+        kept: Entry = from_plain(Entry, entry, "entry")  # rounded as in a later run, so that both say the same
         return kept  # noqa: TRY300
     except GearsigError as error:
         return _failure(job, str(error).removeprefix(f"{job.name}: "))
-    except Exception as error:  # noqa: BLE001 - one broken file must not stop the rest; the reason is passed on
+    except Exception as error:  # noqa: BLE001 - one broken file must not stop the others; the reason is reported
         return _failure(job, unexpected_text(error))
 
 

@@ -1,4 +1,4 @@
-"""Where a user's machine keeps what can be computed again, and how a file gets there whole."""
+"""The user's cache of results that can be recomputed, and atomic writing of files."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ import numpy as np
 from gearsig.errors import InputError
 
 FRESH = "add --fresh to gearsig simulate, flexible, gear-body or gap, which clears such files away, or delete this one"
-"""What makes a file again that another version of the code kept."""
+"""Remedy for a cached file from another version of the code."""
 
 FOLDERS = ("GEARSIG_CACHE", "XDG_CACHE_HOME", "LOCALAPPDATA")
-"""Variables that say where; the first names the folder itself."""
+"""Environment variables for the cache; the first names the folder itself, the others its parent."""
 
 
 class OtherVersionError(InputError):
-    """A kept file was made by another version of the code."""
+    """A cached file was made by another version of the code."""
 
 
 def cache_folder(room: str) -> Path:
-    """Return this user's folder for one kind of kept results; the variable GEARSIG_CACHE names another place.
+    """Return the user's cache folder for one kind of results; the variable GEARSIG_CACHE names another place.
 
     Parameters
     ----------
@@ -50,14 +50,14 @@ def cache_folder(room: str) -> Path:
 
 
 def part_beside(path: Path) -> Path:
-    """Return a hidden name beside a file's place for what is not complete; it says which process of which machine."""
-    # Names have 255 bytes, and a letter up to four.
+    """Return a hidden temporary name beside a file's path; it contains the process and machine that write it."""
+    # File names have at most 255 bytes, and a character up to four.
     begin = os.fsencode(path.name)[:120].decode("utf-8", "ignore")
     return path.with_name(f".{begin}.{_machine()}-{os.getpid()}-{secrets.token_hex(4)}.part")
 
 
 def remove_parts(folder: Path) -> None:
-    """Remove what processes have left that were killed: of this machine what runs no more, of others after an hour."""
+    """Remove temporary files of killed processes: on this machine at once, from other machines after an hour."""
     for part in folder.glob(".*.part"):
         machine, _, process = part.name.split(".")[-2].rpartition("-")[0].partition("-")
         with suppress(OSError):
@@ -76,20 +76,20 @@ def _machine() -> str:
 
 
 def _runs(process: int) -> bool:
-    """Return whether a process runs; where the system cannot be asked without harm, it may."""
+    """Whether a process is running; assumed so where the system offers no harmless check."""
     if sys.platform == "win32":
         return True
     try:
         os.kill(process, 0)
     except ProcessLookupError:
         return False
-    except OSError:  # it is another user's
+    except OSError:  # it belongs to another user
         return True
     return True
 
 
 def write_whole(path: Path, write: Callable[[IO[bytes]], object], *, remedy: str = "choose another folder") -> Path:
-    """Write a file beside its place and move it there: whole or not at all; its folder is made where there is none.
+    """Write a file atomically, under a temporary name that is then renamed; its folder is created if missing.
 
     Raises
     ------
@@ -111,12 +111,12 @@ def write_whole(path: Path, write: Callable[[IO[bytes]], object], *, remedy: str
 
 
 def made_folder(folder: Path, remedy: str = "choose another with -o") -> Path:
-    """Make a folder where there is none, and return it.
+    """Create a folder if it does not exist, and return it.
 
     Raises
     ------
     InputError
-        If it cannot be made: a file of that name, a place that may not be written.
+        If it cannot be created: a file has that name, or the place is not writable.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -128,7 +128,7 @@ def made_folder(folder: Path, remedy: str = "choose another with -o") -> Path:
 
 
 def write_text(path: Path, text: str) -> Path:
-    """Write a result as a text, whole or not at all; a failure leaves what was there before.
+    """Write a result as a text file atomically; a failure leaves any earlier file untouched.
 
     Raises
     ------
@@ -140,12 +140,12 @@ def write_text(path: Path, text: str) -> Path:
 
 
 def keep(path: Path, write: Callable[[IO[bytes]], object]) -> bool:
-    """Write a file that can be made again; where its place cannot be written, the next process makes it again.
+    """Write a file to the cache; if that fails, the next process computes it again.
 
     Returns
     -------
     bool
-        Whether it is kept. Work of minutes is never lost for it: results do not hang on a cache.
+        Whether it was written. A failure does not raise: no result depends on the cache.
     """
     try:
         write_whole(path, write)
@@ -155,19 +155,19 @@ def keep(path: Path, write: Callable[[IO[bytes]], object]) -> bool:
 
 
 def read_arrays(path: Path, most_bytes: int) -> dict[str, Any] | None:
-    """Return a kept file's arrays; None where there is no such file, or it is damaged, or unpacks to more than that."""
+    """Return the arrays of a cached file; None if missing, damaged or larger than `most_bytes` when unpacked."""
     try:
         with ZipFile(path) as archive:
             if sum(entry.file_size for entry in archive.infolist()) > most_bytes:
                 return None
         with np.load(path, allow_pickle=False) as data:
             return {name: data[name] for name in data.files}
-    except Exception:  # noqa: BLE001 - damaged bytes make its readers raise anything: zlib.error, TokenError, RuntimeError
+    except Exception:  # noqa: BLE001 - damaged files raise anything: zlib.error, TokenError, RuntimeError
         return None
 
 
 def modules_digest(modules: Iterable[str]) -> str:
-    """Return a short hash of the code of modules, by which it shows that a kept file is of another state of it."""
+    """Return a short hash of the code of modules, to detect cached files from another version of it."""
     digest = sha256()
     for name in modules:
         spec = find_spec(name)

@@ -1,4 +1,4 @@
-"""Checks at the public functions: each raises an `InputError` that names the parameter."""
+"""Argument checks of the public functions: each raises an `InputError` that names the parameter."""
 
 from __future__ import annotations
 
@@ -45,13 +45,13 @@ def within(value: float, name: str, low: float, high: float, unit: str = "", *, 
 
 
 def instance_of(value: T, kinds: type | UnionType, name: str, *, remedy: str = "") -> T:
-    """Return `value` as it is if it is of one of the kinds.
+    """Return `value` unchanged if it is an instance of one of the types.
 
     Parameters
     ----------
     value : object
     kinds : type or union of types
-        With None in it, the value may be left out.
+        If None is among them, the value may be left out.
     name : str
     remedy : str
 
@@ -66,21 +66,21 @@ def instance_of(value: T, kinds: type | UnionType, name: str, *, remedy: str = "
 
 
 def _names(kinds: type | UnionType) -> list[str]:
-    """Return what users call kinds of values."""
+    """Return the names of types as users know them."""
     plain = {type(None): "None", str: "text", np.ndarray: "array", PathLike: "path"}
     return [plain.get(kind, kind.__name__) for kind in get_args(kinds) or (kinds,)]
 
 
 def check_texts(owner: object, *names: str) -> None:
-    """Raise InputError on fields of an object that are no text."""
+    """Raise InputError on fields of an object that are not text."""
     for name in names:
         instance_of(getattr(owner, name), str, f"{name} of {short(owner)}")
 
 
 def listed(values: Iterable[T], name: str, of: type | UnionType, *, remedy: str = "") -> tuple[T, ...]:
-    """Return several values as a tuple if each is of one of the kinds; a text or a single value is not several.
+    """Return values as a tuple if each is an instance of `of`; a text or a single value raises.
 
-    Kind `object`: what each must be is for the caller to say.
+    With `of=object` the caller checks the values.
 
     Examples
     --------
@@ -95,7 +95,7 @@ def listed(values: Iterable[T], name: str, of: type | UnionType, *, remedy: str 
 
 
 def listed_numbers(values: Iterable[float], name: str, *, remedy: str = "") -> tuple[float, ...]:
-    """Return several numbers as floats if each is finite; a text or a single number is not several.
+    """Return numbers as floats if each is finite; a text or a single number raises.
 
     Examples
     --------
@@ -107,7 +107,7 @@ def listed_numbers(values: Iterable[float], name: str, *, remedy: str = "") -> t
 
 
 def limits(values: Iterable[float], name: str, unit: str = "") -> tuple[float, float]:
-    """Return a lower and an upper limit as floats if they are two numbers; how they lie is for the caller to say.
+    """Return a lower and an upper limit as floats if they are two numbers; the caller checks their order.
 
     Examples
     --------
@@ -132,7 +132,7 @@ def _several(values: Iterable[T], name: str, allowed: str, of: type | UnionType,
 
 
 def count(value: int, name: str, *, minimum: int = 1, maximum: int | None = None, remedy: str = "") -> int:
-    """Return `value` as int if it is a whole number from `minimum` to `maximum`, None: without end.
+    """Return `value` as int if it is a whole number from `minimum` to `maximum` (None: no upper limit).
 
     Examples
     --------
@@ -149,12 +149,12 @@ def count(value: int, name: str, *, minimum: int = 1, maximum: int | None = None
 
 
 def one_of(value: str, name: str, allowed: Iterable[str]) -> str:
-    """Return `value` if it is among `allowed`; name the closest match if it is not."""
+    """Return `value` if it is among `allowed`; otherwise raise and suggest the closest match."""
     return known_name(value, tuple(allowed), f"{name} is {short(value)}")
 
 
 def known_name(name: str, names: Iterable[str], complaint: str, *, where: str = "", remedy: str = "") -> str:
-    """Return `name` if it is among `names`; else raise with the complaint, all names, and the closest or the remedy."""
+    """Return `name` if it is among `names`; else raise with the complaint, all names, and the closest or `remedy`."""
     choices = tuple(names)
     if not isinstance(name, str) or name not in choices:
         shown = choices if len(choices) <= 30 else (*choices[:30], "…")
@@ -164,7 +164,7 @@ def known_name(name: str, names: Iterable[str], complaint: str, *, where: str = 
 
 
 def short(value: object) -> str:
-    """Return a value as an error shows it, whoever wrote it: 80 characters at most; what is long by its kind.
+    """Return a value as errors show it, in at most 80 characters; long values and objects are named by their type.
 
     Examples
     --------
@@ -191,11 +191,11 @@ def short(value: object) -> str:
 
 _NO_NUMBERS = (str, bytes, bool, np.bool_, np.complexfloating)
 _SHOWN = (str, bytes, int, float, complex, np.generic, type(None), list, tuple, dict, type)
-"""Kinds of values that say in a few words what they are."""
+"""Types whose `repr` is short and readable."""
 
 
 def closest_match_hint(value: object, choices: Iterable[str]) -> str:
-    """Return "did you mean …?" for a misspelt name, or nothing; upper and lower case are the same to it.
+    """Return "did you mean …?" for a misspelt name, or an empty text; case is ignored.
 
     Examples
     --------
@@ -213,7 +213,7 @@ def frozen_array(values: Any, name: str, *, ndim: int, finite: bool = True) -> F
     """Return a read-only float array of `ndim` dimensions; float32 and float64 are kept, others become float64."""
     if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
         masked = int(np.sum(np.ma.getmaskarray(values)))
-        remedy = "fill or cut out what is masked, knowingly"
+        remedy = "fill in or cut out the masked values before the analysis"
         raise InputError(
             f"{name} holds {counted(masked, 'masked value')}", allowed="an array of numbers", remedy=remedy
         )
@@ -240,9 +240,9 @@ def frozen_array(values: Any, name: str, *, ndim: int, finite: bool = True) -> F
 
 
 def _check_real(array: NDArray[Any], name: str) -> None:
-    """Raise on values that numbers could be made of in silence: half of a complex one, a text, a time."""
+    """Raise on values that NumPy would silently convert to numbers: complex numbers, texts, times."""
     if array.dtype.kind == "c":
-        remedy = "take the real part, the magnitude or each part by itself, knowingly"
+        remedy = "take the real part, the magnitude, or each part separately"
         raise InputError(f"{name} holds complex numbers", allowed="real numbers", remedy=remedy)
     if array.dtype.kind in "USmM":
         kind = "times" if array.dtype.kind in "mM" else "text"
@@ -251,7 +251,7 @@ def _check_real(array: NDArray[Any], name: str) -> None:
 
 
 def read_only(array: NDArray[Any]) -> NDArray[Any]:
-    """Return a read-only view: a kernel that is given no other arrays is compiled for one kind only."""
+    """Return a read-only view: kernels that get only read-only arrays are compiled once."""
     view = array.view()
     view.flags.writeable = False
     return view
@@ -266,7 +266,7 @@ def freeze(result: object, *names: str, ndim: int | None = 1) -> None:
     names : str
         Its fields.
     ndim : int or None
-        Dimensions; None: arrays of any shape and type, such as complex or bool, which are kept as they are.
+        Number of dimensions; None: arrays of any shape and type, such as complex or bool, kept as they are.
     """
     for name in names:
         value = getattr(result, name)
@@ -276,12 +276,12 @@ def freeze(result: object, *names: str, ndim: int | None = 1) -> None:
 
 @cache
 def type_hints_of(kind: type) -> dict[str, Any]:
-    """Return the types of a dataclass's fields by name: of those that a file's values are checked against."""
+    """Return the field types of a dataclass by name, to check a file's values against; cached."""
     return get_type_hints(kind)
 
 
 def _is_finite(array: FloatArray) -> bool:
-    """Whether all values are finite; a finite sum proves it at once, and costs a third of looking at each."""
+    """Whether all values are finite; a finite sum proves it at a third of the cost of checking each value."""
     with np.errstate(over="ignore", invalid="ignore"):
         return bool(np.isfinite(array.sum())) or bool(np.isfinite(array).all())
 
@@ -290,7 +290,7 @@ def _number(
     value: Any, name: str, unit: str, *, minimum: float = -np.inf, exclusive: bool = False, remedy: str
 ) -> float:
     number = None
-    # What float() would take as well, a part of some of them lost.
+    # float() would accept these, too, and lose part of some of them.
     if not isinstance(value, _NO_NUMBERS) and not (isinstance(value, np.ndarray) and value.ndim > 0):
         with suppress(TypeError, ValueError, OverflowError):
             number = float(value)

@@ -1,6 +1,6 @@
-"""How kernels are compiled: numba's decorator, whose kept code stops nobody: damaged it is compiled anew.
+"""Compilation of kernels: numba's decorator with a cache that never fails.
 
-A full disk just keeps none; numba itself ends with the error of the one or the other.
+Damaged cache files are compiled again and a full disk caches nothing; numba itself raises an error in both cases.
 """
 
 # mypy: allow-untyped-calls
@@ -17,21 +17,21 @@ from numba.core.options import DefaultOptions
 
 
 def njit(*, cache: bool = False, **options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Return `numba.njit` with these options.
+    """Return the decorator `numba.njit` with these options and a fault-tolerant cache.
 
     Parameters
     ----------
     cache : bool
-        Whether compiled code is kept on disk.
+        Whether to keep compiled code on disk.
     **options
-        Numba's.
+        Passed to numba.
     """
     compiled = numba.njit(**options)
 
     def decorate(function: Callable[..., Any]) -> Any:
         dispatcher = compiled(function)
         if cache:
-            with suppress(RuntimeError):  # there is no room for so much as a folder
+            with suppress(RuntimeError):  # the disk has no room even for a folder
                 dispatcher._cache = _KeptCode(function)
         return dispatcher
 
@@ -39,7 +39,7 @@ def njit(*, cache: bool = False, **options: Any) -> Callable[[Callable[..., Any]
 
 
 class _KeptCode(FunctionCache):  # type: ignore[misc,unused-ignore]
-    """What is kept of one function: an index, and a file of each signature that it was called with."""
+    """The cache of one function: an index, and a file for each signature that it was called with."""
 
     def load_overload(self, signature: Any, target: Any) -> Any:
         try:
@@ -53,18 +53,18 @@ class _KeptCode(FunctionCache):  # type: ignore[misc,unused-ignore]
                 super().save_overload(signature, code)
             except OSError:
                 raise
-            except Exception:  # noqa: BLE001 - the index is damaged: begin another
+            except Exception:  # noqa: BLE001 - the index is damaged: start a new one
                 self.flush()
                 super().save_overload(signature, code)
 
 
 UNCOUNTED: dict[str, Any] = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
-"""Options of `numba.njit` without the counting of references to arrays, an atomic operation wherever one is passed on,
-which took a fifth of the time of short steps. An allocation in such a kernel is an error when it is compiled."""
+"""Options of `numba.njit` that turn off reference counting of arrays, an atomic operation whenever an array is passed
+on, which took a fifth of the time of short steps. A kernel with these options that allocates arrays cannot compile."""
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def copy(source, out):  # type: ignore[no-untyped-def]
-    """Write a vector to the beginning of another; `out[:] = source` compiles for two seconds, for its error text."""
+    """Copy a vector to the beginning of another; `out[:] = source` takes two seconds to compile, for its error text."""
     for i in range(source.shape[0]):
         out[i] = source[i]

@@ -1,4 +1,4 @@
-"""The errors gearsig raises, each saying what is wrong, where, what is allowed, what to do; those of other engines."""
+"""The errors that gearsig raises: what is wrong, where, what is allowed and what to do; also for optional engines."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ T = TypeVar("T")
 
 
 class GearsigError(Exception):
-    """Base of every error that gearsig raises on purpose."""
+    """Base class of all errors that gearsig raises on purpose."""
 
 
 class InputError(GearsigError, ValueError):
@@ -22,7 +22,7 @@ class InputError(GearsigError, ValueError):
     Parameters
     ----------
     what : str
-        What was received and why it does not do.
+        What was received and why it is not acceptable.
     where : str
         File, place in the file, or parameter name.
     allowed : str
@@ -47,7 +47,7 @@ class InputError(GearsigError, ValueError):
 
 
 class RefusalError(GearsigError):
-    """The data do not allow an answer; the input is well formed all the same.
+    """The input is well formed, but the data do not allow an answer.
 
     Parameters
     ----------
@@ -56,8 +56,7 @@ class RefusalError(GearsigError):
     remedy : str
         Which data or knowledge would allow one.
     looked_at : object
-        What was found on the way, where there is something to look at: as the room that refuses has it, to be drawn by
-        `gearsig.plot.figure_of_refusal`.
+        Intermediate result that explains the refusal, if any; `gearsig.plot.figure_of_refusal` draws it.
     """
 
     def __init__(self, reason: str, *, remedy: str = "", looked_at: object = None) -> None:
@@ -66,9 +65,9 @@ class RefusalError(GearsigError):
 
 
 def answer_or_none(ask: Callable[[], T], name: str, refusals: list[str]) -> T | None:
-    """Return what `ask` returns; where it raises a `GearsigError`, None, with "name: error" added to the refusals.
+    """Return what `ask` returns; if it raises a `GearsigError`, return None and add "name: error" to the refusals.
 
-    For results of several parts, of which one that the data do not allow is no reason to withhold the others.
+    For results of several parts, where one that the data do not allow must not withhold the others.
     """
     try:
         return ask()
@@ -79,12 +78,12 @@ def answer_or_none(ask: Callable[[], T], name: str, refusals: list[str]) -> T | 
 
 @contextmanager
 def options_named(names: Mapping[str, str]) -> Iterator[None]:
-    """Let errors that are raised inside name the options of another record in their remedies.
+    """Replace option names in the remedies of errors raised inside, for options of another record.
 
     Parameters
     ----------
     names : mapping
-        Option of the command line → the one that does the same for the record that is read.
+        Command-line option → the option that does the same for the record being read.
 
     Examples
     --------
@@ -110,28 +109,28 @@ def _with_options(text: str, names: Mapping[str, str]) -> str:
 
 
 def unexpected_text(error: BaseException) -> str:
-    """Say in one line that a program error stopped the work on one of many files."""
+    """Return one line that reports a program error on one of many files."""
     return f"unexpected error, please report: {type(error).__name__}: {' '.join(str(error).split())}"
 
 
 def _one_line(text: str) -> str:
-    """Fold line breaks and control characters, which may come from a file, into spaces."""
+    """Replace line breaks and control characters, which may come from a file, by spaces."""
     return " ".join("".join(c if c.isprintable() else " " for c in text).split())
 
 
 # --------------------
-# Other programs that compute the same result, loaded only when they are chosen by `engine=`.
+# Other packages that compute the same result, loaded only when chosen by `engine=`.
 # --------------------
 
 
 @contextmanager
 def engine_module(name: str) -> Iterator[ModuleType]:
-    """Load an optional engine and turn whatever it raises into one sentence.
+    """Load an optional engine and convert whatever it raises to an `InputError`.
 
     Parameters
     ----------
     name : str
-        Name of the package, which is the engine's name too.
+        Name of the package, which is also the engine's name.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Numbers and names as people and JSON read them."""
+"""Numbers and names formatted for people and for JSON."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 N_DIGITS = 9
-"""Significant digits kept in JSON: more than any measurement has, and free of rounding noise."""
+"""Significant digits in JSON: more than any measurement has, but without rounding noise."""
 
 
 def file_label(path: str | Path, *, whole: bool = False) -> str:
-    r"""Return a file's name, or its whole path, as text: bytes that are no UTF-8, which names may hold, become "?".
+    r"""Return a file's name, or its whole path, as text; bytes that are not UTF-8 become "?".
 
     Examples
     --------
@@ -33,7 +33,7 @@ Cell = TypeVar("Cell")
 
 
 def spreadsheet_cell(value: Cell) -> Cell | str:
-    """Return a value of a table; text that a spreadsheet would run as a formula gets a quote before it.
+    """Return a table value; text that a spreadsheet would run as a formula is prefixed with a quote.
 
     Examples
     --------
@@ -45,14 +45,14 @@ def spreadsheet_cell(value: Cell) -> Cell | str:
 
 
 def csv_rows(header: Iterable[object], rows: Iterable[Iterable[object]]) -> str:
-    """Return a table as CSV, cells as they are."""
+    """Return a table as CSV, with cells unchanged."""
     text = StringIO()
     csv.writer(text, lineterminator="\n").writerows([header, *rows])
     return text.getvalue()
 
 
 def markdown_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a table in Markdown, a line a row.
+    """Return a table in Markdown, one line per row.
 
     Examples
     --------
@@ -66,14 +66,14 @@ def markdown_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def csv_text(table: DataFrame) -> str:
-    """Return a table as CSV, its texts as `spreadsheet_cell` leaves them."""
+    """Return a table as CSV, with texts made safe by `spreadsheet_cell`."""
     texts = table.select_dtypes(exclude="number").columns
     safe = table.assign(**{name: table[name].map(spreadsheet_cell) for name in texts})
     return str(safe.to_csv(index=False))
 
 
 def rounded(value: float, n_digits: int = N_DIGITS) -> float | None:
-    """Return `value` with so many significant digits; None for nan and infinity, which JSON does not know.
+    """Return `value` rounded to `n_digits` significant digits; None for nan and infinity, which JSON lacks.
 
     Examples
     --------
@@ -85,7 +85,7 @@ def rounded(value: float, n_digits: int = N_DIGITS) -> float | None:
 
 
 def readable(value: float, n_digits: int = 4) -> str:
-    """Write a number for reading: so many significant digits, an en dash where it is not defined.
+    """Format a number with `n_digits` significant digits; nan is an en dash.
 
     Examples
     --------
@@ -105,7 +105,7 @@ def readable(value: float, n_digits: int = 4) -> str:
 
 
 def seconds_text(seconds: float) -> str:
-    """Write a time in the unit that leaves a readable number: s, ms or µs.
+    """Format a time in s, ms or µs, whichever gives a readable number.
 
     Examples
     --------
@@ -118,7 +118,7 @@ def seconds_text(seconds: float) -> str:
 
 
 def power_of_ten(value: float) -> str:
-    """Write a small positive number with one digit and a power of ten.
+    """Format a small positive number as one digit and a power of ten.
 
     Examples
     --------
@@ -132,7 +132,7 @@ def power_of_ten(value: float) -> str:
 
 
 def signed(value: float, n_decimals: int = 1) -> str:
-    """Write a change with its sign and one decimal; none where it is nothing.
+    """Format a change with its sign, which is left out if it rounds to zero.
 
     Examples
     --------
@@ -146,7 +146,7 @@ def signed(value: float, n_decimals: int = 1) -> str:
 
 
 def decimals_for(scatter: float, n_decimals: int = 1) -> int:
-    """Return the decimals of a figure and its scatter: one more where the scatter would be written as zero.
+    """Return the number of decimals for a value and its scatter: one more if the scatter would round to zero.
 
     Examples
     --------
@@ -157,7 +157,7 @@ def decimals_for(scatter: float, n_decimals: int = 1) -> int:
 
 
 def scatter_text(scatter: float, n_decimals: int = 1) -> str:
-    """Return a scatter for people: never written as zero.
+    """Format a scatter; it is never shown as zero.
 
     Examples
     --------
@@ -169,7 +169,7 @@ def scatter_text(scatter: float, n_decimals: int = 1) -> str:
 
 
 def plus_minus(value: float, scatter: float, n_decimals: int = 1, *, with_sign: bool = False) -> str:
-    """Return a figure with its scatter, in as many decimals.
+    """Format a value with its scatter, both to the same number of decimals.
 
     Examples
     --------
@@ -182,7 +182,7 @@ def plus_minus(value: float, scatter: float, n_decimals: int = 1, *, with_sign: 
 
 
 def percent(share: float) -> str:
-    """Write a share in percent: nothing below one is told from another.
+    """Format a fraction in percent; positive values below 1 % are "< 1 %".
 
     Examples
     --------
@@ -195,7 +195,7 @@ def percent(share: float) -> str:
 
 
 def odds_text(probability: float) -> str:
-    """Write a probability for people: nothing is surer than "> 99 %".
+    """Format a probability in percent, at most "> 99 %".
 
     Examples
     --------
@@ -206,7 +206,7 @@ def odds_text(probability: float) -> str:
 
 
 def enumerated(names: Sequence[str], conjunction: str = "and") -> str:
-    """Return names as a sentence lists them.
+    """Join names as in a sentence.
 
     Examples
     --------
@@ -218,7 +218,7 @@ def enumerated(names: Sequence[str], conjunction: str = "and") -> str:
 
 
 def counted(n: int, noun: str) -> str:
-    """Return a number with its noun, in the plural where it is not one.
+    """Return a number with its noun, in the plural unless the number is 1.
 
     Examples
     --------
@@ -229,7 +229,7 @@ def counted(n: int, noun: str) -> str:
 
 
 def sentence(text: str) -> str:
-    """Return a note as a sentence: with a capital letter, unless it begins with a name, and a full stop.
+    """Return a note as a sentence: with a full stop and, unless it begins with a name, a capital letter.
 
     Examples
     --------
@@ -241,7 +241,7 @@ def sentence(text: str) -> str:
 
 
 def with_minus(text: str) -> str:
-    """Return a text whose negative numbers have a minus sign, which a hyphen is not.
+    """Replace the hyphens of negative numbers in a text by minus signs.
 
     Examples
     --------
@@ -255,7 +255,7 @@ _SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
 
 def unit_text(unit: str) -> str:
-    """Write a unit with superscripts.
+    """Format a unit with superscripts.
 
     Examples
     --------
@@ -271,7 +271,7 @@ def unit_text(unit: str) -> str:
 
 
 def axis_unit(axis: str) -> str:
-    """Return the unit in which an axis of frequencies, orders or quefrencies counts.
+    """Return the unit of an axis of frequencies, orders or quefrencies.
 
     Examples
     --------
@@ -282,12 +282,12 @@ def axis_unit(axis: str) -> str:
 
 
 def axis_label(axis: str, shaft: str) -> str:
-    """Name an axis of frequencies, of orders, that is cycles per revolution of a shaft, or of quefrencies."""
+    """Return the label of an axis of frequencies, orders (cycles per revolution of a shaft) or quefrencies."""
     return {"order": f"order of {shaft or 'the shaft'}", "quefrency": "quefrency (s)"}.get(axis, "frequency (Hz)")
 
 
 def position_text(axis: str, position: float, n_digits: int = 7) -> str:
-    """Name a position on an axis.
+    """Format a position on an axis.
 
     Examples
     --------
@@ -299,12 +299,12 @@ def position_text(axis: str, position: float, n_digits: int = 7) -> str:
 
 
 def named(what: str, name: str) -> str:
-    """Return a name with what it names before it, unless the name says so itself; empty for an empty name."""
+    """Return a name preceded by its kind, unless the name contains it; empty for an empty name."""
     return name if not name or what.rsplit(maxsplit=1)[-1] in name.lower() else f"{what} {name}"
 
 
 def moment_text(moment: datetime) -> str:
-    """Write a date, with the time of day unless that is midnight, as where a name states the day alone.
+    """Format a date, with the time of day unless it is midnight, as when a file name states only the day.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Where a peak lies between samples."""
+"""Interpolation of peaks between samples."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ import numpy as np
 
 
 def parabola_vertex(before: Any, middle: Any, after: Any) -> tuple[Any, Any]:
-    """Return the vertex of the parabola through three equally spaced values a, b, c, of which the middle is a peak.
+    """Return the vertex of the parabola through three equally spaced values a, b, c whose middle one is a peak.
 
-    Its place is p = ½ (a − c)/(a − 2b + c) steps from the middle, its height b − ¼ (a − c) p. Through logarithms of
-    magnitudes it is exact for a Gaussian window, and off by some per cent of a line for a Hann window.
+    It lies p = ½ (a − c)/(a − 2b + c) steps from the middle and has the height b − ¼ (a − c) p. For logarithms of
+    magnitudes it is exact with a Gaussian window, and off by a few per cent of a line with a Hann window.
 
     Parameters
     ----------
     before, middle, after : float or array
-        Of equal shapes. Give logarithms of spectral lines.
+        Of equal shapes. For spectra, give logarithms of the lines.
 
     Returns
     -------
     offset, height : float or array
-        The offset is cut to half a step; zero where the three do not bend down.
+        The offset is limited to half a step, and zero where the parabola does not open downwards.
 
     References
     ----------
@@ -36,6 +36,6 @@ def parabola_vertex(before: Any, middle: Any, after: Any) -> tuple[Any, Any]:
     """
     bend = before - 2 * middle + after
     bent = np.where(bend < 0, bend, -1.0)
-    # Not np.clip, which Numba has for arrays alone: kernels take this function for single lines.
+    # Not np.clip, which Numba supports for arrays only: kernels use this function for single lines.
     offset = np.where(bend < 0, np.minimum(np.maximum(0.5 * (before - after) / bent, -0.5), 0.5), 0.0)
     return offset, middle - 0.25 * (before - after) * offset

@@ -1,4 +1,4 @@
-"""Where jobs run: in this process, in fresh local ones with one computing thread each, or on a cluster."""
+"""Run jobs in this process, in fresh local processes with one computing thread each, or on a cluster."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ _APART: ProcessPoolExecutor | None = None
 
 @contextmanager
 def process_pool(n_processes: int) -> Iterator[ProcessPoolExecutor]:
-    """Open a pool of fresh processes; more threads than one each would fight over the processors.
+    """Open a pool of fresh processes with one thread each, as more would compete for the processors.
 
-    They do not know what the caller's own script defines, see `can_be_sent`.
+    They do not know what the caller's own script defines; see `can_be_sent`.
 
     Raises
     ------
     InputError
-        If the system has no room for the semaphores by which they are told.
+        If the system has no room for the semaphores that control them.
     """
     try:
         pool = ProcessPoolExecutor(n_processes, mp_context=_Context(), initializer=_start_worker)
@@ -49,7 +49,7 @@ def process_pool(n_processes: int) -> Iterator[ProcessPoolExecutor]:
         ) from None
     try:
         yield pool
-    except (KeyboardInterrupt, GeneratorExit):  # whoever told this process to end does not wait for jobs of minutes
+    except (KeyboardInterrupt, GeneratorExit):  # an interrupted process must not wait for jobs that take minutes
         for process in list((pool._processes or {}).values()):
             process.terminate()
         raise
@@ -62,12 +62,12 @@ _KEPT: ContextVar[list[ProcessPoolExecutor]] = ContextVar("kept")
 
 @contextmanager
 def one_pool(n_processes: int) -> Iterator[None]:
-    """Let all jobs of a block that ask for so many local processes run in the same ones, also as a decorator.
+    """Run all jobs of a block that ask for `n_processes` local processes in the same pool; also a decorator.
 
-    The processes start with the first job, and stay what they are while the block lasts; where one is killed, the jobs
-    that follow get fresh ones. Within such a block another one changes nothing.
+    The processes start with the first job and live until the block ends; if one is killed, the following jobs get
+    fresh ones. A nested block has no effect.
     """
-    if any(pool._max_workers == n_processes for pool in _KEPT.get([])):  # type: ignore[attr-defined]  # nothing public tells it
+    if any(pool._max_workers == n_processes for pool in _KEPT.get([])):  # type: ignore[attr-defined]  # there is no public attribute
         yield
         return
     with process_pool(n_processes) as pool:
@@ -79,17 +79,17 @@ def one_pool(n_processes: int) -> Iterator[None]:
 
 
 def start_early(function: Callable[..., object], *arguments: object) -> None:
-    """Start the processes of `one_pool` now, each by a call whose answer nobody waits for: it loads what jobs need."""
+    """Start the processes of `one_pool` now, each with a call that loads what jobs need; its result is ignored."""
     if active_cluster() is None and can_be_sent(arguments):
         for pool in _KEPT.get([]):
-            for _ in range(pool._max_workers):  # type: ignore[attr-defined]  # nothing public tells it
+            for _ in range(pool._max_workers):  # type: ignore[attr-defined]  # there is no public attribute
                 pool.submit(function, *arguments)
 
 
 def begin(function: Callable[..., Result], *arguments: object) -> Callable[[], Result]:
-    """Begin a call in a process of `one_pool`; return what waits for its result.
+    """Begin a call in a process of `one_pool`; return a function that waits for its result.
 
-    Outside such a block, and where the process is killed, that makes the call itself.
+    Outside such a block, or if the process is killed, that function makes the call itself.
     """
     future: Future[Result] | None = None
     if active_cluster() is None and can_be_sent((function, arguments)):
@@ -108,9 +108,9 @@ def begin(function: Callable[..., Result], *arguments: object) -> Callable[[], R
 
 @contextmanager
 def _jobs_pool(n_processes: int) -> Iterator[ProcessPoolExecutor]:
-    """Open a pool, or take the one that is kept; a kept one that broke is not taken again."""
+    """Open a pool, or reuse that of `one_pool`; a broken one is not used again."""
     kept = _KEPT.get([])
-    if not kept or kept[0]._max_workers != n_processes:  # type: ignore[attr-defined]  # nothing public tells it
+    if not kept or kept[0]._max_workers != n_processes:  # type: ignore[attr-defined]  # there is no public attribute
         with process_pool(n_processes) as pool:
             yield pool
         return
@@ -122,27 +122,27 @@ def _jobs_pool(n_processes: int) -> Iterator[ProcessPoolExecutor]:
 
 
 def call_apart(function: Callable[..., Result], *arguments: object, longest_s: float) -> Result:
-    """Call a function in a process that may die of it, as compiled readers do of damaged files; it is kept for more.
+    """Call a function that may crash, such as a compiled reader of damaged files, in a separate, reused process.
 
     Parameters
     ----------
     function : callable
     *arguments
     longest_s : float
-        Of processor time, which a busy machine does not use up; twenty times as much may pass. Where the system
-        cannot count it, of time that passes.
+        Limit of processor time in s, which is independent of the machine's load; the limit of elapsed time is twenty
+        times as long. If the system cannot measure processor time, the limit of elapsed time.
 
     Raises
     ------
     BrokenProcessPool
-        If the process has died, or has not answered for so long and was ended; the next call gets a new one.
+        If the process died, or exceeded the limit and was killed; the next call gets a new process.
     """
     global _APART  # noqa: PLW0603 - one process for all calls, which starts in a second
     with _CALLING:
         if _APART is None:
             _APART = ProcessPoolExecutor(1, mp_context=_Context(), initializer=_start_worker)
         try:
-            _APART.submit(_nothing).result()  # it has started: the time that follows is the function's own
+            _APART.submit(_nothing).result()  # wait for the start: the time from here on is the function's
             longest_wait_s = 20.0 * longest_s if hasattr(signal, "setitimer") else longest_s
             return _APART.submit(_counted, function, arguments, longest_s).result(longest_wait_s)
         except TimeoutError:
@@ -156,11 +156,11 @@ def call_apart(function: Callable[..., Result], *arguments: object, longest_s: f
 
 
 def _nothing() -> None:
-    """Answer."""
+    """Do nothing: a reply shows that the process has started."""
 
 
 def _counted(function: Callable[..., Result], arguments: tuple[object, ...], longest_s: float) -> Result:
-    """Call a function; the system ends this process after so much processor time, also within compiled code."""
+    """Call a function; the system kills this process after `longest_s` of processor time, even in compiled code."""
     if not hasattr(signal, "setitimer"):
         return function(*arguments)
     signal.signal(signal.SIGPROF, signal.SIG_DFL)
@@ -172,14 +172,14 @@ def _counted(function: Callable[..., Result], arguments: tuple[object, ...], lon
 
 
 def n_processors() -> int:
-    """Return the processors that this process may use."""
+    """Return the number of processors that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 def can_be_sent(value: object) -> bool:
-    """Return whether fresh processes understand a thing: it can be pickled, and is not of the caller's own script."""
+    """Whether a value can be sent to fresh processes: it can be pickled and is not defined in the caller's script."""
     try:
         return _MAIN.encode() not in pickle.dumps(value)
     except (pickle.PicklingError, AttributeError, TypeError):
@@ -189,8 +189,8 @@ def can_be_sent(value: object) -> bool:
 class _Process(SpawnProcess):
     """A fresh process that does not run the caller's script.
 
-    Python would run it again in each, up to where the processes are started: from a script without
-    `if __name__ == "__main__":`, as people write them, none would ever start.
+    Python would run it again in each, up to the point where processes are started: from a script without
+    `if __name__ == "__main__":`, which is common, none would ever start.
     """
 
     def start(self) -> None:
@@ -204,7 +204,7 @@ class _Context(SpawnContext):
 
 @contextmanager
 def _one_thread() -> Iterator[None]:
-    """Tell libraries to use one thread: they read the environment when they load; it is restored afterwards."""
+    """Set libraries to one thread through the environment, which they read when loaded; restore it afterwards."""
     before = {name: os.environ.get(name) for name in _THREAD_SETTINGS}
     os.environ.update(dict.fromkeys(_THREAD_SETTINGS, "1"))
     try:
@@ -219,7 +219,7 @@ def _one_thread() -> Iterator[None]:
 
 @contextmanager
 def _script_out_of_sight() -> Iterator[None]:
-    """Take away for a moment what tells `multiprocessing.spawn` where the script is."""
+    """Temporarily hide from `multiprocessing.spawn` where the script is."""
     main = sys.modules[_MAIN]
     known: dict[str, Any] = {name: main.__dict__[name] for name in ("__spec__", "__file__") if name in main.__dict__}
     main.__dict__.update(dict.fromkeys(known))
@@ -230,7 +230,7 @@ def _script_out_of_sight() -> Iterator[None]:
 
 
 def _start_worker() -> None:
-    """Let Ctrl-C end a worker at once and without a traceback; the parent tidies up. It ends with its parent."""
+    """Let Ctrl-C end a worker at once without a traceback, as the parent cleans up; end it with its parent."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     parent = parent_process()
     if parent is not None and hasattr(signal, "SIGIO"):
@@ -241,15 +241,13 @@ def _start_worker() -> None:
         fcntl.fcntl(parent.sentinel, fcntl.F_SETOWN, os.getpid())
         flags = fcntl.fcntl(parent.sentinel, fcntl.F_GETFL)
         fcntl.fcntl(parent.sentinel, fcntl.F_SETFL, flags | os.O_ASYNC)
-        if connection.wait(
-            [parent.sentinel], 0
-        ):  # it went while this process started: there is nothing left to signal that
+        if connection.wait([parent.sentinel], 0):  # the parent ended while this process started: no signal will come
             os._exit(1)
     Thread(target=_end_with_parent, daemon=True).start()
 
 
 def _end_with_parent() -> None:
-    """End this process where its parent is gone: one that was killed could not tidy up."""
+    """End this process when its parent ends: a parent that was killed cannot clean up."""
     parent = parent_process()
     if parent is not None:
         parent.join()
@@ -257,7 +255,7 @@ def _end_with_parent() -> None:
 
 
 # --------------------
-# One seam for everything that is many jobs: reports, fleets, sweeps, bifurcations, simulations of a gap diagnosis.
+# One function for all batches of jobs: reports, fleets, sweeps, bifurcations, simulations of a gap diagnosis.
 # --------------------
 
 
@@ -272,22 +270,22 @@ def run_jobs(
 ) -> Generator[tuple[int, Result], None, None]:
     """Run jobs and yield each result with the job's number, once, as they finish.
 
-    Jobs are taken as workers become free, so that they may be made, or claimed, at the last moment. Where a job kills
-    its local process, those that ran beside it get a process each: the one that kills again is told by `if_killed`.
+    Jobs are taken as workers become free, so they may be created, or claimed, at the last moment. If a job kills its
+    local process, each job that was running gets its own process; one that kills that, too, goes to `if_killed`.
 
     Parameters
     ----------
     function : callable
-        Of a module; it must not raise. Its job and its result can be pickled.
+        Defined in a module; it must not raise. Its job and its result must be picklable.
     jobs : iterable
     n_workers : int
-        Local processes; with 1 everything runs in this one.
+        Number of local processes; with 1 everything runs in this process.
     executor : concurrent.futures.Executor or None
         Runs the jobs instead; None: that of the `cluster` in whose block this is called, if any.
     if_killed : callable
         Returns the result of a job whose worker was killed.
     on_wait : callable or None
-        Called each second while no job finishes; not where everything runs in this process.
+        Called each second while no job finishes; never if everything runs in this process.
     """
     if executor is None and (active := active_cluster()) is not None:
         executor, n_workers = active.executor, active.n_workers
@@ -327,7 +325,7 @@ def _collect(
     on_wait: Callable[[], object] | None,
     if_killed: Callable[[Job], Result] | None = None,
 ) -> Iterator[tuple[int, Result]]:
-    """Keep so many jobs with an executor; what `running` still holds after an error has no result."""
+    """Keep `n_at_once` jobs with an executor; jobs left in `running` after an error have no result."""
     try:
         while True:
             for number, job in islice(waiting, n_at_once - len(running)):
@@ -358,18 +356,18 @@ def _collect(
 
 
 def killed_text(job: str) -> str:
-    """Say why a job whose process was killed has no result: for what `if_killed` of `run_jobs` returns.
+    """Return why a job whose process was killed has no result, for use in `if_killed` of `run_jobs`.
 
     Parameters
     ----------
     job : str
-        What the process did, e.g. "analysed it".
+        What the process was doing, e.g. "analysed it".
     """
     return f"the process that {job} was killed: perhaps it ran out of memory"
 
 
 class Cluster:
-    """Workers of a Dask cluster as one executor, and what became of them.
+    """Workers of a Dask cluster as one executor, with a record of lost workers.
 
     Parameters
     ----------
@@ -383,17 +381,17 @@ class Cluster:
 
     @property
     def n_workers(self) -> int:
-        """Threads of all workers that are there now, at least 1."""
+        """Number of threads of all present workers, at least 1."""
         return max(1, sum(int(worker["nthreads"]) for worker in self._workers().values()))
 
     def lost(self) -> tuple[str, ...]:
-        """Return the addresses of workers that were there, and are not any more."""
+        """Return the addresses of workers that have disappeared."""
         now = set(self._workers())
         self._seen |= now
         return tuple(sorted(self._seen - now))
 
     def text(self) -> str:
-        """Say in one sentence where the jobs ran, and which workers were lost."""
+        """Say in one sentence where the jobs ran and how many workers were lost."""
         lost, here = self.lost(), self._workers()
         text = f"on {len(here)} worker{'s' * (len(here) != 1)} of a Dask cluster"
         if not lost:
@@ -409,7 +407,7 @@ _ACTIVE: ContextVar[Cluster | None] = ContextVar("cluster", default=None)
 
 
 def active_cluster() -> Cluster | None:
-    """Return the cluster in whose block this is called, None outside of any."""
+    """Return the cluster in whose block this is called; None outside any such block."""
     return _ACTIVE.get()
 
 
@@ -417,17 +415,17 @@ def active_cluster() -> Cluster | None:
 def cluster(address: str) -> Iterator[Cluster]:
     """Run the jobs of a block on a Dask cluster. Its workers must see the same files under the same paths.
 
-    Dask sends pickled code both ways: only a cluster that is trusted may be named.
+    Dask sends pickled code both ways: use only a cluster that you trust.
 
     Parameters
     ----------
     address : str
-        Of the scheduler, e.g. "tcp://10.0.0.5:8786".
+        Address of the scheduler, e.g. "tcp://10.0.0.5:8786".
 
     Raises
     ------
     InputError
-        If `distributed` is not installed, no scheduler answers, it has no workers, or they have another gearsig.
+        If `distributed` is not installed, no scheduler answers, it has no workers, or their gearsig version differs.
     """
     from gearsig import __version__
 
@@ -447,7 +445,7 @@ def cluster(address: str) -> Iterator[Cluster]:
     try:
         versions = set(client.run(gearsig_version).values())
         if versions != {__version__}:
-            here = f"gearsig {__version__} is here, and {', '.join(sorted(versions)) or 'no worker'} there"
+            here = f"gearsig is {__version__} here, and {', '.join(sorted(versions)) or 'no worker'} there"
             raise InputError(here, where=address, remedy="start workers with the same gearsig: dask worker ADDRESS")
         opened = Cluster(client)
         before = _ACTIVE.set(opened)
@@ -460,23 +458,23 @@ def cluster(address: str) -> Iterator[Cluster]:
 
 
 def gearsig_version() -> str:
-    """Return the version of gearsig, as a worker is asked for it."""
+    """Return the version of gearsig; workers are asked to call it."""
     from gearsig import __version__
 
     return __version__
 
 
 # --------------------
-# Processes that run other programs, in a session of their own: ended with all that they started.
+# Processes that run other programs, each in a separate session, so that they end with all that they started.
 # --------------------
 
 
 PATIENCE_S = 3.0
-"""A process that was told to stop is ended by force after this."""
+"""Time after which a process that was told to stop is killed."""
 
 
 def stop(process: subprocess.Popen[Any]) -> None:
-    """End a process and what it started; nothing happens if it has ended."""
+    """End a process and what it started, unless it has already ended."""
     if process.poll() is not None:
         return
     _signal(process, force=False)
@@ -488,18 +486,18 @@ def stop(process: subprocess.Popen[Any]) -> None:
 
 
 class Running:
-    """Processes that run at the moment, to be stopped together; none starts after that."""
+    """Running processes that can be stopped together; none starts after that."""
 
     def __init__(self) -> None:
         self._lock, self._processes, self._stopped = Lock(), set[subprocess.Popen[Any]](), False
 
     def start(self, arguments: list[str], **settings: Any) -> subprocess.Popen[Any]:
-        """Start a process in a session of its own.
+        """Start a process in a separate session.
 
         Raises
         ------
         KeyboardInterrupt
-            If they have been stopped.
+            If `stop` has been called.
         """
         with self._lock:
             if self._stopped:
@@ -509,7 +507,7 @@ class Running:
         return process
 
     def ended(self, process: subprocess.Popen[Any]) -> bool:
-        """Forget a process; whether it ended by itself and was not stopped."""
+        """Forget a process; return whether it ended by itself and was not stopped."""
         with self._lock:
             self._processes.discard(process)
             return not self._stopped

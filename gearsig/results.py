@@ -1,4 +1,4 @@
-"""The base of all results: a `repr` of a few lines, and a table for pandas."""
+"""The base class of all results: a `repr` of a few lines, and a pandas table."""
 
 from __future__ import annotations
 
@@ -25,24 +25,24 @@ _AXES = {
     ("at", "frequency"): "time_s",
     ("at", "order"): "revolutions",
 }
-"""(field, axis of the result) → name of the column: the same field counts Hz or orders."""
+"""(field, axis of the result) → name of the column: the same field may hold Hz or orders."""
 _LINE, _TEXT, _SHOWN = 110, 60, 6
-"""Characters of a line, and of a text in it; items of a tuple that are shown."""
+"""Maximum characters of a line and of a text in it; number of tuple items that are shown."""
 
 
 class Result:
-    """Base of the dataclasses that the library returns.
+    """Base class of the dataclasses that the library returns.
 
     Parameters
     ----------
     rows : str
-        Keyword of the class: the field whose items are the rows of `to_frame`.
+        Class keyword: the field whose items are the rows of `to_frame`.
     columns : tuple of str
-        Keyword of the class: fields or properties of equal length that are its columns, or mappings of such. By default
-        all fields that are arrays of one dimension and as long as the longest.
+        Class keyword: fields or properties of equal length that are its columns, or mappings of such. Default: all
+        one-dimensional arrays that are as long as the longest.
     matrix : (str, str, str)
-        Keyword of the class: an array of two dimensions (or its transpose, "values.T"), what counts its rows, and what
-        counts its columns.
+        Class keyword: a two-dimensional array (or its transpose, "values.T"), the index of its rows, and that of its
+        columns.
 
     Examples
     --------
@@ -69,7 +69,7 @@ class Result:
     ) -> None:
         super().__init_subclass__()
         cls._rows, cls._columns, cls._matrix = rows or cls._rows, columns or cls._columns, matrix or cls._matrix
-        # The decorator `dataclass`, which comes after this, leaves a `__repr__` that the class has of its own.
+        # The decorator `dataclass`, which runs after this, keeps a `__repr__` that the class itself defines.
         if "__repr__" not in cls.__dict__:
             cls.__repr__ = Result.__repr__  # type: ignore[method-assign]
 
@@ -84,7 +84,7 @@ class Result:
         return "\n".join([*head, *(f"  {name:<{width}}  {_array_text(a)}" for name, a in arrays.items())])
 
     def _repr_html_(self) -> str:
-        """Return the same as a small table, for notebooks; texts may come from files."""
+        """Return the same as a small HTML table for notebooks; texts are escaped, as they may come from files."""
         values = {f.name: getattr(self, f.name) for f in fields(self) if f.repr}  # type: ignore[arg-type]
         rows = []
         for name, value in values.items():
@@ -95,7 +95,7 @@ class Result:
         return f"<strong>{escape(type(self).__name__)}</strong><table>{''.join(rows)}</table>"
 
     def to_frame(self) -> DataFrame:
-        """Return the result as a pandas table; names end in their unit where it is always the same."""
+        """Return the result as a pandas table; column names end in their unit where it is fixed."""
         from pandas import DataFrame
 
         table = _table_of(self)
@@ -103,13 +103,13 @@ class Result:
 
 
 def verdict_html(verdict: Sequence[str], head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a verdict over a table, for notebooks; texts may come from files.
+    """Return a verdict above a table as HTML for notebooks; texts are escaped, as they may come from files.
 
     Parameters
     ----------
     verdict, head : sequence of str
     rows : iterable of sequences of str
-        As long as the head.
+        Of the same length as `head`.
     """
     cell = "<{0} style='text-align:left'>{1}</{0}>"
     lines = [("th", head), *(("td", row) for row in rows)]
@@ -124,8 +124,8 @@ def to_frame(result: object) -> DataFrame:
     Parameters
     ----------
     result : Result or sequence of dataclasses
-        Of a sequence, each item is a row; where the items hold arrays (tracked orders, ridges), their tables follow
-        each other, led by a column for each number or text in which the items differ.
+        Each item of a sequence is a row. If the items hold arrays (tracked orders, ridges), their tables are stacked,
+        with a leading column for each number or text in which the items differ.
 
     Returns
     -------
@@ -156,13 +156,13 @@ def _frame_of_items(items: Sequence[Any]) -> DataFrame:
 
     tables = [_table_of(item) if isinstance(item, Result) else None for item in items]
     rows = [_row_of(item) for item in items]
-    # Where one item has a dataclass, whose numbers are columns, and another has none, None is no column of its own.
+    # If one item holds a dataclass, whose numbers are columns, and another holds None, None gets no separate column.
     parents = {name[:at] for row in rows for name in row for at, c in enumerate(name) if c == "."}
     rows = [{name: value for name, value in row.items() if name not in parents} for row in rows]
     parts = [table for table in tables if table is not None]
     if not parts or len(parts) < len(items):
         return DataFrame(rows)
-    # What tells the items apart: their own numbers and texts, not those of results in them.
+    # Items are distinguished by their own numbers and texts, not those of results in them.
     plain = [n for n, v in rows[0].items() if "." not in n and not isinstance(v, tuple)]
     leading = [n for n in plain if any(row[n] != rows[0][n] for row in rows)]
     for row, part in zip(rows, parts, strict=True):
@@ -172,7 +172,7 @@ def _frame_of_items(items: Sequence[Any]) -> DataFrame:
 
 
 def _table_of(result: Result) -> DataFrame | None:
-    """Return the table of a result's items or arrays; None where it has neither."""
+    """Return the table of a result's items or arrays; None if it has neither."""
     from pandas import DataFrame, Index
 
     if result._rows:
@@ -198,7 +198,7 @@ def _column_name(result: object, name: str) -> str:
 
 
 def _row_of(item: Any, path: str = "") -> dict[str, Any]:
-    """Return numbers and texts of a dataclass, those of dataclasses in it by their path; arrays are left out."""
+    """Return the numbers and texts of a dataclass, with nested dataclasses by path and without arrays."""
     row: dict[str, Any] = {}
     for name, value in ((path + f.name, getattr(item, f.name)) for f in fields(item)):
         if is_dataclass(value):
@@ -210,14 +210,14 @@ def _row_of(item: Any, path: str = "") -> dict[str, Any]:
     return row
 
 
-# The words of a `repr`.
+# The text of a `repr`.
 
 
 def _verdict_of(result: object) -> tuple[str, ...]:
-    """Return what a result says in words, which comes first."""
+    """Return a result's verdict in words, which is shown first."""
     verdict = getattr(result, "verdict", ())
     if isinstance(verdict, str):
-        return (verdict,) if " " in verdict else ()  # one word stands among the others
+        return (verdict,) if " " in verdict else ()  # a single word is shown among the fields
     return tuple(verdict)
 
 
@@ -240,7 +240,7 @@ def _array_text(array: NDArray[Any]) -> str:
 
 
 def _value_text(value: Any) -> str:
-    """Return a value in a few words; empty where it says nothing."""
+    """Return a value as a short text; empty if there is nothing to show."""
     if value is None or (isinstance(value, (str, tuple, Mapping)) and not value):
         text = ""
     elif isinstance(value, str):

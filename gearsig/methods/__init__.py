@@ -1,7 +1,7 @@
-"""The methods by name, from which the command line and the dashboard make commands and pages.
+"""The methods by name, from which the command line and the dashboard build commands and pages.
 
-A method is a function of a prepared recording, a channel and its options; its row in a table names the options once,
-with text, limits and what a recording offers for them.
+A method is a function of a prepared recording, a channel and its options. Its row in a table defines the options, with
+texts, limits and the choices that a recording offers.
 
 >>> from gearsig.methods import apply_method
 >>> answer = apply_method("envelope", recording, band_hz=(2000.0, 4000.0))  # doctest: +SKIP

@@ -1,4 +1,4 @@
-"""All methods in one table, and how one of them is applied."""
+"""The table of all methods, and the application of one of them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from gearsig.recording import Recording
 from gearsig.rig import Rig, SpeedSource
 
 METHODS: dict[str, Method] = {**WHOLE, **ALONG, **MODULATIONS, **MAPS, **PARTS, **IN_PHASE}
-"""The methods by the names that command line and reports know them by."""
+"""The methods by their names on the command line and in reports."""
 
 
 def apply_method(
@@ -34,7 +34,7 @@ def apply_method(
     end_s: float | None = None,
     **options: Any,
 ) -> MethodAnswer:
-    """Apply a method to one channel of a recording that is in memory.
+    """Apply a method to one channel of a recording in memory.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def apply_method(
         One of `METHODS`.
     recording : Recording or PreparedRecording
     channel : str
-        Empty: the first acceleration, else the first channel that is not a tachometer's.
+        Empty: the first acceleration, else the first channel that is not a tachometer.
     start_s, end_s : float or None
         Part of the recording; None: all.
     **options
@@ -51,9 +51,9 @@ def apply_method(
     Raises
     ------
     InputError
-        If there is no such method or channel, or the method does not take an option or its value.
+        If there is no such method or channel, or an option or its value is not allowed.
     RefusalError
-        If the recording does not allow it: no speed, too short.
+        If the recording does not allow the method, e.g. because the speed is not known or it is too short.
     """
     method, settings = _method(name, options)
     prepared = prepare(recording)
@@ -65,7 +65,7 @@ def apply_method(
 
 
 def _method(name: str, options: Mapping[str, Any]) -> tuple[Method, dict[str, Any]]:
-    """Return a method and all its options, checked."""
+    """Return a method and all its options after checking them."""
     method = METHODS[known_name(name, METHODS, f"there is no method {name!r}")]
     defined = {option.name: option for option in method.options}
     for key, value in options.items():
@@ -80,15 +80,15 @@ def _method(name: str, options: Mapping[str, Any]) -> tuple[Method, dict[str, An
 
 
 # --------------------
-# Recordings in files, which may be longer than memory.
+# Recordings in files, which may be larger than memory.
 # --------------------
 
 PROGRAM_BYTES = 2e8
-"""What Python and its libraries take."""
+"""Memory that Python and its libraries take."""
 READING_BYTES = 24.0
-"""Of each sample of each channel: as it is read, as a number, and while it is checked."""
+"""Memory per sample of each channel: as read, as a number, and during checks."""
 ANGLE_BYTES = 220.0
-"""Of each sample: a stated speed is refined by the vibration, where there is no tachometer."""
+"""Memory per sample to refine a stated speed by the vibration, if there is no tachometer."""
 
 
 def apply_method_to_file(
@@ -104,7 +104,7 @@ def apply_method_to_file(
     speed: SpeedSource | None = None,
     **options: Any,
 ) -> MethodAnswer:
-    """Apply a method to a file in bounded memory: to all of it where it fits, else in blocks, else not at all.
+    """Apply a method to a file in bounded memory: to all of it if it fits, else in blocks if the method allows it.
 
     Parameters
     ----------
@@ -113,15 +113,15 @@ def apply_method_to_file(
     path : str or Path
     rig : Rig or None
     memory_bytes : float
-        What may be taken, from 0.25 GB.
+        Memory that may be used, at least 0.25 GB.
     sampling_rate_hz, speed
         As in `read_recording`.
 
     Raises
     ------
     InputError
-        As `apply_method` and `read_recording`; where the part does not fit and the method does not work in blocks, or
-        the format is only read whole.
+        As in `apply_method` and `read_recording`; or if the part does not fit and the method does not work in blocks,
+        or the format can only be read as a whole.
     """
     method, settings = _method(name, options)
     allowed = positive(memory_bytes - PROGRAM_BYTES, "memory less 0.2 GB", "bytes", remedy="allow more than 0.2 GB")
@@ -147,7 +147,7 @@ def apply_method_to_file(
         remedy += ", or convert it to HDF5, Parquet, TDMS or WAV, which are read in parts"
     elif method.in_blocks is None:
         all_of_it = ", ".join(block_method for block_method, m in METHODS.items() if m.in_blocks is not None)
-        remedy += f"; all of it is looked at by: {all_of_it}"
+        remedy += f"; methods for the whole recording: {all_of_it}"
     needed = part_bytes if record.is_parted else whole_bytes
     raise InputError(
         f"{name} of {last - first} samples takes {needed / 1e9:.3g} GB",
@@ -160,11 +160,11 @@ def apply_method_to_file(
 def _in_blocks(
     name: str, method: Method, blocks: RecordBlocks, channel: str, settings: Mapping[str, Any]
 ) -> MethodAnswer:
-    """Apply a method that works in blocks; what names its lines asks a prepared recording for rig and angle only."""
+    """Apply a method that works in blocks; labels of its lines need only rig and angle of a prepared recording."""
     assert method.in_blocks is not None  # noqa: S101 - said to the type checker: looked at by the caller
     prepared = prepare(blocks.head)
     prepared.keep_angle(blocks.shaft_angle)
     answer = method.in_blocks(blocks, prepared, usual_channel(blocks.head, channel), **settings)
     duration_s = blocks.n_samples / blocks.head.sampling_rate_hz
-    note = f"Of {duration_s:.5g} s, longer than memory, in blocks: no speed is refined by the vibration."
+    note = f"{duration_s:.5g} s exceed the memory and are analysed in blocks: the vibration does not refine the speed."
     return replace(answer, method=name, notes=(*answer.notes, note))

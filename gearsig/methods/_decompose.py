@@ -1,4 +1,4 @@
-"""Methods that take a channel apart: variational modes, with the transform of one of them, and wavelet denoising."""
+"""Methods that decompose a channel: variational modes, with the transform of one of them, and wavelet denoising."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from gearsig.spectra import band_envelope
 from gearsig.timefreq import UniformSignal
 
 PENALTIES = (50, 100, 200, 500, 1000, 2000, 5000, 10_000, 20_000, 50_000, 100_000, 200_000)
-"""A logarithmic scale that holds whatever is suggested."""
+"""A logarithmic scale that contains all suggested values."""
 
 
 def _modes(
@@ -56,7 +56,7 @@ def _modes(
     engine: Any,
 ) -> MethodAnswer:
     signal, offset = _decomposed(prepared, channel, envelope_hz, over_angle=over_angle, shaft=shaft)
-    # How many modes and which penalty: asked for, or tried out on the signal, with the trials as a table.
+    # The number of modes and the penalty: given, or found by trials on the signal, which are returned as a table.
     reasons: tuple[str, ...] = ()
     settings, trials = VmdSettings(n_modes or 4, penalty or 2000.0), dict[str, Any]()
     place = ("methods", "modes", channel, envelope_hz, over_angle, shaft)
@@ -69,17 +69,17 @@ def _modes(
         settings,
         start=settings.start if start == "automatic" else start,
         zero_mode=zero_mode,
-        max_iterations=499 if engine == "vmdpy" else iterations,  # as it does
+        max_iterations=499 if engine == "vmdpy" else iterations,  # vmdpy's fixed number
         dual_step=dual_step,
         engine=engine,
     )
     modes = prepared.keep((*place, settings), lambda: by_centre(vmd(signal, None, settings)))
     modes = replace(modes, offset=offset)
-    # The mode to look at is the one with the most impulsive waveform: damage impacts, meshing hums.
+    # The mode of interest is the one with the most impulsive waveform: damage causes impacts, meshing hums.
     impulses = [kurtosis(waveform) for waveform in modes.waveforms]
     chosen = int(np.argmax(impulses)) if mode is None else mode - 1
     if not 0 <= chosen < modes.n_modes:
-        raise InputError(f"mode is {mode}", allowed=f"1 to {modes.n_modes}, by rising centre")
+        raise InputError(f"mode is {mode}", allowed=f"1 to {modes.n_modes}, by ascending centre")
     numbers = {
         "centres": list(modes.centres),
         "bandwidths": list(modes.bandwidths),
@@ -124,13 +124,13 @@ def _modes(
                 f"{impulses[chosen]:.3g}, centre {position_text(modes.axis, modes.centres[chosen], 5)}."
             ),
         ),
-        notes=(*reasons, f"{end} after {modes.n_iterations} iterations. Upright lines: the modes' centres."),
+        notes=(*reasons, f"{end} after {modes.n_iterations} iterations. Vertical lines: the modes' centres."),
         warnings=modes.notes,
         waveforms=waveforms,
     )
     if not then:
         return answer
-    # The chosen mode alone, transformed two octaves to either side of its centre; the modes' panels stay below it.
+    # The chosen mode alone, transformed two octaves on each side of its centre; the modes' panels stay below it.
     centre, top = float(modes.centres[chosen]), 0.45 * modes.sampling_rate
     low = centre / 4.0 if lowest is None else lowest
     levels = levels_of(
@@ -153,24 +153,24 @@ def _modes(
 def _decomposed(
     prepared: PreparedRecording, channel: str, envelope_hz: tuple[float, float] | None, *, over_angle: bool, shaft: str
 ) -> tuple[UniformSignal, float]:
-    """Return what is taken apart, and the constant that was subtracted from it."""
+    """Return the signal to decompose, and the constant that was subtracted from it."""
     if envelope_hz is None:
         return signal_of(prepared, channel, over_angle=over_angle, shaft=shaft), 0.0
     if over_angle:
-        raise InputError("an envelope over the shaft's angle is asked for", allowed="one of both")
+        raise InputError("an envelope over the shaft's angle was requested", allowed="one of the two")
     recording = prepared.recording
     unit = unit_of(prepared, channel)
     envelope = band_envelope(
         recording.values(channel), recording.sampling_rate_hz, envelope_hz, kind="magnitude", unit=unit, source=channel
     )
-    # its mean would be a mode of its own that outweighs the others
+    # its mean would be a separate mode that outweighs the others
     mean = float(envelope.values.mean())
     rate = envelope.sampling_rate_hz
     return UniformSignal(envelope.values - mean, rate, unit=envelope.unit, source=envelope.source), mean
 
 
 def by_centre(modes: Modes) -> Modes:
-    """Return the modes by rising centre: the first one shown is number 1."""
+    """Return the modes by ascending centre, so that the first one shown is number 1."""
     order = list(modes.by_centre())
     return replace(
         modes,
@@ -182,7 +182,7 @@ def by_centre(modes: Modes) -> Modes:
 
 
 def _spectra_panel(modes: Modes, names: list[str]) -> LinePanel:
-    """All modes' spectra on one logarithmic axis, so that their sizes compare."""
+    """Return the panel of all modes' spectra, on one logarithmic axis for comparison."""
     spectra = mode_spectra(modes)
     colours: tuple[int | str, ...] = (*series_colours(modes.n_modes), -1)
     lines = [
@@ -192,7 +192,7 @@ def _spectra_panel(modes: Modes, names: list[str]) -> LinePanel:
     highest = max(float(line.y[1:].max()) for line in lines)
     cursors = [Cursor(float(c), "mode", str(k), k) for k, c in enumerate(modes.centres, start=1)]
     label = with_unit("amplitude peak", modes.unit)
-    # the residual lies behind the modes
+    # the residual is drawn behind the modes
     return LinePanel(
         [lines[-1], *lines[:-1]], spectra[0].axis_label, label, (1e-3 * highest, 3.0 * highest), True, cursors
     )
@@ -217,7 +217,7 @@ def _trials(trials: Any) -> dict[str, Any]:
 
 
 MOST_NOISE = 0.5
-"""Share of a signal's energy that may be noise without a word."""
+"""Maximum share of a signal's energy removed as noise without a warning."""
 
 
 def _denoising(
@@ -257,9 +257,9 @@ def _denoising(
     warnings = list[str]()
     if denoised.removed_share > MOST_NOISE:
         warnings.append(
-            f"{100.0 * denoised.removed_share:.3g} % of the energy was taken for noise: lines or impacts may fill the "
-            "levels on which it is measured. Take white noise of the quietest level; of steady lines a spectrum or a "
-            "synchronous average"
+            f"{100.0 * denoised.removed_share:.3g} % of the energy was removed as noise: lines or impacts may fill the "
+            "levels on which the noise is estimated. Choose white noise of the quietest level; for steady lines, a "
+            "spectrum or a synchronous average"
         )
     return MethodAnswer(
         channel,
@@ -276,7 +276,7 @@ def _denoising(
         ),
         notes=(
             (
-                "Look at what was removed: a modulation in it is signal that should not have gone. Steady tones are "
+                "Look at what was removed: a modulation in it is signal that should have been kept. Steady tones are "
                 "better extracted by a spectrum or a synchronous average."
             ),
         ),
@@ -287,7 +287,7 @@ def _denoising(
 
 def _bytes_per_sample_of_modes(options: Mapping[str, Any]) -> float:
     n_modes = options["n_modes"] or 8
-    # vmdpy keeps the spectra of all modes of all iterations, of the signal mirrored at both ends.
+    # vmdpy keeps the spectra of all modes of all iterations, for the signal mirrored at both ends.
     return 400.0 + 50.0 * n_modes if options["engine"] == "gearsig" else 32.0 * n_modes * options["iterations"]
 
 
@@ -298,8 +298,8 @@ def _samples_of_modes(options: Mapping[str, Any]) -> int:
 PARTS = {
     "modes": Method(
         "Modes",
-        "Takes the signal apart into a few narrow-band parts whose frequencies need not be known (VMD), and transforms "
-        "one of them: what noisy recordings of cracks need.",
+        "Decomposes the signal into a few narrow-band modes whose frequencies need not be known (VMD), and transforms "
+        "one of them: useful for noisy recordings of cracks.",
         _modes,
         (
             MethodOption(
@@ -311,12 +311,12 @@ PARTS = {
                 verbatim(*PENALTIES), minimum=1e-9,
             ),
             MethodOption(
-                "mode", "Chosen mode", "count", None, "From 1 by rising centre.", "the most impulsive one",
+                "mode", "Chosen mode", "count", None, "From 1 by ascending centre.", "the most impulsive one",
                 verbatim(*range(1, 11)),
             ),
             MethodOption(
                 "then", "The chosen mode goes on to", "choice", "",
-                "Squeezed wavelet: the momentary frequency of the mode, as noisy records of cracks need.",
+                "Squeezed wavelet: the instantaneous frequency of the mode, useful for noisy records of cracks.",
                 choices={"": "nothing", **NAMES},
             ),
             MethodOption(
@@ -332,7 +332,7 @@ PARTS = {
             ),
             MethodOption(
                 "zero_mode", "Mode at zero", "switch", False,
-                "Keep the first mode's centre at zero, so that it takes mean and drift.", more=True,
+                "Keep the first mode's centre at zero, so that it contains mean and drift.", more=True,
             ),
             MethodOption("iterations", "Iterations", "count", 499, "", "", verbatim(499, 1000, 2000, 5000), more=True),
             MethodOption(
@@ -355,7 +355,7 @@ PARTS = {
     ),
     "denoising": Method(
         "Denoising",
-        "Takes out noise by thresholds on wavelet coefficients, and shows what was taken out.",
+        "Removes noise by thresholds on wavelet coefficients, and shows what was removed.",
         _denoising,
         (
             MethodOption(
@@ -370,7 +370,7 @@ PARTS = {
             ),
             MethodOption(
                 "noise", "Noise", "choice", "quietest level",
-                "White: one size of noise for all levels, of the quietest or of the finest. Coloured: one of each.",
+                "White: one noise estimate for all levels, from the quietest or the finest. Coloured: one for each.",
                 choices={"quietest level": "White", "finest level": "White, finest level", "each level": "Coloured"},
             ),
             MethodOption(
@@ -383,7 +383,7 @@ PARTS = {
             ),
             MethodOption(
                 "levels", "Levels", "count", None,
-                "How often the signal is halved in frequency; what lies below the coarsest level is kept as it is.",
+                "How often the signal is halved in frequency; anything below the coarsest level is kept unchanged.",
                 "automatic", verbatim(*range(1, 15)),
             ),
         ),

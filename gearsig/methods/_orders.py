@@ -1,4 +1,4 @@
-"""Methods along a run: order and frequency map, tracked orders, orders taken out by a Vold–Kalman filter."""
+"""Methods along a run: order and frequency map, tracked orders, orders extracted by a Vold–Kalman filter."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ from gearsig.rig import order_lines
 
 KINDS = ("mesh", "shaft", "bearing", "sideband")
 MIN_LENGTH, MAX_EFFORT = 2**16, 1_600_000
-"""Coupled orders take time as their number squared: so many samples times orders squared, but not less than that."""
+"""Coupled orders take time as their number squared: minimum samples, and maximum samples × orders²."""
 HANN_BANDWIDTH = 1.5
-"""Noise bandwidth of a Hann window in lines: blocks of 1.5/B revolutions collect over B orders."""
+"""Noise bandwidth of a Hann window in lines: blocks of 1.5/B revolutions have a bandwidth of B orders."""
 RESIDUAL = "residual without all chosen orders"
 
 
@@ -103,7 +103,7 @@ def _frequency_map_in_blocks(
 
 
 def known_orders(prepared: PreparedRecording, channel: str = "") -> dict[float, str]:
-    """Return the orders that follow from the rig with their names, the most telling kinds first."""
+    """Return the orders that follow from the rig with their names, the most important kinds first."""
     del channel
     if not prepared.rig.shafts:
         return {float(k): f"{k}× shaft" for k in (1, 2, 3)}
@@ -178,11 +178,11 @@ def _vold_kalman(
     table["speed of the reference shaft (rpm)"] = 60.0 * separation.orders[0].frequency_hz / values[0]
     for k, (name, order) in enumerate(zip(names, separation.orders, strict=True)):
         x = 60.0 * order.frequency_hz / order.order if over_speed else time_s
-        # where the filter has settled; where it nowhere has, all of it
+        # where the filter has settled, or all of it if it never has
         y = np.where(order.settled, order.amplitude, np.nan) if order.settled.any() else order.amplitude
         lines.append(ChartLine(x[::step], y[::step], name, k))
         table[with_unit(f"{name}, amplitude peak", unit)] = order.amplitude
-    # An order that begins or ends in the part is not known well there: the highest few of the points are left out.
+    # An order that begins or ends within the part is uncertain there: the few highest points are left out.
     tops = [float(np.nanpercentile(line.y, 99.5)) for line in lines if np.isfinite(line.y).any()]
     for k, (name, track) in enumerate(zip(names, tracks, strict=False)):
         x = track.speed_rpm if over_speed else track.time_s
@@ -190,7 +190,7 @@ def _vold_kalman(
     label = "speed of the reference shaft (rpm)" if over_speed else "time (s)"
     limits = (0.0, 1.15 * max(tops, default=0.0) or 1.0)
     panel = LinePanel(lines, label, with_unit("amplitude peak", unit), limits)
-    # What remains without all orders tells how much of the signal they explain.
+    # The residual without all orders shows how much of the signal they explain.
     columns = {"signal": recording.values(channel)}
     columns |= {name: order.waveform for name, order in zip(names, separation.orders, strict=True)}
     columns[RESIDUAL] = separation.residual
@@ -204,7 +204,7 @@ def _vold_kalman(
     )
     power, residual = float(np.var(columns["signal"].astype(np.float64))) or 1.0, float(np.std(separation.residual))
     rms = np.array([np.sqrt(np.mean(np.square(order.waveform))) for order in separation.orders])
-    notes = ["Levels end where the filter has not settled yet: at the ends, and where an order begins or ends."]
+    notes = ["Levels are left out where the filter has not settled: at the ends, and where an order begins or ends."]
     if tracks:
         b = tracks[0].bandwidth_orders
         notes.append(
@@ -215,7 +215,7 @@ def _vold_kalman(
         notes.append(f"No resampling-based track: {reason}")
     return MethodAnswer(
         channel,
-        f"{len(values)} orders taken out by a Vold–Kalman filter",
+        f"{len(values)} orders extracted by a Vold–Kalman filter",
         lambda: plot.panels_figure([panel], title=f"{channel}: orders by a Vold–Kalman filter"),
         table,
         tables={
@@ -243,7 +243,7 @@ def _vold_kalman(
 def _tracks(
     prepared: PreparedRecording, channel: str, orders: Sequence[float], width: float
 ) -> tuple[Sequence[TrackedOrder], str]:
-    """Return resampling-based tracks, of the same bandwidth where the part allows it, or why there are none."""
+    """Return resampling-based tracks, of the same bandwidth if the part is long enough, or why there are none."""
     n = min(max(HANN_BANDWIDTH / width, 1.0), 0.25 * prepared.shaft_angle.n_revolutions)
     try:
         signal = prepared.over_angle("", [channel])
@@ -269,13 +269,13 @@ ALONG = {
     ),
     "vold-kalman": Method(
         "Orders (Vold–Kalman)",
-        "Takes single orders out of the signal as waveforms, also where they cross or lie close together.",
+        "Extracts single orders from the signal as waveforms, also where they cross or are close together.",
         _vold_kalman,
         (
             ORDERS,
             MethodOption(
                 "bandwidth", "Bandwidth", "number", 0.5,
-                "Between the -3 dB points. Narrow bands tell close orders apart and smooth changes of level.",
+                "Between the -3 dB points. Narrow bands separate close orders and smooth changes of level.",
                 minimum=0.0,
             ),
             MethodOption("bandwidth_in", "Bandwidth in", "choice", "orders", choices={"orders": "Orders", "hz": "Hz"}),
@@ -291,8 +291,7 @@ ALONG = {
             ),
             MethodOption(
                 "coupling", "Coupling", "choice", "automatic",
-                ("Orders solved for together share the signal where they cross or lie close: automatic where it "
-                "matters."),
+                ("Orders solved for together share the signal where they cross or are close: automatic if it matters."),
                 choices={"automatic": "Automatic", "all": "All", "none": "None"}, more=True,
             ),
             MethodOption(

@@ -1,4 +1,4 @@
-"""Methods in phase space: phase plane and its section; embedding by delays and what is asked of its path."""
+"""Methods in phase space: phase plane and its section; embedding by delays and measures of its path."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from gearsig.plot import with_unit
 from gearsig.prepared import PreparedRecording
 
 N_DRAWN, N_IN_SPACE = 20_000, 6_000
-"""Points of a path: more is a blot, and a browser without a graphics card turns it slowly in space."""
+"""Maximum points of a path in the plane and in space: more overlap too much, and are slow to rotate in a browser."""
 PAIR = MethodOption(
     "pair", "A point once per mesh cycle of", "name", "", empty="the first pair",
     known=lambda prepared, _: [pair.name for pair in prepared.rig.pairs],
@@ -24,9 +24,9 @@ PAIR = MethodOption(
 
 
 def _lowest_hz(prepared: PreparedRecording, channel: str = "") -> tuple[float, str]:
-    """Return a frequency below the slowest mesh, or else shaft, or what the part allows if that is higher, and why.
+    """Return a frequency below the slowest mesh, else shaft, or the part's limit if that is higher, and the reason.
 
-    Far below the mesh, integrated noise outgrows the motion of the teeth and makes a cloud of the section.
+    Far below the mesh, integrated noise exceeds the motion of the teeth and turns the section into a cloud.
     """
     del channel
     possible = 1.05 * phase.lowest_low_cut_hz(prepared.recording.duration_s)
@@ -51,7 +51,7 @@ def _modulation_text(prepared: PreparedRecording, channel: str) -> str:
 
 
 def _lock(prepared: PreparedRecording, pair: str, shaft: str) -> phase.CycleLock:
-    """Return what gives a point per cycle: a shaft that is asked for, else the mesh of a pair."""
+    """Return the cycle that gives one point each: of the requested shaft, else of the mesh of a pair."""
     if not (pair or shaft) and prepared.rig.pairs:
         pair = prepared.rig.pairs[0].name
     return phase.find_lock(prepared.recording, pair=pair, shaft=shaft, rig=prepared.rig, angle=prepared.shaft_angle)
@@ -59,14 +59,14 @@ def _lock(prepared: PreparedRecording, pair: str, shaft: str) -> phase.CycleLock
 
 def _speed_messages(prepared: PreparedRecording) -> tuple[str, ...]:
     angle = angle_or_none(prepared)
-    # a section is one of one motion only while the speed varies by less than 5 %
+    # a section shows a single motion only if the speed varies by less than 5 %
     if angle is None or angle.is_steady(0.05):
         return ()
     low, high = angle.speed_range_rpm
     return (
         (
-            f"the speed runs from {low:.4g} to {high:.4g} rpm here: a Poincaré section shows one motion only at a "
-            "steady speed. Its points smear, and what is said of them does not hold; choose a steady part"
+            f"the speed varies from {low:.4g} to {high:.4g} rpm here: a Poincaré section shows a single motion only at "
+            "steady speed. Its points smear, and statements about them do not hold; choose a steady part"
         ),
     )
 
@@ -134,8 +134,8 @@ def _phase_plane(
         notes=(
             (
                 f"Shown are {portrait.start_s:.3g} to {portrait.end_s:.3g} s of the part, {low:.4g} to {high:.4g} Hz; "
-                "its ends are left out, as integration is uncertain there. Motion that repeats with every cycle falls "
-                "onto one point; scatter is noise, modulation, or motion that does not repeat."
+                "its ends are left out, as integration is uncertain there. Motion that repeats in each cycle falls on "
+                "one point; scatter is noise, modulation, or motion that does not repeat."
             ),
         ),
         warnings=_speed_messages(prepared) if section is not None else (),
@@ -157,7 +157,7 @@ def _embedded(
     delay: int | None,
     dimension: int | None,
 ) -> tuple[phase.PhasePortrait, phase.MutualInformation, phase.EmbeddingDimension, tuple[str, ...]]:
-    """Return the path with the curves that delay and dimension follow from, and what is to be said of it."""
+    """Return the path, the curves from which delay and dimension follow, and warnings."""
 
     def embed() -> tuple[phase.PhasePortrait, phase.MutualInformation, phase.EmbeddingDimension, tuple[str, ...]]:
         values, rate_hz, start_s, source = _in_band(prepared, channel, lowest_hz, highest_hz)
@@ -170,7 +170,7 @@ def _embedded(
             messages = (
                 (
                     f"no dimension up to {n_axes} unfolds the path: the signal looks stochastic. {n_axes} dimensions "
-                    "are taken; a narrower band or a dimension of your own may say more"
+                    "are used; a narrower band or a dimension of your own may show more"
                 ),
             )
         path = phase.delay_embedding(
@@ -184,7 +184,7 @@ def _embedded(
 def _in_band(
     prepared: PreparedRecording, channel: str, low_hz: float | None, high_hz: float | None
 ) -> tuple[FloatArray, float, float, str]:
-    """Return the channel as it is, or within a band, with its rate, start and name."""
+    """Return the channel unchanged, or within a band, with its rate, start and name."""
     recording = prepared.recording
     values, rate_hz = recording.values(channel), recording.sampling_rate_hz
     if not low_hz and not high_hz:
@@ -225,9 +225,9 @@ def _embedding(prepared: PreparedRecording, channel: str, **options: Any) -> Met
         numbers={"delay_samples": information.delay_samples, "dimension": curves.dimension},
         notes=(
             (
-                f"Delay {delay} by the curve ({information.rule}); a dimension unfolds the path where fewer than "
-                f"{percent(curves.threshold)} of the nearest neighbours are false.{yours} E2 near 1 at every dimension "
-                "says random."
+                f"Delay {delay} by the curve ({information.rule}); a dimension unfolds the path if fewer than "
+                f"{percent(curves.threshold)} of the nearest neighbours are false.{yours} E2 near 1 at each dimension "
+                "means random."
             ),
         ),
         warnings=messages,
@@ -239,7 +239,7 @@ def _portrait(
 ) -> MethodAnswer:
     path, *_, messages = _embedded(prepared, channel, **options)
     if path.n_axes == 1:
-        raise RefusalError("one dimension makes no portrait", remedy="give a larger one")
+        raise RefusalError("a portrait needs more than one dimension", remedy="give a larger one")
     if in_space and path.n_axes < 3:
         raise RefusalError(f"the path has {path.n_axes} dimensions", remedy="give at least 3 to see it in space")
     section, warnings = None, [*messages]
@@ -309,14 +309,14 @@ def _recurrence(
     first, second = np.nonzero(np.triu(pairs.recurrent))
     return MethodAnswer(
         channel,
-        "recurrence plot: which points come back close to which",
+        "recurrence plot: which points return close to each other",
         lambda: plot.recurrence_figure(pairs, measures),
         {"time (s)": pairs.times_s[first], "recurs at (s)": pairs.times_s[second]},
         numbers=numbers,
         notes=(
             (
-                f"The measures are of {measures.n_points} points, {measures.duration_s:.4g} s, pairs nearer in time "
-                f"than {measures.theiler_points} points left out. Lines along the diagonal are motion that repeats."
+                f"The measures are from {measures.n_points} points, {measures.duration_s:.4g} s, without pairs closer "
+                f"in time than {measures.theiler_points} points. Lines along the diagonal are motion that repeats."
             ),
         ),
         warnings=messages,
@@ -353,7 +353,7 @@ def _chaos_test(
         numbers={"k": test.k, "verdict": test.verdict, "every": test.every},
         notes=(
             "K near 0: regular, a bounded walk. K near 1: chaos or noise, a walk like Brownian motion; only the false "
-            "neighbours tell these two apart." + (f" Every {test.every}-th value is used." if test.every > 1 else ""),
+            "neighbours distinguish these." + (f" One in {test.every} values is used." if test.every > 1 else ""),
         ),
         warnings=(*messages, *undecided),
     )
@@ -371,7 +371,7 @@ def _kind(
     section = phase.poincare_section(path, lock)
     after = f" after {kind.period} cycles" if kind.kind == "subharmonic" else ""
     scope = {
-        "plane": "displacement and velocity; integration makes slow motion weigh more",
+        "plane": "displacement and velocity; integration gives slow motion more weight",
         "signal": "the signal as measured, embedded by delays",
     }[of]
     return MethodAnswer(
@@ -380,7 +380,7 @@ def _kind(
         lambda: plot.phase_portrait_figure(path, section, n_points=N_IN_SPACE),
         _columns(replace(path, points=section.points)),
         numbers={"kind": kind.kind, "period": kind.period, "evidence": list(kind.evidence), "of": of},
-        facts=(f"Kind of motion: **{kind.kind}**{after}", f"Asked of {scope}."),
+        facts=(f"Kind of motion: **{kind.kind}**{after}", f"Based on {scope}."),
         notes=(
             *kind.evidence,
             (
@@ -394,22 +394,22 @@ def _kind(
 
 LOW = MethodOption(
     "lowest_hz", "Lowest frequency (Hz)", "number", None,
-    "Integration magnifies whatever is slow. Too low, noise turns into drift; too high, slow motion is bent.",
+    "Integration amplifies slow motion. Too low, noise turns into drift; too high, slow motion is distorted.",
     unit="Hz", minimum=0.0, known=_modulation_text,
 )  # fmt: skip
 HIGH = MethodOption(
     "highest_hz", "Highest frequency (Hz)", "number", None,
-    "A lower one shows the slower motion alone, without resonances.", "0.8 of half the sampling rate", unit="Hz",
+    "A lower one shows only the slower motion, without resonances.", "0.8 of half the sampling rate", unit="Hz",
     minimum=0.0,
 )  # fmt: skip
 QUANTITY = MethodOption(
     "quantity", "An unnamed quantity is", "choice", "acceleration",
-    "Where the recording does not say what the channel measures.",
+    "If the recording does not say what the channel measures.",
     choices=verbatim("acceleration", "velocity", "displacement"), more=True,
 )  # fmt: skip
 PLACE = MethodOption(
     "place", "Place in the cycle (0 to 1)", "number", 0.0,
-    "Another place shows the section from another side; it must not change what kind of motion it is.", minimum=0.0,
+    "Another place shows the section from another side; the kind of motion must not change.", minimum=0.0,
     maximum=1.0, more=True,
 )  # fmt: skip
 PLANE = (
@@ -418,7 +418,7 @@ PLANE = (
     PAIR,
     SHAFT,
     MethodOption(
-        "revolutions", "Path drawn (revolutions)", "count", 2, "The points are of the whole part.",
+        "revolutions", "Path drawn (revolutions)", "count", 2, "The points are from the whole part.",
         choices=verbatim(1, 2, 5, 10, 20, 50, 100),
     ),
     QUANTITY,
@@ -468,7 +468,7 @@ IN_PHASE = {
     ),
     "lyapunov": _row(
         "Lyapunov exponent",
-        "How fast neighbouring paths part: the largest Lyapunov exponent.",
+        "How fast neighbouring paths diverge: the largest Lyapunov exponent.",
         _lyapunov,
         MethodOption(
             "method", "Method", "choice", "rosenstein",
@@ -480,7 +480,7 @@ IN_PHASE = {
         MethodOption("steps", "Steps followed", "count", None, "", "30 mean periods"),
         MethodOption(
             "fit_s", "Fit from, to (s)", "span", None,
-            "Else from where the delayed values overlap no more to where the distance nears that of unrelated points.",
+            "From where delayed values no longer overlap to where the distance nears that of unrelated points.",
             "as the curve suggests",
             unit="s",
         ),
@@ -488,7 +488,7 @@ IN_PHASE = {
     ),
     "recurrence": _row(
         "Recurrence",
-        "Which points of the path come back close to which, and what that measures.",
+        "Which points of the path return close to each other, with measures of it.",
         _recurrence,
         MethodOption(
             "rate_percent", "Recurrence rate (%)", "number", 5.0,
@@ -504,7 +504,7 @@ IN_PHASE = {
     ),
     "chaos-test": _row(
         "0–1 test",
-        "Regular or chaotic, by the 0–1 test, and the walk it rests on.",
+        "Regular or chaotic, by the 0–1 test, and the walk it is based on.",
         _chaos_test,
         MethodOption("of", "Of the", "choice", "section", choices={"section": "Poincaré points", "signal": "signal"}),
         MethodOption(
@@ -525,7 +525,7 @@ IN_PHASE = {
         _kind,
         MethodOption(
             "of", "Asked of", "choice", "signal",
-            "Of displacement and velocity slow motion weighs more; the answers may differ.",
+            "Displacement and velocity give slow motion more weight; the answers may differ.",
             choices={"signal": "Signal as measured", "plane": "Phase plane"},
         ),
         PAIR,

@@ -45,11 +45,11 @@ from gearsig.rig import order_lines
 from gearsig.spectra import Spectrum
 
 SLIP_SHARE = 0.01
-"""Bearings slip by a percent or so."""
+"""Bearings slip by about one per cent."""
 
 
 def cursors_of(prepared: PreparedRecording, shown: Spectrum | OrderMap) -> tuple[Cursor, ...]:
-    """Return the lines that the rig implies, where the speed is known and they are sharp."""
+    """Return the lines that the rig implies, if the speed is known and they are sharp."""
     angle = angle_or_none(prepared)
     if angle is None or (shown.axis == "frequency" and not angle.is_steady()):
         return ()
@@ -57,12 +57,12 @@ def cursors_of(prepared: PreparedRecording, shown: Spectrum | OrderMap) -> tuple
 
 
 def modulations_of(prepared: PreparedRecording, shown: Spectrum) -> tuple[Cursor, ...]:
-    """Return the lines of shafts and bearings that the spectrum of an envelope, or a coherence, may show."""
+    """Return the lines of shafts and bearings that an envelope spectrum or a coherence may show."""
     return modulation_cursors(cursors_of(prepared, shown))
 
 
 def periods_of(prepared: PreparedRecording) -> tuple[Cursor, ...]:
-    """Return where a cepstrum shows what turns: one turn of each shaft and one mesh cycle; none where speed changes."""
+    """Return the quefrencies of one turn of each shaft and of one mesh cycle; none if the speed changes."""
     angle = angle_or_none(prepared)
     if angle is None or not angle.is_steady() or not prepared.rig.shafts:
         return ()
@@ -75,7 +75,8 @@ def periods_of(prepared: PreparedRecording) -> tuple[Cursor, ...]:
 
 
 LONGEST_ECHO_S = 0.005
-"""Below this quefrency a cepstrum shows the path and the floor's shape, a hundred times as large as any family."""
+"""Below this quefrency a cepstrum shows the transmission path and the shape of the floor, a hundred times as large as
+any family."""
 
 
 def columns_of(spectrum: Spectrum) -> dict[str, Any]:
@@ -94,7 +95,7 @@ def _panel(
     values = spectrum.values if linear else plot.above_zero(spectrum.values)
     line = ChartLine(spectrum.positions, values, spectrum.source, peaks=True)
     inside = values[min(3, len(values) - 1) :]
-    if shown is not None and shown[0] < shown[1]:  # what lies elsewhere may be a hundred times as large
+    if shown is not None and shown[0] < shown[1]:  # values elsewhere may be a hundred times as large
         within = values[(spectrum.positions >= shown[0]) & (spectrum.positions <= shown[1])]
         inside = within[3 if shown[0] <= spectrum.positions[0] and len(within) > 9 else 0 :]
         inside = inside if len(inside) else values
@@ -167,18 +168,18 @@ def _order_spectrum(
 # Modulations in noise: envelope, kurtogram, cyclic coherence.
 
 BAND = MethodOption(
-    "band_hz", "Band (Hz)", "span", None, "Whose envelope it is.", "the most impulsive one", unit="Hz", known=top_hz,
+    "band_hz", "Band (Hz)", "span", None, "Band of the envelope.", "the most impulsive one", unit="Hz", known=top_hz,
 )  # fmt: skip
 PREPARATION = MethodOption(
     "preparation", "Signal", "choice", "none",
-    ("Tones removed: steady lines, such as mesh harmonics, are cut down to the floor. Whitened: every line is "
-    "made equally strong, which takes out resonances as well."),
+    ("Tones removed: steady lines, such as mesh harmonics, are reduced to the floor. Whitened: all lines are made "
+    "equally strong, which also removes resonances."),
     choices={"none": "As recorded", "tones removed": "Tones removed", "whitened": "Whitened"},
 )  # fmt: skip
 
 
 def _usual_modulation_hz(prepared: PreparedRecording, channel: str = "") -> float:
-    """Three harmonics of the fastest bearing line and what slip makes of the last; 12 orders where none is known."""
+    """Third harmonic of the fastest bearing line, plus slip, in Hz; 12 orders if no bearing is known."""
     del channel
     rate, rig, angle = prepared.recording.sampling_rate_hz, prepared.rig, angle_or_none(prepared)
     if angle is None:
@@ -190,13 +191,13 @@ def _usual_modulation_hz(prepared: PreparedRecording, channel: str = "") -> floa
 
 HIGHEST_MODULATION = MethodOption(
     "highest_modulation_hz", "Highest modulation (Hz)", "number", None,
-    "The highest frequency sought. Bands must be three times as wide, and the envelope's spectrum ends there.",
+    "The highest frequency of interest. Bands must be three times as wide, and the envelope's spectrum ends there.",
     unit="Hz", known=lambda prepared, channel: f"{_usual_modulation_hz(prepared, channel):.3g}",
 )  # fmt: skip
 
 
 def _over_orders(prepared: PreparedRecording, over: str) -> bool:
-    """Whether lines are orders: as asked, by default where the speed is known and changes."""
+    """Whether lines are orders: as requested, or by default if the speed is known and changes."""
     angle = angle_or_none(prepared)
     return over == "order" or (over == "automatic" and angle is not None and not angle.is_steady())
 
@@ -216,7 +217,7 @@ def _envelope(
     highest: float | None,
 ) -> MethodAnswer:
     usual_hz = _usual_modulation_hz(prepared)
-    banded = spectra.kurtogram_envelope(  # three times as wide, as in the kurtogram: what turns must fit into the band
+    banded = spectra.kurtogram_envelope(  # three times as wide, as in the kurtogram: modulations must fit into the band
         prepared.recording, channel, narrowest_hz=3.0 * usual_hz, band_hz=band_hz
     )
     low, high = banded.envelope.band_hz
@@ -238,7 +239,7 @@ def _envelope_in_blocks(
 ) -> MethodAnswer:
     if band_hz is None:
         raise InputError(
-            "the record is longer than memory, and no band is given",
+            "the record exceeds the memory, and no band is given",
             allowed="--band FROM..TO",
             remedy="gearsig show kurtogram finds one in a part: --from 0s --to 10s",
         )
@@ -258,7 +259,7 @@ def _kurtogram(
     band_hz: tuple[float, float] | None,
     over: str,
 ) -> MethodAnswer:
-    # The band must be wide enough for the highest modulation looked for, and its envelope long enough for a kurtosis.
+    # The band must be wide enough for the highest modulation of interest, and its envelope long enough for a kurtosis.
     recording = prepared.recording
     usual = highest_modulation_hz or _usual_modulation_hz(prepared)
     max_levels = max(1, int(np.log2(max(recording.n_samples / 512.0, 2.0))))
@@ -271,10 +272,10 @@ def _kurtogram(
         ),
     )
     grid, band, envelope, spectrum = chosen.kurtogram, chosen.band, chosen.envelope, chosen.spectrum
-    # Where the speed changes, a modulation's lines stay sharp over orders only.
+    # If the speed changes, a modulation's lines are sharp over orders only.
     if _over_orders(prepared, over):
         spectrum = _envelope_orders(prepared, chosen, usual)
-    # All bands as a table, with the limit that the kurtosis of noise reaches: without it a large number says little.
+    # All bands as a table, with the limit of the kurtosis of noise, without which a large number means little.
     bands = {
         "from (Hz)": grid.low_hz,
         "to (Hz)": grid.high_hz,
@@ -289,15 +290,15 @@ def _kurtogram(
     angle = angle_or_none(prepared)
     if angle is not None and not angle.is_steady():
         warnings.append(
-            "the speed changes: mesh harmonics that pass resonances raise the kurtosis too, without any impact. Trust "
-            "a modulation of the envelope over order, or choose a part of even speed"
+            "the speed changes: mesh harmonics that pass resonances raise the kurtosis, too, without any impact. Trust "
+            "a modulation of the envelope over order, or choose a part of constant speed"
         )
-    # The envelope itself, at its own lower rate, for other methods.
+    # The envelope itself, at its lower sampling rate, for other methods.
     signal = replace(signal_of(prepared, channel), values=envelope.values, rate=envelope.sampling_rate_hz)
     columns = {envelope.source: envelope.values}
     return MethodAnswer(
         channel,
-        "kurtogram: spectral kurtosis of bands; outlined is the most impulsive one that is wide enough",
+        "kurtogram: spectral kurtosis of bands; the most impulsive one that is wide enough is outlined",
         lambda: plot.kurtogram_figure(grid, band),
         bands,
         tables={"envelope spectrum": columns_of(spectrum)},
@@ -322,18 +323,18 @@ def _kurtogram(
 
 
 N_MAP_LINES = 144
-"""Of a kurtogram's map from its widest to its narrowest bands."""
+"""Number of lines of a kurtogram's map, from its widest to its narrowest bands."""
 
 
 def _kurtosis_panel(grid: spectra.Kurtogram, band: spectra.BandCandidate, rate_hz: float) -> LevelPanel:
-    """Spectral kurtosis over frequency, a row for each bandwidth, the widest on top; the chosen band is outlined."""
+    """Return the panel of spectral kurtosis: a row per bandwidth, the widest on top, and the chosen band outlined."""
     levels = -np.unique(grid.level)[::-1]  # ascending in bandwidth
     n = 3 * 2 ** int(np.ceil(-levels.min()))
     at = (np.arange(n) + 0.5) * rate_hz / 2.0 / n
     rows = np.zeros((len(levels), n))
     for low, high, level, value in zip(grid.low_hz, grid.high_hz, grid.level, grid.kurtosis, strict=True):
         rows[np.searchsorted(levels, -level), (at >= low) & (at < high)] = value
-    # Levels are not equally far apart: the row of each reaches halfway to its neighbours, over many lines of the map.
+    # Levels are unequally spaced: the row of each reaches halfway to its neighbours, over many lines of the map.
     halves = np.diff(levels) / 2.0 if len(levels) > 1 else np.array([0.5])
     edges = np.concatenate([levels[:1] - halves[:1], levels[:-1] + np.diff(levels) / 2.0, levels[-1:] + halves[-1:]])
     middles = edges[0] + (np.arange(N_MAP_LINES) + 0.5) * (edges[-1] - edges[0]) / N_MAP_LINES
@@ -354,7 +355,7 @@ def _kurtosis_panel(grid: spectra.Kurtogram, band: spectra.BandCandidate, rate_h
 
 
 def _envelope_orders(prepared: PreparedRecording, chosen: spectra.ChosenBand, highest_hz: float) -> Spectrum:
-    """Return the spectrum of an envelope over orders, up to what the highest modulation is at the mean speed."""
+    """Return the spectrum of an envelope over orders, up to the highest modulation at the mean speed."""
     envelope, angle = chosen.envelope, prepared.shaft_angle
     values = envelope.values - envelope.values.mean()
     alone = Recording(values[None, :], envelope.sampling_rate_hz, (Channel(envelope.source, "unknown", envelope.unit),))
@@ -366,7 +367,7 @@ def _envelope_orders(prepared: PreparedRecording, chosen: spectra.ChosenBand, hi
 
 
 MAX_CELLS = 1 << 22
-"""Of a coherence: 100 MB."""
+"""Maximum number of cells of a coherence: 100 MB."""
 
 
 def _coherence(
@@ -379,7 +380,7 @@ def _coherence(
     band_hz: tuple[float, float] | None,
     odds: int,
 ) -> MethodAnswer:
-    # How large the result is follows from the highest modulation frequency: refused before it is computed.
+    # The size of the result follows from the highest modulation frequency: refuse before computing.
     recording = prepared.recording
     over_orders = _over_orders(prepared, over)
     usual_hz = _usual_modulation_hz(prepared)
@@ -400,7 +401,7 @@ def _coherence(
         )
 
     coherence = prepared.keep(("methods", "coherence", channel, over_orders, preparation, top, n_bands), compute)
-    # Only lines above what noise reaches are marked on the map; its colours begin at the level of one cell in 1000.
+    # Only lines above the level of noise are marked on the map; its colours begin at the level of one cell in 1000.
     mean = spectra.enhanced_envelope(coherence, band_hz, probability=1.0 / odds)
     spectrum = mean.spectrum
     cursors = modulations_of(prepared, spectrum)
@@ -436,7 +437,7 @@ def _coherence(
 
 
 def _above_noise(mean: spectra.EnhancedEnvelope, cursors: Sequence[Cursor]) -> dict[Cursor, float]:
-    """Return the lines of shafts and bearings that stand above noise's level, and where each one's peak lies."""
+    """Return the lines of shafts and bearings above the level of noise, with the position of their peaks."""
     spectrum, peaks = mean.spectrum, dict[Cursor, float]()
     first, end = float(spectrum.positions[0]), float(spectrum.positions[-1])
     for cursor in cursors:
@@ -450,8 +451,8 @@ def _above_noise(mean: spectra.EnhancedEnvelope, cursors: Sequence[Cursor]) -> d
 
 def _cursor_texts(peaks: dict[Cursor, float], cursors: Sequence[Cursor], resolution: float) -> tuple[str, ...]:
     if not peaks:
-        return ("No line of a shaft or bearing stands above noise's level.",)
-    # A bearing line whose peak lies on a multiple of a shaft's speed may be a mesh or its sidebands.
+        return ("No line of a shaft or bearing is above the level of noise.",)
+    # A bearing line whose peak is at a multiple of a shaft's speed may be a mesh or its sidebands.
     speeds = [cursor.position / cursor.number for cursor in cursors if cursor.kind == "shaft"]
 
     def on_multiple(cursor: Cursor) -> bool:
@@ -463,12 +464,12 @@ def _cursor_texts(peaks: dict[Cursor, float], cursors: Sequence[Cursor], resolut
 
     apart = [cursor for cursor in peaks if on_multiple(cursor)]
     remaining = [cursor for cursor in peaks if cursor not in apart]
-    text = ["Above noise's level means that there is modulation, not that there is damage: healthy gears modulate too."]
+    text = ["A line above noise shows that there is modulation, not that there is damage: healthy gears modulate, too."]
     if remaining:
-        text.append(f"Lines that stand above noise's level, bearings' within 1 % for their slip: {names(remaining)}.")
+        text.append(f"Lines above the level of noise, those of bearings within 1 % for slip: {names(remaining)}.")
     if apart:
         text.append(
-            "Bearing lines whose peak lies on a multiple of a shaft's speed, which meshes and shafts cause as well: "
+            "Bearing lines whose peak is at a multiple of a shaft's speed, which meshes and shafts also cause: "
             f"{names(apart)}."
         )
     return tuple(text)
@@ -481,7 +482,7 @@ def _deconvolution(
     x, fs = recording.values(channel), recording.sampling_rate_hz
     warnings, modulation = list[str](), ""
     notes: tuple[str, ...] = (
-        "It makes something impulsive of any noise: other rates must be less alike. Levels are not kept.",
+        "It makes any noise impulsive: other rates must give less likeness. Levels are not kept.",
     )
     if by == "multipoint":
         if rate_hz is None:
@@ -489,16 +490,16 @@ def _deconvolution(
             suggested_hz = suggested_rate_hz(analysis)
             rate_hz, modulation = suggested_hz or ASSUMED_RATE_HZ, "as found in the recording" if suggested_hz else ""
         if not rate_hz:
-            raise RefusalError("no rate of the impacts is given", remedy="give how often they come, above 0 Hz")
+            raise RefusalError("no impact rate is given", remedy="give the impacts per second, above 0 Hz")
         modulation = modulation_at(prepared, rate_hz) or modulation
         if not modulation and rate_hz == ASSUMED_RATE_HZ:
             warnings.append(
                 f"{rate_hz:g} impacts per second are assumed: nothing is suspected, and no bearing or shaft is "
-                "described whose rate could be taken. Give the rate that you seek"
+                "described whose rate could be used. Give the rate of interest"
             )
         angle = angle_or_none(prepared)
         if angle is not None and not angle.is_steady():
-            warnings.append("the speed changes, and the rate of impacts with it: choose a part of even speed")
+            warnings.append("the speed changes, and the rate of impacts with it: choose a part of constant speed")
         result = spectra.multipoint_deconvolution(x, fs, 1.0 / rate_hz, n_taps=taps)
         facts: tuple[str, ...] = (_train_fact(f"{rate_hz:.5g} Hz", result.score, taps, len(x)),)
         if modulation:  # a shaft's name has no place in a fact
@@ -522,7 +523,7 @@ def _deconvolution(
     )
     return MethodAnswer(
         channel,
-        "impacts sharpened by a filter that undoes their path",
+        "impacts sharpened by a filter that inverts their path",
         lambda: plot.panels_figure([panel], title=f"{channel}: impacts sharpened"),
         waveforms.table(),
         numbers={"score": result.score},
@@ -534,10 +535,10 @@ def _deconvolution(
 
 
 def _train_fact(train: str, score: float, taps: int, n_samples: int) -> str:
-    """Say whether a train of impacts is in a signal more than in white noise.
+    """Say whether a signal contains a train of impacts more clearly than white noise.
 
-    The square of the norm is there the share of a random direction that lies in a space of `taps` among `n_samples`
-    dimensions: a beta distribution of mean taps/n and of relative deviation √(2/taps). Three of them are more than
+    For white noise, the square of the norm is the share of a random direction in a subspace of `taps` of `n_samples`
+    dimensions: a beta distribution with mean taps/n and relative deviation √(2/taps). Three deviations are more than
     chance.
     """
     chance = np.sqrt(taps / n_samples)
@@ -550,16 +551,16 @@ def _train_fact(train: str, score: float, taps: int, n_samples: int) -> str:
 
 N_IMPACTS_SHOWN = 5
 ASSUMED_RATE_HZ = 100.0
-"""Rate of impacts where nothing tells one."""
+"""Impact rate if nothing suggests one."""
 
 
 def suggested_rate_hz(analysis: Analysis) -> float | None:
-    """Return how often impacts come, by what was found of the machine; else by its description; None without either.
+    """Return the impact rate in Hz suggested by the findings, else by the machine's description; None without either.
 
-    The first of: impacts that a finding names; turns of the shaft of a damaged tooth; elements that pass the outer race
-    of the first bearing, which is damaged most often; turns of the reference shaft.
+    The first of: impacts named by a finding; turns of the shaft of a damaged tooth; elements passing the outer race of
+    the first bearing, the race most often damaged; turns of the reference shaft.
     """
-    # what has changed since a reference stands at a part's kinematic rate, from which a bearing slips
+    # changes since a reference are at a part's kinematic rate, from which a bearing deviates by slip
     for finding in sorted(analysis.findings, key=lambda finding: finding.code == CHANGED):
         if finding.where.band_hz is not None and finding.where.frequency_hz:
             return finding.where.frequency_hz
@@ -583,7 +584,7 @@ def suggested_rate_hz(analysis: Analysis) -> float | None:
 
 
 def modulation_at(prepared: PreparedRecording, rate_hz: float) -> str:
-    """Name the bearing line or the shaft that a rate is of, bearings within their slip; empty where there is none."""
+    """Return the name of the bearing line (within its slip) or shaft at a rate; empty if there is none."""
     angle = angle_or_none(prepared)
     if angle is None or angle.mean_speed_rpm <= 0:
         return ""
@@ -657,7 +658,7 @@ def _speed(prepared: PreparedRecording, channel: str) -> MethodAnswer:
 
 WHOLE = {
     "waveform": Method("Waveform", "The signal over time.", _waveform),
-    "speed": Method("Speed", "The speed that everything over angle rests on.", _speed),
+    "speed": Method("Speed", "The speed on which everything over angle is based.", _speed),
     "spectrum": Method("Spectrum", "Tones and their amplitudes.", _spectrum, IN_HZ),
     "density": Method(
         "Density", "Noise over frequency.", _density, IN_HZ, "Spectrum", 1_000_000, 20_000_000,
@@ -679,7 +680,7 @@ WHOLE = {
     "average": Method(
         "Synchronous average", "The mean revolution of a shaft.", _average, (SHAFT,), in_blocks=_average_in_blocks,
     ),
-    "indicators": Method("Indicators", "Every condition indicator of the channel.", _indicators),
+    "indicators": Method("Indicators", "All condition indicators of the channel.", _indicators),
 }  # fmt: skip
 MODULATIONS = {
     "envelope": Method(
@@ -688,7 +689,7 @@ MODULATIONS = {
     ),
     "kurtogram": Method(
         "Kurtogram",
-        "Finds the band that carries impacts, and how often they repeat: the spectrum of its envelope.",
+        "Finds the band that contains impacts, and their rate by the spectrum of its envelope.",
         _kurtogram,
         (
             PREPARATION,
@@ -696,7 +697,7 @@ MODULATIONS = {
             HIGHEST_MODULATION,
             MethodOption(
                 "levels", "Levels", "count", None,
-                "The spectrum is cut into up to 2 to the power of it bands, and into thirds of these.", "up to 7",
+                "The spectrum is divided into up to 2 to the power of it bands, and into thirds of these.", "up to 7",
                 more=True,
             ),
             _MODULATION_OVER,
@@ -707,7 +708,7 @@ MODULATIONS = {
     ),
     "coherence": Method(
         "Cyclic coherence",
-        "Finds modulations in noise and in which band they are, also where no band stands out: for bearings and wear.",
+        "Finds modulations in noise and their band, even if no band stands out: for bearings and wear.",
         _coherence,
         (
             _MODULATION_OVER,
@@ -718,18 +719,18 @@ MODULATIONS = {
             ),
             MethodOption(
                 "highest", "Highest modulation frequency (Hz or order)", "number", None,
-                "The highest modulation frequency sought. Carriers below half of it are left out.",
+                "The highest modulation frequency of interest. Carriers below half of it are left out.",
                 "three harmonics of the fastest bearing line",
             ),
             MethodOption(
                 "n_bands", "Carrier bands", "count", 64,
-                "Fewer bands average more and find weaker modulation; more show better where its carrier is.",
+                "Fewer bands average more and find weaker modulation; more bands locate its carrier better.",
                 choices=verbatim(8, 16, 32, 64, 128, 256),
             ),
             replace(BAND, label="Carriers averaged (Hz)", about="", empty="all"),
             MethodOption(
-                "odds", "Noise passes the level in 1 line of", "count", 100,
-                "How often noise alone passes the dashed line.",
+                "odds", "Noise exceeds the level in 1 line of", "count", 100,
+                "How often noise alone exceeds the dashed line.",
                 choices=verbatim(20, 100, 1000, 10_000), minimum=2, more=True,
             ),
         ),
@@ -739,14 +740,14 @@ MODULATIONS = {
     ),
     "deconvolution": Method(
         "Deconvolution",
-        "Undoes the path between impacts and sensor, so that each is sharp again: for bearings that ring long. "
+        "Inverts the path between impacts and sensor, so that each impact is sharp again: for bearings that ring long. "
         "If there is such a train, the sharpened signal shows needles one period apart.",
         _deconvolution,
         (
             MethodOption(
                 "by", "Filter", "choice", "multipoint",
-                ("Multipoint: nearest to a train of impacts of a known rate. Minimum entropy: most impulsive, "
-                "whatever it is."),
+                ("Multipoint: closest to a train of impacts of known rate. Minimum entropy: most impulsive, whatever "
+                "the rate."),
                 choices={"multipoint": "Multipoint", "minimum-entropy": "Minimum entropy"},
             ),
             MethodOption(
@@ -755,7 +756,7 @@ MODULATIONS = {
             ),
             MethodOption(
                 "rate_hz", "Impacts per second (Hz)", "number", None,
-                "How often an impact comes, e.g. how often elements pass a race.",
+                "Rate of the impacts, e.g. of elements passing a race.",
                 "as found, else as the machine's description says", unit="Hz", minimum=0.0,
                 suggested=suggested_rate_hz,
             ),

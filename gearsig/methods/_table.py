@@ -1,4 +1,4 @@
-"""A method of the table: its options, its answer, how it is applied to a part of one channel."""
+"""A method of the table: its options, its answer, and its application to a part of one channel."""
 
 from __future__ import annotations
 
@@ -19,39 +19,39 @@ from gearsig.recording import Channel, Provenance, Recording
 from gearsig.timefreq import Axis, UniformSignal, at_label, uniform
 
 Table = Mapping[str, NDArray[Any]]
-"""Title with unit → column; all of one length."""
+"""Title with unit → column; all of equal length."""
 Kind = Literal["choice", "switch", "number", "count", "span", "numbers", "name", "text"]
 
 
 @dataclass(frozen=True)
 class MethodOption:
-    """Something that a method is asked for: an option of the command line, a widget of the dashboard.
+    """An option of a method: an option of the command line, and a widget of the dashboard.
 
     Parameters
     ----------
     name : str
         Keyword of the method.
     label : str
-        Of the widget; not from a file.
+        Label of the widget; not from a file.
     kind : str
         "choice" of few, "switch", "number", "count", a "span" of two numbers, several "numbers", the "name" of a shaft
         or pair, or "text".
     default : object
-        None: as the method decides, which `empty` says in words.
+        None: the method decides, as described by `empty`.
     about, empty : str
     choices : mapping
-        Value → text: of a choice all there are, of a number or count those of a slider.
+        Value → text: all values of a choice, or those on the slider of a number or count.
     unit : str
         Of numbers.
     minimum, maximum : float or None
-        Both included.
+        Inclusive limits.
     known : callable or None
-        Prepared recording and channel → what this recording offers: names, value → text of numbers, ends of a span;
-        or the text that stands for None in a number.
+        Prepared recording and channel → what this recording offers: names, value → text for numbers, ends of a span;
+        or the text for None in a number.
     more : bool
-        Seldom needed.
+        Rarely needed.
     suggested : callable or None
-        Analysis → the value that what it found, or the machine's description, suggests; None: none.
+        Analysis → value suggested by its findings or the machine's description; None: none.
     """
 
     name: str
@@ -69,7 +69,7 @@ class MethodOption:
     suggested: Callable[[Analysis], Any] | None = None
 
     def check(self, value: Any) -> None:
-        """Raise an `InputError` for a value that the option does not allow."""
+        """Raise an `InputError` if the option does not allow a value."""
         if value is None:
             return
         if self.kind == "choice":
@@ -86,26 +86,26 @@ class MethodOption:
 
 @dataclass(frozen=True)
 class Waveforms:
-    """Signals of equal length at equal steps of time or angle.
+    """Signals of equal length, sampled at equal steps of time or angle.
 
     Parameters
     ----------
     columns : mapping
-        Name → samples, (n_samples,): the signal, and what was made of it.
+        Name → samples, (n_samples,): the signal, and signals derived from it.
     rate : float
         Samples per second, or per revolution of `shaft`.
     start : float
         Time or angle of the first sample.
     unit, quantity : str
     step : str
-        What was done to the signal, for the history of a file.
+        Description of the processing, for the history of a file.
     axis : str
         "frequency" for signals over time, "order" for those over angle.
     shaft, residual, shown_first : str
-        Residual: the column that remains of the signal, if there is one. Shown first: the column that the answer
-        speaks of; empty: the first.
+        Residual: the column with the rest of the signal, if there is one. Shown first: the column that the answer
+        refers to; empty: the first.
     first_length : float or None
-        Of the first view, in s or revolutions; None: a few mesh cycles.
+        Length of the initial view, in s or revolutions; None: a few mesh cycles.
     """
 
     columns: Mapping[str, FloatArray]
@@ -122,7 +122,7 @@ class Waveforms:
 
     @property
     def n_samples(self) -> int:
-        """Samples of each."""
+        """Number of samples of each."""
         return len(next(iter(self.columns.values())))
 
     @property
@@ -131,16 +131,16 @@ class Waveforms:
         return self.start + self.n_samples / self.rate
 
     def at(self, part: slice = slice(None)) -> FloatArray:
-        """Return time in s or angle in revolutions of some samples."""
+        """Return the time in s or angle in revolutions of some samples."""
         result: FloatArray = self.start + np.arange(self.n_samples)[part] / self.rate
         return result
 
     def table(self) -> dict[str, FloatArray]:
-        """Return the columns with their time or angle before them."""
+        """Return the columns, preceded by their time or angle."""
         return {at_label(self.axis, self.shaft): self.at(), **self.columns}
 
     def recording(self) -> Recording:
-        """Return waveforms over time as a recording, one channel each; its time begins at 0."""
+        """Return waveforms over time as a recording with one channel each; its time starts at 0."""
         return Recording(
             np.stack(list(self.columns.values())),
             self.rate,
@@ -151,7 +151,7 @@ class Waveforms:
 
 @dataclass(frozen=True)
 class MethodAnswer:
-    """What a method found in one channel.
+    """The result of a method for one channel.
 
     Parameters
     ----------
@@ -159,21 +159,21 @@ class MethodAnswer:
     draw : callable
         Returns the figure.
     table : mapping
-        Title with unit → column; all of one length.
+        Title with unit → column; all of equal length.
     tables : mapping
-        What it holds → another table.
+        Title → further table.
     matrices : mapping
-        Name → array of two dimensions, for maps: their rows and columns are named by `axes`.
+        Name → two-dimensional array, for maps; `axes` names their rows and columns.
     axes : mapping
         Title with unit → positions of the rows or columns of the matrices.
     numbers : mapping
-        What else is known: settings, counts.
+        Further values: settings, counts.
     panels : sequence of LinePanel or LevelPanel
-        The figure, to be zoomed; empty: the figure is a picture.
+        The figure as zoomable panels; empty: only a static figure.
     path : array, (n, 3), or None
-        In space, to be turned.
+        A path in space, to be rotated.
     facts, notes, warnings : sequence of str
-        What was found, how it is read, what to check.
+        Findings, hints for interpretation, and points to check.
     waveforms : Waveforms or None
     method : str
         Set by `apply_method`.
@@ -203,21 +203,21 @@ class Method:
     Parameters
     ----------
     title, about : str
-        Its name on a page; what it shows, in a sentence.
+        Its name on a page, and a sentence on what it shows.
     answer : callable
         Prepared recording, channel and the options by name → answer.
     options : sequence of MethodOption
     view : str
-        View of the chain that shows it; empty: a view of its own shows the same.
+        View of the chain that shows it; empty: a separate view shows the same.
     n_first, n_max : int
-        Samples that a page analyses at first, and at most: a few seconds.
+        Initial and maximum number of samples that a page analyses: a few seconds.
     limit : callable or None
-        Options → samples, where they decide how many a page can analyse.
+        Options → maximum samples that a page can analyse, if it depends on them.
     bytes_per_sample : float or callable
-        What it takes of memory besides the recording, at most, for each sample of the part; or options → that.
+        Maximum memory in addition to the recording, per sample of the part; or options → that.
     in_blocks : callable or None
-        Of records longer than memory: blocks, a prepared recording that knows rig and angle alone, channel and the
-        options by name → answer.
+        For records larger than memory: blocks, a prepared recording with only rig and angle, channel and the options
+        by name → answer.
     """
 
     title: str
@@ -233,7 +233,7 @@ class Method:
 
 
 def usual_channel(recording: Recording, name: str = "") -> str:
-    """Return the channel of that name; by default the first acceleration, else the first that is no tachometer's."""
+    """Return the channel of that name; by default the first acceleration, else the first that is not a tachometer."""
     if name:
         return recording.channels[recording.index(name)].name
     order = ("acceleration", "velocity", "displacement", "transmission_error", "sound_pressure")
@@ -246,14 +246,14 @@ def usual_channel(recording: Recording, name: str = "") -> str:
 
 
 def part_of(prepared: PreparedRecording, start_s: float, end_s: float, channel: str = "") -> PreparedRecording:
-    """Return a part of a recording, with the whole recording's angle of that time.
+    """Return a part of a recording, with the angle of that part from the whole recording.
 
     Parameters
     ----------
     prepared : PreparedRecording
     start_s, end_s : float
     channel : str
-        The only one that is kept; empty: all.
+        The only one to keep; empty: all.
     """
     whole = prepared.recording
     part = whole.between(start_s, end_s)
@@ -271,7 +271,7 @@ def part_of(prepared: PreparedRecording, start_s: float, end_s: float, channel: 
 
 
 def angle_or_none(prepared: PreparedRecording) -> ShaftAngle | None:
-    """Return the shaft's angle; None where the speed is not known."""
+    """Return the shaft's angle; None if the speed is not known."""
     try:
         return prepared.shaft_angle
     except (InputError, RefusalError):
@@ -302,7 +302,7 @@ def waveforms_of(
     shown_first: str = "",
     first_length: float | None = None,
 ) -> Waveforms:
-    """Return waveforms on the axis and in the unit of a signal that was made of a channel."""
+    """Return waveforms with the axis and unit of a signal derived from a channel."""
     measured = prepared.recording.channels[prepared.recording.index(channel)]
     same = signal.unit == measured.unit and signal.source == channel
     return Waveforms(
@@ -312,13 +312,13 @@ def waveforms_of(
 
 
 def verbatim(*values: Any) -> dict[Any, str]:
-    """Return choices that are shown as they are written."""
+    """Return choices whose texts are the values themselves."""
     return {value: str(value) for value in values}
 
 
 OVER_ANGLE = MethodOption(
     "over_angle", "Over", "switch", False,
-    "Over the shaft's angle lines are orders: a change of speed does not smear.",
+    "Over the shaft's angle, lines are orders, which changes of speed do not smear.",
 )  # fmt: skip
 SHAFT = MethodOption(
     "shaft", "Shaft", "name", "", empty="the reference shaft", more=True,

@@ -33,11 +33,11 @@ TRANSFORMS = ("cwt", "squeezed-cwt", "stft", "squeezed-stft")
 """Transforms of the method time-frequency, and of a chosen mode."""
 NAMES = {"stft": "Fourier", "cwt": "Wavelet", "squeezed-stft": "Squeezed Fourier", "squeezed-cwt": "Squeezed wavelet"}
 OCTAVES = 8.0
-"""Of wavelet maps; lower lines are mostly the ends' doing."""
+"""Range of wavelet maps; lower lines are mostly effects of the ends."""
 TRANSFORM = MethodOption(
     "transform", "Transform", "choice", "cwt",
-    ("Fourier: the same window for all lines, for steady lines and sidebands. Wavelet: short in time at high, "
-    "sharp at low frequencies, for impacts. Squeezed: each component is concentrated at its momentary frequency; "
+    ("Fourier: the same window for all lines, for steady lines and sidebands. Wavelet: short in time at high and "
+    "sharp at low frequencies, for impacts. Squeezed: each component is concentrated at its instantaneous frequency; "
     "sharp for a few clear components, not for noise or impacts."),
     choices=NAMES,
 )  # fmt: skip
@@ -46,17 +46,17 @@ MAP_OPTIONS = (
     *LINES,
     MethodOption(
         "periods", "Periods in the wavelet", "number", None,
-        "More tell close frequencies apart, fewer show impacts sharper in time.", "2.5", minimum=0.5, maximum=100.0,
+        "More separate close frequencies, fewer show impacts sharper in time.", "2.5", minimum=0.5, maximum=100.0,
         more=True,
     ),
     MethodOption(
         "window", "Window (s or revolutions)", "number", None,
-        "Longer ones tell close lines apart, shorter ones show changes sooner.", "by the length of the part",
+        "Longer ones separate close lines, shorter ones show changes sooner.", "by the length of the part",
         minimum=0.0, more=True,
     ),
     MethodOption(
         "reduction", "Each column", "choice", "mean",
-        "A column holds many samples: their mean power, or the largest one, which keeps the height of impacts.",
+        "A column covers many samples: their mean power, or the maximum, which keeps the height of impacts.",
         choices={"mean": "Mean", "max": "Largest"}, more=True,
     ),
     MethodOption(
@@ -69,7 +69,7 @@ MAP_OPTIONS = (
 
 
 def wavelet_of(periods: float | None) -> Morse:
-    """Return the Morse wavelet of so many periods, √(3β)/π."""
+    """Return the Morse wavelet of √(3β)/π periods."""
     return Morse() if periods is None else Morse(beta=float(round((np.pi * periods) ** 2 / 3.0)))
 
 
@@ -126,12 +126,12 @@ def levels_answer(
         axes={levels.at_label: levels.at, levels.axis_label: levels.positions},
         numbers={"scaling": levels.scaling, "unit": levels.unit, "transform": levels.method, **numbers},
         panels=(panel,),
-        notes=("Between the dotted lines and the ends, a level depends on what is assumed outside of the part.",),
+        notes=("Between the dotted lines and the ends, levels depend on the assumed continuation of the signal.",),
     )
 
 
 def _edges(levels: TimeFrequencyMap) -> list[ChartLine]:
-    """How far what is assumed outside of the signal reaches into the map, by ascending place."""
+    """Return the lines up to which the assumed continuation of the signal affects the map, by ascending position."""
     inside = levels.edge < (levels.at[-1] - levels.at[0]) / 2
     reach, at = levels.edge[inside], levels.positions[inside]
     order = np.argsort(reach, kind="stable")
@@ -140,7 +140,7 @@ def _edges(levels: TimeFrequencyMap) -> list[ChartLine]:
 
 
 def _signal(prepared: PreparedRecording, channel: str, options: dict[str, Any]) -> UniformSignal:
-    """Return the channel over time or angle; orders end past the meshes unless more are asked for."""
+    """Return the channel over time or angle; orders end just past the meshes unless more are requested."""
     over_angle = bool(options.pop("over_angle"))
     signal = signal_of(prepared, channel, over_angle=over_angle, shaft=str(options.pop("shaft")))
     if over_angle and options["highest"] is None:
@@ -175,7 +175,7 @@ def _ridges(
     signal = _signal(prepared, channel, options)
     levels = prepared.keep(key, lambda: levels_of(signal, transform, **options))
     ridges = timefreq.ridges(levels, n_ridges, stiffness=bends, steepest=steepest)
-    # Each component is taken out of the signal, not of what earlier ones left: their order must not matter.
+    # Each component is extracted from the signal, not from the residual of earlier ones: their order must not matter.
     first, wavelet = ridges[0], wavelet_of(options["periods"])
     columns: dict[str, FloatArray] = {"signal": signal.values}
     residual = signal.values.astype(np.float64)
@@ -210,7 +210,7 @@ def _ridges(
         ),
         (
             "A component is the sum of the wavelet coefficients in the band around its ridge. Where bands of two "
-            "ridges overlap, both components hold what lies there."
+            "ridges overlap, both components contain the overlap."
         ),
     ]
     if len(ridges) < n_ridges:
@@ -227,7 +227,7 @@ def _ridges(
 
 def _limit(options: Mapping[str, Any]) -> int:
     if options["engine"] != "gearsig":
-        return 100_000  # it holds the whole matrix of lines and samples several times
+        return 100_000  # it keeps several copies of the whole matrix of lines and samples
     return {"stft": 20_000_000, "cwt": 10_000_000, "squeezed-stft": 4_000_000}.get(options["transform"], 2_000_000)
 
 
@@ -277,7 +277,7 @@ def _packets(
         panels=(panel, *answer.panels),
         facts=(
             (
-                f"**{packets.n_bands} nodes**, each {packets.band_width:.5g} {unit} wide. Together they hold the "
+                f"**{packets.n_bands} nodes**, each {packets.band_width:.5g} {unit} wide. Together they contain the "
                 f"part's energy, rms {rms}; its mean is in the first."
             ),
         ),
@@ -307,7 +307,7 @@ def _energies(packets: WaveletPackets) -> dict[str, Any]:
 MAPS = {
     "time-frequency": Method(
         "Time–frequency",
-        "Levels over time and frequency, or over shaft angle and order: shows what comes and goes, and what sweeps.",
+        "Levels over time and frequency, or over shaft angle and order: shows transient and sweeping components.",
         _time_frequency,
         (TRANSFORM, *MAP_OPTIONS),
         "Time–frequency",
@@ -317,20 +317,20 @@ MAPS = {
     ),
     "ridges": Method(
         "Ridges",
-        "Follows components along their momentary frequency or order, and gives each one's waveform.",
+        "Follows components along their instantaneous frequency or order, and gives the waveform of each.",
         _ridges,
         (
             MethodOption("transform", "Transform", "choice", "squeezed-cwt", choices=NAMES),
             MethodOption("n_ridges", "Ridges", "count", 2, choices=verbatim(*range(1, 7)), maximum=12),
             MethodOption(
                 "bends", "Penalty on bends", "number", 1.0,
-                "Price of changes of slope: raise it for sweeps in noise, lower it for fast modulation.",
+                "Cost of changes of slope: raise it for sweeps in noise, lower it for fast modulation.",
                 choices={x: f"{x:g}" for x in (0.0, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0)}, minimum=0.0,
                 more=True,
             ),
             MethodOption(
                 "steepest", "Steepest (lines per column)", "number", 2.0,
-                "How many lines of the map a ridge may rise or fall from one of its thousand columns to the next.",
+                "Number of lines by which a ridge may rise or fall from one of the map's thousand columns to the next.",
                 choices={x: f"{x:g}" for x in (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)}, minimum=0.0, more=True,
             ),
             MethodOption(
@@ -340,8 +340,8 @@ MAPS = {
             ),
             MethodOption(
                 "assigned", "Assigned", "choice", "frequency",
-                "By its momentary frequency: keeps more noise out, and fast modulation too. By its lines: smoother.",
-                choices={"frequency": "By its momentary frequency", "lines": "By its lines"}, more=True,
+                "By its instantaneous frequency: rejects more noise, but also fast modulation. By its lines: smoother.",
+                choices={"frequency": "By its instantaneous frequency", "lines": "By its lines"}, more=True,
             ),
             *MAP_OPTIONS,
         ),
@@ -351,22 +351,22 @@ MAPS = {
     ),
     "wavelet-packets": Method(
         "Wavelet packets",
-        "Splits the signal into bands of equal width, says how the energy spreads over them, and gives any of them.",
+        "Splits the signal into bands of equal width, and gives the energy of each and the waveforms of any.",
         _packets,
         (
             MethodOption(
                 "wavelet", "Wavelet", "choice", "sym12",
-                "Long wavelets separate bands better; nearly symmetric ones (sym, dmey) show an event when it was.",
+                "Long wavelets separate bands better; nearly symmetric ones (sym, dmey) show events at the right time.",
                 choices=verbatim(*PACKET_WAVELETS),
             ),
             MethodOption(
                 "level", "Level", "count", 4,
-                "The signal is split so often into halves: 2 to the power of it nodes of equal width.",
+                "How often the signal is split into halves: 2 to the power of it nodes of equal width.",
                 choices=verbatim(*range(1, 9)), maximum=12,
             ),
             MethodOption(
                 "nodes", "Waveform of the nodes", "numbers", (),
-                "From 0 upwards in frequency. Several are added up; all of them together make the signal.",
+                "From 0 upwards in frequency. Several are added; all of them together make up the signal.",
                 "the strongest", known=lambda *_: {},
             ),
             OVER_ANGLE,

@@ -1,4 +1,4 @@
-"""Measured motion of both gears of a pair: forces between the teeth, impacts, backlash, start–stop indicators."""
+"""Measured motion of both gears of a pair: tooth forces, impacts, backlash, start–stop indicators."""
 
 from gearsig.motion._backlash import dependence, estimate_backlash, torque_twist
 from gearsig.motion._force import (

@@ -1,4 +1,4 @@
-"""Backlash from reversals of a loaded gear pair: where the flanks would touch without load."""
+"""Backlash from load reversals of a gear pair: where the flanks would touch without load."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ from gearsig.motion._segments import MotionSegments
 from gearsig.results import Result
 
 MIN_SAMPLES = 12
-"""On either flank."""
+"""On each flank."""
 
 
 @dataclass(frozen=True)
 class BacklashEstimate(Result):
-    """Play between the flanks.
+    """Backlash between the flanks.
 
     Parameters
     ----------
     backlash_um : float
         2a along the line of action, from flank to flank, without load.
     uncertainty_um : float
-        One standard deviation, with the samples' dependence on each other.
+        One standard deviation, allowing for correlation between samples.
     datum_m : float
-        Compression in the middle of the play.
+        Compression at the middle of the backlash.
     stiffness_n_per_m_lambda : float
-        Of one tooth pair, that came out with it; nan where it was taken from the rig.
+        Stiffness of one tooth pair, from the same fit; nan where none was fitted.
     n_drive, n_back : int
-        Samples on either flank.
+        Number of samples on each flank.
     scatter_um : float
-        Of the samples around the fit.
+        Standard deviation of the samples around the fit.
     method : str
     """
 
@@ -51,24 +51,24 @@ class BacklashEstimate(Result):
 def estimate_backlash(motion: PairMotion) -> BacklashEstimate:
     """Estimate the backlash from a motion that loads both flanks.
 
-    With torque, q = q₀ + s a + s κ (|F|/n)^{1/λ} is fitted to all loaded samples: s the sign of F = (τ − J1 α1)/r_b1, n
-    the pairs in contact, and κ = k^{−1/λ} free, so that the elastic part is measured and not taken from the rig.
-    Outliers beyond four standard deviations are left out. Without torque, the distance between the middle positions on
-    both flanks is given: it contains the deflection of both.
+    With torque, q = q₀ + s a + s κ (|F|/n)^{1/λ} is fitted to all loaded samples: s is the sign of
+    F = (τ − J1 α1)/r_b1, n the number of pairs in contact, and κ = k^{−1/λ} a free parameter, so that the elastic part
+    is measured and not taken from the rig. Outliers beyond four standard deviations are left out. Without torque, the
+    result is the distance between the median positions on both flanks, which includes the deflection of both.
 
     Raises
     ------
     RefusalError
-        If only one flank was loaded, as there was no reversal; or neither, as the machine stood.
+        If only one flank was loaded because there was no reversal, or neither because the machine stood still.
 
     Notes
     -----
-    The interval knows the noise of the angles, not eccentric gears or bent shafts, which move q within a revolution.
+    The uncertainty covers noise of the angles, but not eccentric gears or bent shafts, which vary q in a revolution.
     """
     force = motion.tooth_force_from_torque_n
     if force is None:
         return _lost_motion(motion)
-    # From a tenth of the ordinary load on a sample tells where a flank is.
+    # Samples above a tenth of the typical load show where a flank is.
     loaded = np.abs(force) > 0.1 * float(np.quantile(np.abs(force), 0.9))
     side = np.sign(force)
     _check_sides(int(np.sum(loaded & (side > 0))), int(np.sum(loaded & (side < 0))))
@@ -85,7 +85,7 @@ def _fitted(motion: PairMotion, design: FloatArray, loaded: NDArray[np.bool_]) -
         x, *_ = np.linalg.lstsq(design[keep], q[keep], rcond=None)
         residual = q - design @ x
         scatter = median_deviation(residual[keep]) or float(np.finfo(float).tiny)
-        # What is four standard deviations off is left out: the middle of a blow, a slipped count.
+        # Leave out what is more than four standard deviations off: the middle of an impact, a slipped count.
         again = loaded & (np.abs(residual) < 4.0 * scatter)
         _check_sides(int(np.sum(again & (design[:, 1] > 0))), int(np.sum(again & (design[:, 1] < 0))))
         if np.array_equal(again, keep):
@@ -93,7 +93,7 @@ def _fitted(motion: PairMotion, design: FloatArray, loaded: NDArray[np.bool_]) -
         keep = again
     if not x[1] > 0.0:
         raise RefusalError(
-            f"the flanks come out {2e6 * float(x[1]):.3g} µm apart: torque does not tell which of them carries",
+            f"the estimated backlash is {2e6 * float(x[1]):.3g} µm: the torque does not show which flank carries",
             remedy="record a start and a braked stop: both flanks must carry",
         )
     inverse = np.linalg.pinv(design[keep].T @ design[keep])
@@ -112,7 +112,7 @@ def _fitted(motion: PairMotion, design: FloatArray, loaded: NDArray[np.bool_]) -
 
 
 def dependence(values: FloatArray) -> float:
-    """Factor by which the variance of a mean grows because neighbours are alike: 1 + 2 Σ ρ_k up to the first ρ_k ≤ 0.
+    """Factor by which autocorrelation increases the variance of a mean: 1 + 2 Σ ρ_k up to the first ρ_k ≤ 0.
 
     Source: C. J. Geyer, Practical Markov chain Monte Carlo, Statistical Science 7 (1992), initial positive sequence.
     """
@@ -130,7 +130,7 @@ def dependence(values: FloatArray) -> float:
 
 
 def _lost_motion(motion: PairMotion) -> BacklashEstimate:
-    """Distance between the middle positions on both flanks while the gears turn."""
+    """Return the distance between the median positions on both flanks while the gears turn."""
     speed = np.abs(motion.driver_speed_rad_s)
     turning = speed > 0.05 * float(np.quantile(speed, 0.95))
     q = motion.compression_m
@@ -141,11 +141,11 @@ def _lost_motion(motion: PairMotion) -> BacklashEstimate:
     _check_sides(len(drive), len(back))
     scatter = median_deviation(drive - np.median(drive))
     drawn = 2e-6 * motion.contact.half_backlash_um
-    # Less than half of the rig's play is the deflection of one flank and not the way to the other.
+    # Less than half of the rig's backlash is the deflection of one flank, not the distance to the other.
     if high - low < max(6.0 * scatter, 0.5 * drawn):
         raise RefusalError(
-            f"the flanks move by {1e6 * (high - low):.3g} µm against each other, the play drawn is {1e6 * drawn:.3g} "
-            f"µm and the noise {1e6 * scatter:.2g} µm: only one flank was loaded, or it cannot be told",
+            f"the flanks move by {1e6 * (high - low):.3g} µm against each other, with {1e6 * drawn:.3g} µm of backlash "
+            f"in the rig and {1e6 * scatter:.2g} µm of noise: only one flank was loaded, or noise hides the other",
             remedy="record a start and a braked stop; better with torque",
         )
     deviations = [1.25 * float(np.std(x)) * np.sqrt(dependence(x) / len(x)) for x in (drive, back)]
@@ -164,35 +164,35 @@ def _lost_motion(motion: PairMotion) -> BacklashEstimate:
 def _check_sides(n_drive: int, n_back: int) -> None:
     if min(n_drive, n_back) < MIN_SAMPLES:
         raise RefusalError(
-            f"{n_drive} samples load the drive flank and {n_back} the back flank: the play between them does not show",
+            f"{n_drive} samples load the drive flank and {n_back} the back flank: too few to show the backlash",
             remedy="record a reversal, or a stop with a brake: both flanks must carry",
         )
 
 
 LIGHT = (0.1, 0.5)
-"""Parts of the ordinary torque between which flanks touch and hardly yield."""
+"""Range of torque, relative to the typical one, in which flanks touch but hardly deflect."""
 
 
 @dataclass(frozen=True)
 class TorqueTwist(Result, columns=("twist_rad", "torque_nm")):
-    """The loop of torque over twist of the pair.
+    """Hysteresis loop of torque over twist of the pair.
 
     Parameters
     ----------
     twist_rad : array, (n,)
-        Driver's angle less the driven gear's times the ratio, from the middle of the play.
+        Driver's angle minus the driven gear's times the ratio, from the middle of the backlash.
     torque_nm : array, (n,)
         On the driver's shaft.
     lost_motion_rad : float
-        Width of the loop at a light load, between both signs of the torque: the play as the driver's shaft feels it;
-        nan where the torque has one sign.
+        Width of the loop at light load, between torques of opposite sign: the backlash at the driver's shaft; nan if
+        the torque has one sign only.
     loss_per_cycle_j : float
-        ∮ τ dδ per segment of motion: what contact and friction of the teeth take; nan where the motion neither stops
-        nor reverses, as no loop closes then.
+        ∮ τ dδ per segment of motion: energy lost in tooth contact and friction; nan if the motion neither stops nor
+        reverses, as the loop does not close then.
     loss_uncertainty_j : float
-        By how much two ways of summing it differ, over compression and over its rate: noise, where that is larger.
+        Difference between two ways of integrating it, over compression and over its rate: noise if it exceeds the loss.
     work_per_cycle_j : float
-        ∫ τ dθ1 per segment of motion: what goes through the shaft; nan likewise.
+        ∫ τ dθ1 per segment of motion: work transmitted through the shaft; nan in the same case.
     n_cycles : int
     """
 
@@ -206,7 +206,7 @@ class TorqueTwist(Result, columns=("twist_rad", "torque_nm")):
 
 
 def torque_twist(motion: PairMotion, segments: MotionSegments, datum_m: float) -> TorqueTwist:
-    """Return the loop of a start–stop motion.
+    """Return the torque–twist loop of a start–stop motion, with its lost motion and losses.
 
     Raises
     ------
@@ -232,7 +232,7 @@ def torque_twist(motion: PairMotion, segments: MotionSegments, datum_m: float) -
 
 
 def _width(twist_rad: FloatArray, torque_nm: FloatArray) -> float:
-    """Distance between the median twists at a light torque of either sign."""
+    """Distance between the median twists at light torque of each sign."""
     ordinary = float(np.quantile(np.abs(torque_nm), 0.95))
     light = (np.abs(torque_nm) > LIGHT[0] * ordinary) & (np.abs(torque_nm) < LIGHT[1] * ordinary)
     sides = [twist_rad[light & (torque_nm > 0.0)], twist_rad[light & (torque_nm < 0.0)]]

@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Datum:
-    """Zero of the compression: where it is when the teeth stand in the middle of the backlash.
+    """Zero of the compression: its value with the teeth in the middle of the backlash.
 
     Parameters
     ----------
     compression_m : float
     uncertainty_m : float
-        One standard deviation; nan where it was given.
+        One standard deviation; nan if the datum was given.
     method : str
     """
 
@@ -38,15 +38,15 @@ class Datum:
 
 @dataclass(frozen=True)
 class ForceError:
-    """How far a model's force is from the reference.
+    """Deviation of a model's force from the reference.
 
     Parameters
     ----------
     model, reference : str
     rms_n, bias_n, largest_n : float
-        Root mean square, mean and largest magnitude of model − reference.
+        RMS, mean and maximum magnitude of model − reference.
     relative_rms : float
-        Root mean square over that of the reference.
+        RMS divided by that of the reference.
     correlation : float
     """
 
@@ -68,14 +68,14 @@ class ForceEstimate(Result):
     motion : PairMotion
     datum : Datum
     depth_m : array, (n,)
-        g: depth of the contact with the flank's sign, 0 in the backlash.
+        g: contact depth with the sign of the flank, 0 in the backlash.
     n_pairs : array, (n,)
     forces_n : mapping
         Model → (n,).
     references_n : mapping
         "torque / base radius" or "tooth force" → (n,); empty where nothing was measured.
     errors : tuple of ForceError
-        Of every model against every reference it can be compared with.
+        For each model and each reference it can be compared with.
     descriptions : mapping
         Model → formula with its numbers.
     """
@@ -93,7 +93,7 @@ class ForceEstimate(Result):
         freeze(self, "depth_m", "n_pairs")
 
     def to_frame(self) -> DataFrame:
-        """Return time, references, models, depth and pairs in contact as a pandas table, one row a sample."""
+        """Return time, references, models, depth and pairs in contact as a pandas table, one row per sample."""
         from pandas import DataFrame
 
         forces = {f"{name} [N]": values for name, values in {**self.references_n, **self.forces_n}.items()}
@@ -107,17 +107,17 @@ class ForceEstimate(Result):
 
 
 def depth(compression_m: FloatArray, half_backlash_m: float) -> FloatArray:
-    """g: beyond the backlash, with the flank's sign; 0 in the gap."""
+    """Depth g in m: compression beyond the half backlash, with the sign of the flank; 0 in the gap."""
     g: FloatArray = np.sign(compression_m) * np.maximum(np.abs(compression_m) - half_backlash_m, 0.0)
     return g
 
 
 def latched_damping(motion: PairMotion, compression_m: FloatArray) -> FloatArray:
-    """β in s/m at each sample, from the speed at which the flanks met; 0 in the gap.
+    """β in s/m at each sample, from the impact speed of its contact; 0 in the gap.
 
-    √(v² + 2 a d) with speed v, acceleration a and distance d of the last sample in the gap: between two samples flanks
-    that start from rest gain most of their speed. The speed is latched for the whole contact, with the floor: b = f/v
-    of the speed at each instant would grow without bound where the flanks come to rest.
+    The impact speed is √(v² + 2 a d) with speed v, acceleration a and distance d at the last sample in the gap: flanks
+    that start from rest gain most of their speed between two samples. It is held for the whole contact and not less
+    than the floor: with the instantaneous speed, b = f/v would grow without bound as the flanks come to rest.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def latched_damping(motion: PairMotion, compression_m: FloatArray) -> FloatArray
         return np.zeros_like(side)
     last = np.maximum(begins - 1, 0)
     earlier = np.maximum(begins - 2, 0)
-    # A derived acceleration would hold a part of the blow that follows: two samples in the gap tell it without.
+    # A derived acceleration would include part of the impact that follows; two samples in the gap do not.
     flown = (side[earlier] == 0.0) & (earlier < last)
     gained = np.where(
         flown,
@@ -149,7 +149,7 @@ def latched_damping(motion: PairMotion, compression_m: FloatArray) -> FloatArray
 
 
 def pair_force(g: FloatArray, rate_mps: FloatArray, damping_s_per_m: FloatArray, contact: ToothContact) -> FloatArray:
-    """Force of one tooth pair, k sgn(g)|g|^λ (1 + β ġ), never tension: above 0 on the drive flank."""
+    """Force of one tooth pair in N, k sgn(g)|g|^λ (1 + β ġ), never tensile; positive on the drive flank."""
     side = np.sign(g)
     growth = np.maximum(1.0 + damping_s_per_m * side * rate_mps, 0.0)
     force: FloatArray = side * contact.stiffness_n_per_m_lambda * np.abs(g) ** contact.exponent * growth
@@ -157,10 +157,10 @@ def pair_force(g: FloatArray, rate_mps: FloatArray, damping_s_per_m: FloatArray,
 
 
 def friction_share(motion: PairMotion, g: FloatArray, gear: int = 0) -> FloatArray:
-    """Mean of 1 − μ sgn(v_s) tan α_k over the pairs that carry: what a gear's torque feels of the normal force.
+    """Mean of 1 − μ sgn(v_s) tan α_k over the pairs in contact: the share of the normal force in a gear's torque.
 
-    tan α_k = ρ/r_b at the point of contact, of the driver (gear 0) or the driven gear (1); the sign changes at the
-    pitch point, so that the share is 1 ∓ 0.018 there for μ = 0.05 and 20°.
+    tan α_k = ρ/r_b at the point of contact, for the driver (gear 0) or the driven gear (1). The sign changes at the
+    pitch point, so that the share there is 1 ∓ 0.018 for μ = 0.05 and 20°.
     """
     path = motion.path
     flank = np.where(g < 0.0, -1.0, 1.0)
@@ -168,7 +168,7 @@ def friction_share(motion: PairMotion, g: FloatArray, gear: int = 0) -> FloatArr
     rho_1 = path.driver_lever_m(positions)
     rho_2 = path.length_m - rho_1
     sliding = flank * (motion.driven_speed_rad_s * rho_2 - motion.driver_speed_rad_s * rho_1)
-    # Below 2 mm/s the sign of friction is brought over smoothly: bristles that bend are not followed.
+    # Below 2 mm/s the sign of friction changes smoothly: bristle deflection is not modelled.
     sign = np.clip(sliding / 2e-3, -1.0, 1.0)
     share = 1.0 - motion.contact.friction_coefficient * sign * (rho_1, rho_2)[gear] / path.base_radii_m[gear]
     result: FloatArray = np.sum(weights * share, axis=0) / np.sum(weights, axis=0)
@@ -176,10 +176,10 @@ def friction_share(motion: PairMotion, g: FloatArray, gear: int = 0) -> FloatArr
 
 
 def hand_over_force(motion: PairMotion, g: FloatArray) -> FloatArray:
-    """Return ∂V/∂θ1 / r_b1: what storing energy in a growing number of pairs asks of the driver, beside the force.
+    """Return ∂V/∂θ1 / r_b1 in N: the additional driver force due to energy of pairs that enter or leave contact.
 
-    V = Σ w(p_i) k |g|^(λ+1)/(λ+1) changes with the driver's angle by the weights of the pairs that come and go; over a
-    whole pitch at constant depth it is nothing.
+    V = Σ w(p_i) k |g|^(λ+1)/(λ+1) changes with the driver's angle through the weights of the pairs that enter and
+    leave; over a whole pitch at constant depth the sum is zero.
     """
     flank = np.where(g < 0.0, -1.0, 1.0)
     slopes = np.sum(motion.path.pairs(motion.driver_angle_rad, flank)[2], axis=0)
@@ -194,14 +194,14 @@ MIN_SAMPLES = 20
 
 
 def find_datum(motion: PairMotion, choice: str | float = "auto") -> Datum:
-    """Return the compression at which the teeth stand in the middle of the backlash.
+    """Find the compression at which the teeth are in the middle of the backlash.
 
     Parameters
     ----------
     motion : PairMotion
     choice : str or float
-        "auto": from the torque where there is one, else midway between the two flanks; "zero": the angles count from
-        the middle of the backlash; a number: that compression in m.
+        "auto": from the torque if measured, else midway between the two flanks; "zero": the angles are zero at the
+        middle of the backlash; a number: that compression in m.
 
     Raises
     ------
@@ -219,7 +219,7 @@ def find_datum(motion: PairMotion, choice: str | float = "auto") -> Datum:
 
 
 def elastic_depth(motion: PairMotion, force_n: FloatArray) -> FloatArray:
-    """Depth with sign at which the pairs that touch carry a force at rest."""
+    """Signed depth in m at which the pairs in contact carry a static force."""
     contact, path = motion.contact, motion.path
     n = path.n_pairs(motion.driver_angle_rad, np.sign(force_n))
     yielding: FloatArray = np.sign(force_n) * (np.abs(force_n) / (n * contact.stiffness_n_per_m_lambda)) ** (
@@ -229,14 +229,14 @@ def elastic_depth(motion: PairMotion, force_n: FloatArray) -> FloatArray:
 
 
 def _from_torque(motion: PairMotion) -> Datum:
-    """Median of q − sgn(F) a − g(F) over loaded samples: the mean depth then carries the measured torque."""
+    """Median of q − sgn(F) a − g(F) over loaded samples, so that the mean depth carries the measured torque."""
     _, force = motion.torque_and_tooth_force()
-    # Loaded: above a fifth of what one sample in twenty carries, so that no single blow decides.
+    # Loaded: above a fifth of the 95 % quantile, so that no single impact decides.
     loaded = np.abs(force) > 0.2 * np.quantile(np.abs(force), 0.95)
     if np.count_nonzero(loaded) < MIN_SAMPLES or not np.any(force):
         raise RefusalError(
             f"{np.count_nonzero(loaded)} samples carry a load: the zero of the compression cannot be found",
-            remedy="record while the machine drives, or tell the zero to gearsig force by --datum",
+            remedy="record while the machine drives, or give gearsig force the zero with --datum",
         )
     a = motion.contact.half_backlash_um * 1e-6
     normal = force / friction_share(motion, force)
@@ -252,14 +252,14 @@ def _between_flanks(motion: PairMotion) -> Datum:
     if not play or abs(high - low - play) > 0.35 * play:
         raise RefusalError(
             f"there is no torque, and the distance between the flanks spans {1e6 * (high - low):.4g} µm where the "
-            f"backlash is {1e6 * play:.4g} µm: which flank touches cannot be told",
-            remedy="record the torque, or a start and stop that touches both flanks, or tell the zero to gearsig force "
-            "by --datum",
+            f"backlash is {1e6 * play:.4g} µm: it is unclear which flank touches",
+            remedy="record the torque, or a start and stop that touches both flanks, or give gearsig force the zero "
+            "with --datum",
         )
     return Datum(
         float(low + high) / 2.0,
         float(high - low - play) / 2.0,
-        "midway between both flanks; they may yield differently",
+        "midway between both flanks; they may deflect differently",
     )
 
 
@@ -275,14 +275,14 @@ def estimate_forces(motion: PairMotion, *, datum: str | float = "auto") -> Force
     """Estimate the force between the teeth at every sample.
 
     - piecewise: Σ over the pairs in contact of w k sgn(g)|g|^λ (1 + β ġ)(1 ∓ μ tan α_k), plus ∂V/∂θ1/r_b1 where their
-      weights w change, plus J1 α1/r_b1 of what turns between torque sensor and teeth: comparable with τ/r_b1. Pairs by
-      the driver's angle, forwards and backwards.
-    - piecewise, teeth alone: without the inertia and the friction's share, the normal force itself.
+      weights w change, plus J1 α1/r_b1 of the inertia between torque sensor and teeth: comparable with τ/r_b1. The
+      driver's angle determines the pairs, forwards and backwards.
+    - piecewise, teeth alone: the normal force, without inertia and friction.
     - piecewise, as printed: with J2/r_b2² · q̈ instead of J1 α1/r_b1. For two free bodies that is the force with the
-      opposite sign; in a driven gear it counts the load's inertia in the pinion's torque, and is several times the
-      force off.
-    - Hunt–Crossley: k δ^λ (1 + β δ̇) of one pair on the drive flank, δ from where the flanks touch.
-    - Kelvin–Voigt: k' δ + b' δ̇, likewise, k' and b' such that both agree with Hunt–Crossley at the median load.
+      opposite sign; for a loaded gear it counts the load's inertia in the pinion's torque, an error of several times
+      the force.
+    - Hunt–Crossley: k δ^λ (1 + β δ̇) of one pair on the drive flank, with δ from first contact.
+    - Kelvin–Voigt: k' δ + b' δ̇, likewise, with k' and b' that match Hunt–Crossley at the median load.
 
     Parameters
     ----------
@@ -293,16 +293,16 @@ def estimate_forces(motion: PairMotion, *, datum: str | float = "auto") -> Force
     Returns
     -------
     ForceEstimate
-        With errors against τ/r_b1 and against a measured or simulated tooth force, where there are.
+        With errors against τ/r_b1 and against a measured or simulated tooth force, where available.
 
     Notes
     -----
-    A micrometre of the compression is worth λF/g: some 130 N of 2 kN on stiff teeth. With an encoder of less than some
-    10⁶ counts this is no measurement of force; see `gearsig.motion`.
+    An error of 1 µm in the compression is an error of λF/g per µm: about 130 N of 2 kN for stiff teeth. An encoder of
+    fewer than about 10⁶ counts cannot measure force in this way.
 
     Source: Z. Xu, H. Deng, Y. Zhang, Piecewise nonlinear dynamic modeling for gear transmissions with rotary inertia
-    and backlash, with sgn(g)|g|^λ for g^λ, base radii for reference radii, μ tan α_k for μ cot β, one mass also in
-    double contact, and the speed of impact latched.
+    and backlash, modified: sgn(g)|g|^λ for g^λ, base radii for reference radii, μ tan α_k for μ cot β, one mass also
+    in double contact, and the impact speed held during contact.
     """
     zero = find_datum(motion, datum)
     contact = motion.contact
@@ -338,7 +338,7 @@ def estimate_forces(motion: PairMotion, *, datum: str | float = "auto") -> Force
 
 
 def compare(model: str, force_n: FloatArray, reference: str, reference_n: FloatArray) -> ForceError:
-    """Return the error of a force against a reference."""
+    """Return the deviation of a force from a reference."""
     error = force_n - reference_n
     size = float(np.sqrt(np.mean(reference_n**2)))
     moving = float(np.std(force_n)) > 0.0 and float(np.std(reference_n)) > 0.0
@@ -364,7 +364,7 @@ def _references(motion: PairMotion) -> dict[str, FloatArray]:
 
 
 def _errors(forces: Mapping[str, FloatArray], references: Mapping[str, FloatArray]) -> tuple[ForceError, ...]:
-    """Compare each model with each reference; of the piecewise forms each with what it stands for."""
+    """Compare each model with each reference; the piecewise forms only with the quantity they represent."""
     unfit = {(TEETH, FROM_TORQUE), (PIECEWISE, TOOTH_FORCE), (AS_PRINTED, TOOTH_FORCE)}
     return tuple(
         compare(model, force, name, reference)
@@ -379,7 +379,7 @@ def _linear(force_n: FloatArray, depth_m: FloatArray, floor_beta: float) -> tupl
     loaded = depth_m > 0.0
     if not np.any(loaded):
         raise RefusalError(
-            "the drive flanks never touch by this datum, backlash and stiffness",
+            "the drive flanks never touch with this datum, backlash and stiffness",
             remedy="check half_backlash_um in the rig's [contact] and --datum",
         )
     middle, force = float(np.median(depth_m[loaded])), float(np.median(force_n[loaded]))
@@ -409,17 +409,18 @@ LEVELS_UM = (0.0, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 
 @dataclass(frozen=True)
 class NoiseStudy:
-    """Errors of the models over added noise.
+    """Errors of the force models over added noise.
 
     Parameters
     ----------
     levels_um : array, (n_levels,)
-        Standard deviation of white noise that was added to the compression, from sample to sample.
+        Standard deviation of the white noise added to the compression.
     reference : str
     rms_n : mapping
-        Model → (n_levels,), root mean square error over all draws.
+        Model → (n_levels,), RMS error over all draws.
     crossover_um : float or None
-        Noise at which the piecewise model is as far off as Hunt–Crossley; None: better at all levels, or at none.
+        Noise at which the errors of the piecewise model and Hunt–Crossley are equal; None: the piecewise model is
+        better at all levels, or at none.
     """
 
     levels_um: FloatArray
@@ -429,23 +430,24 @@ class NoiseStudy:
 
     @property
     def text(self) -> str:
-        """The answer in a sentence."""
+        """The result in a sentence."""
         ratio = self.rms_n[PIECEWISE] / self.rms_n[HUNT_CROSSLEY]
         if self.crossover_um is not None:
             return (
-                f"The piecewise model is nearer than Hunt–Crossley up to {self.crossover_um:.3g} µm of added noise in "
+                f"The piecewise model is closer than Hunt–Crossley up to {self.crossover_um:.3g} µm of added noise in "
                 f"the compression; without added noise its error is {100.0 * ratio[0]:.3g} % of Hunt–Crossley's."
             )
         if np.all(ratio < 1.0):
-            return f"The piecewise model is nearer than Hunt–Crossley at all levels, up to {self.levels_um[-1]:g} µm."
-        return "The piecewise model is not nearer than Hunt–Crossley, even without added noise."
+            return f"The piecewise model is closer than Hunt–Crossley at all levels, up to {self.levels_um[-1]:g} µm."
+        return "The piecewise model is no closer than Hunt–Crossley, even without added noise."
 
 
 def acceleration_limit_rad_s2(study: NoiseStudy, motion: PairMotion) -> float | None:
-    """Return the white noise on the driver's acceleration up to which the piecewise model is nearer than Hunt–Crossley.
+    """Return the white noise of the driver's acceleration up to which the piecewise model beats Hunt–Crossley.
 
-    It adds J1 σ/r_b1 to the piecewise model alone, in squares: σ = (r_b1/J1) √(rms_HC² − rms_piecewise²). None where
-    nothing turns between torque sensor and teeth, where the reference is the tooth force, or where it is never nearer.
+    The noise adds J1 σ/r_b1 to the error of the piecewise model alone, as a sum of squares:
+    σ = (r_b1/J1) √(rms_HC² − rms_piecewise²). None if there is no inertia between torque sensor and teeth, if the
+    reference is the tooth force, or if the piecewise model is never better.
     """
     inertia, r1 = motion.contact.driver_inertia_kg_m2, motion.path.base_radii_m[0]
     piecewise_n, hunt_crossley_n = float(study.rms_n[PIECEWISE][0]), float(study.rms_n[HUNT_CROSSLEY][0])
@@ -466,16 +468,16 @@ def noise_study(
     unwrap: bool = False,
     datum: str | float = "auto",
 ) -> NoiseStudy:
-    """Add white noise to the driver's angle, and estimate the forces anew as if it had been measured so.
+    """Add white noise to the driver's angle and estimate the forces again, as if it had been measured that way.
 
     Parameters
     ----------
     recording : Recording
-        With torque or tooth force to compare with.
+        With torque or tooth force as a reference.
     rig : Rig or None
     rng : numpy.random.Generator
     levels_um : sequence of float
-        Along the line of action; ascending, the first 0.
+        Along the line of action; ascending from 0.
     n_draws : int
         Per level.
     use, bandwidth_hz, unwrap, datum
@@ -486,11 +488,11 @@ def noise_study(
     InputError
         If the levels do not ascend from 0.
     RefusalError
-        If there is nothing to compare with, or no angle of the driver.
+        If there is no reference, or no driver angle.
     """
     levels = frozen_array(levels_um, "levels_um", ndim=1)
     if len(levels) < 2 or levels[0] != 0.0 or np.any(np.diff(levels) <= 0.0):
-        raise InputError(f"levels_um is {levels.tolist()}", allowed="0 and more, ascending")
+        raise InputError(f"levels_um is {levels.tolist()}", allowed="ascending, from 0")
     count(n_draws, "n_draws")
     known = rig or recording.rig or Rig()
     path = path_of_contact(known)
@@ -521,7 +523,7 @@ def noise_study(
 
 
 def _crossover(levels_um: FloatArray, ratio: FloatArray) -> float | None:
-    """Level at which a ratio below 1 first reaches 1, straight between levels."""
+    """Level at which a ratio below 1 first reaches 1, interpolated linearly."""
     above = np.flatnonzero(ratio >= 1.0)
     if not len(above) or above[0] == 0:
         return None
@@ -531,7 +533,7 @@ def _crossover(levels_um: FloatArray, ratio: FloatArray) -> float | None:
 
 
 def _unit_of(recording: Recording, rig: Rig, role: str, name: str) -> float:
-    """Radians that one unit of the channel is worth."""
+    """Radians per unit of the channel."""
     single_sample = replace(recording, samples=np.ones((len(recording.channels), 1)))
     return float(role_values(single_sample, rig, role, name)[0])
 

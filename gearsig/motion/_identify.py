@@ -18,26 +18,26 @@ from gearsig.results import Result
 from gearsig.rig import damping_ratio_s_per_m
 
 N_BLOCKS = 8
-"""Of the jackknife."""
+"""Number of jackknife blocks."""
 
 
 @dataclass(frozen=True)
 class RobustFit:
-    """A solved problem.
+    """Solution of a robust least-squares problem.
 
     Parameters
     ----------
     names : tuple of str
     values : array, (n,)
     covariance : array, (n, n)
-        Of the values: residual power times (JᵀJ)⁻¹, times the residuals' dependence on their neighbours; wider where
-        leaving out an eighth of the record moves a value by more than that.
+        Of the values: residual power times (JᵀJ)⁻¹ times the factor for autocorrelation; wider if leaving out an
+        eighth of the record moves a value by more than that.
     condition : float
-        Largest over smallest singular value of the Jacobian, its columns scaled to length 1.
+        Ratio of the largest to the smallest singular value of the Jacobian with columns scaled to length 1.
     n_samples : int
-        That were kept.
+        Samples that were kept.
     scatter : float
-        Of their residuals.
+        Standard deviation of their residuals.
     """
 
     names: tuple[str, ...]
@@ -48,7 +48,7 @@ class RobustFit:
     scatter: float
 
     def value(self, name: str) -> float:
-        """Return one value."""
+        """Return the value of a parameter."""
         return float(self.values[self.names.index(name)])
 
     def deviation(self, name: str) -> float:
@@ -57,7 +57,7 @@ class RobustFit:
         return float(np.sqrt(max(self.covariance[i, i], 0.0)))
 
     def correlated_with(self, name: str) -> tuple[str, float]:
-        """Return the parameter whose estimate nearly goes with this one, and their correlation; no name: none does."""
+        """Return the parameter most correlated with this one and the correlation; an empty name if none is close."""
         i = self.names.index(name)
         deviations = np.sqrt(np.maximum(np.diag(self.covariance), 1e-300))
         if not np.isfinite(deviations[i]):
@@ -78,25 +78,25 @@ def robust_fit(
     min_scatter: float = 0.0,
     with_jackknife: bool = True,
 ) -> RobustFit:
-    """Minimise the squares of the usable residuals; leave out what is far off, and again.
+    """Minimise the sum of squares of the usable residuals, repeatedly leaving out outliers.
 
     Parameters
     ----------
     residuals : callable
         Values of the parameters, (n,) → (n_samples,).
     first, scale : array, (n,)
-        Where to begin, and the parameters' sizes.
+        Initial values, and the magnitudes of the parameters.
     usable : array of bool, (n_samples,)
     names : tuple of str
     min_scatter : float
-        What the equation itself leaves out: a sample nearer than five times that is never left out.
+        Model error of the equation: residuals below five times this are never outliers.
     with_jackknife : bool
-        Whether the covariance is widened by it; it costs eight further solutions.
+        Whether to widen the covariance by a jackknife, at the cost of eight further solutions.
 
     Raises
     ------
     RefusalError
-        If fewer samples are left than five times the parameters.
+        If fewer samples are left than five times the number of parameters.
     """
     keep: NDArray[np.bool_] = usable
     x: FloatArray = first / scale
@@ -105,7 +105,7 @@ def robust_fit(
         x, jacobian = _solve(residuals, x, scale, keep)
         residual = residuals(x * scale)
         scatter = median_deviation(residual[keep])
-        # What is five standard deviations off is left out: flanks that just part, counts that slipped.
+        # Leave out what is more than five standard deviations off: flanks about to part, slipped counts.
         again = usable & (np.abs(residual) <= 5.0 * max(scatter, min_scatter))
         if np.array_equal(again, keep):
             break
@@ -114,7 +114,7 @@ def robust_fit(
     lengths = np.linalg.norm(jacobian, axis=0)
     singular = np.linalg.svd(jacobian / np.where(lengths > 0.0, lengths, 1.0), compute_uv=False)
     inverse = np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)
-    inverse[lengths == 0.0, lengths == 0.0] = np.inf  # nothing depends on it: nothing is known of it
+    inverse[lengths == 0.0, lengths == 0.0] = np.inf  # nothing depends on this parameter, so it is unknown
     power = float(np.mean(residual[keep] ** 2)) * dependence(residual[keep])
     covariance = np.where(inverse == 0.0, 0.0, inverse * power)
     widened: FloatArray = np.ones(len(x))
@@ -133,7 +133,7 @@ def robust_fit(
 def _solve(
     residuals: Callable[[FloatArray], FloatArray], x: FloatArray, scale: FloatArray, keep: NDArray[np.bool_]
 ) -> tuple[FloatArray, FloatArray]:
-    """Solution and Jacobian for the samples that are kept, parameters in their scales."""
+    """Solution and Jacobian for the kept samples, with scaled parameters."""
     from scipy.optimize import least_squares
 
     def kept(values: FloatArray) -> FloatArray:
@@ -151,9 +151,9 @@ def _widening(
     keep: NDArray[np.bool_],
     deviation: FloatArray,
 ) -> FloatArray:
-    """Factors, 1 or more, by which the values move more than they should when a part of the record is left out.
+    """Factors, 1 or more, by which values move more than expected when part of the record is left out.
 
-    Delete-a-block jackknife: an equation that holds here and not there shows, which residuals alone hide.
+    Delete-a-block jackknife: it reveals an equation that holds in only part of the record, which residuals alone hide.
 
     Source: H. R. Künsch, The jackknife and the bootstrap for general stationary observations, Annals of Statistics 17
     (1989).
@@ -178,14 +178,14 @@ def _check_samples(keep: NDArray[np.bool_], n_parameters: int) -> None:
 
 
 EDGE = 0.09
-"""Base pitches around the entry and exit of a pair that are left out: there it carries a part of its load."""
+"""Base pitches left out around the entry and exit of a pair, where it carries part of its load."""
 PITCH_POINT, SLOW = 0.1, 0.15
-"""Base pitches around the pitch point, and part of the ordinary speed, within which the friction of the flanks is not
-known: bristles bend."""
+"""Base pitches around the pitch point, and fraction of the typical speed, within which flank friction is not known:
+bristle deflection."""
 LOADED = 0.1
-"""Part of the ordinary load from which on a sample is taken."""
+"""Minimum load of a sample, as a fraction of the typical load."""
 LONG_CONTACT, MAX_LONG = 40, 8
-"""Samples from which on a contact whose speed of meeting is not known gets a damping of its own, and how many do."""
+"""Minimum samples of a contact of unknown impact speed to get a separate damping, and maximum number of these."""
 NAMES = ("datum", "half_backlash", "log stiffness", "damping", "driver inertia", "friction")
 
 
@@ -197,15 +197,15 @@ class ContactEquation:
     ----------
     motion : PairMotion
     torque_nm, side, n_pairs, per_friction : array, (n,)
-        s, the pairs in contact, and the slope of the friction's share over μ.
+        Torque, s, the number of pairs in contact, and the slope of the friction share over μ.
     meeting_speed_mps : array, (n,)
     group : array of int, (n,)
-        Number of the damping that belongs to a sample: 0 for c/v of contacts whose speed v of meeting is known.
+        Index of the damping of each sample: 0 for c/v of contacts of known impact speed v.
     usable : array of bool, (n,)
     start : array
         Values of `NAMES`, then one β for each further group.
     free : tuple of int
-        Which of them are fitted.
+        Indices of those that are fitted.
     """
 
     motion: PairMotion
@@ -221,11 +221,11 @@ class ContactEquation:
 
     @property
     def has_both_flanks(self) -> bool:
-        """Whether the play is fitted."""
+        """Whether the backlash is fitted."""
         return NAMES.index("half_backlash") in self.free
 
     def residuals(self, values: FloatArray) -> FloatArray:
-        """Compression that is not explained, in m."""
+        """Unexplained compression in m."""
         p = self.start.copy()
         p[list(self.free)] = values
         zero, a, log_k, damping, inertia, friction = p[: len(NAMES)]
@@ -240,12 +240,12 @@ class ContactEquation:
         return residual
 
     def solve(self, *, with_jackknife: bool = True) -> RobustFit:
-        """Fit the free parameters; without the jackknife where their intervals are not needed."""
+        """Fit the free parameters; skip the jackknife if their intervals are not needed."""
         names = (*NAMES, *(f"damping {i}" for i in range(1, len(self.start) - len(NAMES) + 1)))
         rows = list(self.free)
         inertia = max(self.motion.contact.driver_inertia_kg_m2, 1e-3)
         scale = np.array([1e-6, 1e-6, 1.0, 0.01, inertia, 0.05, *[1.0] * (len(self.start) - len(NAMES))])
-        # The equation leaves out 20 nm: bristles that bend, a damping that is latched a little early.
+        # The equation neglects about 20 nm: bristle deflection, damping that is held slightly early.
         return robust_fit(
             self.residuals,
             self.start[rows],
@@ -258,7 +258,7 @@ class ContactEquation:
 
 
 def contact_equation(motion: PairMotion) -> ContactEquation:
-    """Return the equation with the samples that it holds for.
+    """Return the contact equation with the samples for which it holds.
 
     Raises
     ------
@@ -291,7 +291,7 @@ def contact_equation(motion: PairMotion) -> ContactEquation:
 
 
 def _start(motion: PairMotion, *, both_flanks: bool) -> FloatArray:
-    """Begin at what reversals tell, else at the rig's values."""
+    """Initial values from reversals, else from the rig."""
     c = motion.contact
     damping = max(damping_ratio_s_per_m(c.damping_law, c.restitution, 1.0), 1e-3)
     zero, a, k = 0.0, c.half_backlash_um * 1e-6, c.stiffness_n_per_m_lambda
@@ -305,7 +305,7 @@ def _start(motion: PairMotion, *, both_flanks: bool) -> FloatArray:
 
 
 def _groups(speed: FloatArray, usable: NDArray[np.bool_], side: FloatArray) -> tuple[NDArray[np.int64], int]:
-    """Number the long contacts whose speed of meeting is not known from 1; −1 for short ones, which are left out."""
+    """Number the long contacts of unknown impact speed from 1; −1 for short ones, which are left out."""
     group = np.where(np.isnan(speed), -1, 0).astype(np.int64)
     unknown = np.flatnonzero(np.isnan(speed))
     if not len(unknown):
@@ -318,7 +318,7 @@ def _groups(speed: FloatArray, usable: NDArray[np.bool_], side: FloatArray) -> t
 
 
 def _clear(motion: PairMotion, side: FloatArray) -> NDArray[np.bool_]:
-    """Samples whose pairs and friction are known: no pair comes, goes or turns its friction round."""
+    """Samples with known pairs and friction: no pair enters, leaves or reverses its friction."""
     path = motion.path
     u = path.position(motion.driver_angle_rad, side)
     clear: NDArray[np.bool_] = (u > EDGE) & (u < 1.0 - EDGE) & (np.abs(u - (path.contact_ratio - 1.0)) > EDGE)
@@ -333,22 +333,22 @@ def _clear(motion: PairMotion, side: FloatArray) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True)
 class FittedParameter:
-    """One parameter.
+    """One identified parameter.
 
     Parameters
     ----------
     name, unit : str
     value : float
     interval : (float, float)
-        95 %, from the curvature at the best fit and the residuals' dependence on each other.
+        95 %, from the curvature at the best fit and the autocorrelation of the residuals.
     is_determined : bool
-        Whether the record tells it: the interval's half width is below half of the value.
+        Whether the record determines it: the half width of the interval is below half of the value.
     why_not : str
-        Else, why.
+        Reason if it does not.
     rig_value : float or None
-        What the rig file says.
+        Value in the rig file.
     correlated_with : str
-        Parameter that could take its place, with the correlation of both estimates.
+        Parameter it may be confused with, and the correlation of both estimates.
     """
 
     name: str
@@ -363,15 +363,15 @@ class FittedParameter:
 
 @dataclass(frozen=True)
 class Identification(Result, rows="parameters"):
-    """Parameters of contact and load.
+    """Identified parameters of contact and load.
 
     Parameters
     ----------
     parameters : tuple of FittedParameter
     equations : mapping
-        Name of an equation → what was fitted, on how many samples, with what scatter.
+        Name of the equation → number of samples and scatter of the fit.
     condition : mapping
-        Name of an equation → ratio of the largest to the smallest singular value of its scaled Jacobian.
+        Name of the equation → ratio of the largest to the smallest singular value of its scaled Jacobian.
     source : str
     """
 
@@ -381,16 +381,16 @@ class Identification(Result, rows="parameters"):
     source: str = ""
 
     def parameter(self, name: str) -> FittedParameter:
-        """Return one parameter by its name."""
+        """Return a parameter by name."""
         parameters = {parameter.name: parameter for parameter in self.parameters}
         return parameters[known_name(name, parameters, f"there is no parameter {name!r}")]
 
 
 MAX_RELATIVE_HALF_WIDTH = 0.5
-"""Half width of the interval over the value beyond which a parameter cannot be told."""
+"""Relative half width of the interval above which a parameter is not determined."""
 NORMAL_95 = 1.96
-ONE_FLANK = "only one flank was loaded: play and zero of the angles cannot be told apart; record a stop with a brake"
-ONE_ZERO = "only one flank was loaded: it is told from the zero of the angles by little; record a stop with a brake"
+ONE_FLANK = "only one flank was loaded: backlash and zero of the angles cannot be separated; record a stop with a brake"
+ONE_ZERO = "only one flank was loaded: it can hardly be separated from the angles' zero; record a stop with a brake"
 NAMES_OF_RESULT = {
     "datum": "the zero of the angles",
     "half_backlash": "half_backlash_um",
@@ -400,21 +400,21 @@ NAMES_OF_RESULT = {
     "friction": "friction_coefficient",
     "inverse inertia": "driven_inertia_kg_m2",
 }
-"""For the names of the equations' terms."""
+"""Term of an equation → name of the parameter."""
 FALLING = ("damping", "inverse inertia")
-"""Terms that fall as what they stand for grows."""
-MOTOR = "it lies ahead of the torque sensor and does not show in the torque"
+"""Terms that decrease as their parameter grows."""
+MOTOR = "it is ahead of the torque sensor and does not show in the torque"
 
 
 def identify(motion: PairMotion) -> Identification:
     """Fit the parameters of contact and load, with 95 % intervals.
 
-    Contact, on loaded samples away from the entry and exit of pairs: see `ContactEquation`; for the zero of the angles,
-    play, stiffness, damping c = β v (v the speed at which the flanks met), inertia behind the sensor and friction.
-    Load, while the driven gear turns: α2 = (r_b2 F − T_c sgn ω2 − c ω2)/J2, for J2, T_c and c.
+    Contact, on loaded samples away from the entry and exit of pairs: `ContactEquation`, for the zero of the angles,
+    backlash, stiffness, damping c = β v (v: impact speed), inertia after the sensor, and friction. Load, while the
+    driven gear turns: α2 = (r_b2 F − T_c sgn ω2 − c ω2)/J2, for J2, T_c and c.
 
-    The noisy quantity (q, α2) is the response, so that its noise widens the intervals and does not bend the values.
-    What the record cannot tell is marked, with what it is mistaken for.
+    The noisy quantity (q, α2) is the response, so that its noise widens the intervals without biasing the values.
+    Parameters that the record does not determine are marked, with those they may be confused with.
 
     Parameters
     ----------
@@ -424,12 +424,12 @@ def identify(motion: PairMotion) -> Identification:
     Raises
     ------
     RefusalError
-        If there is no torque, or it loads the flanks nowhere.
+        If there is no torque, or it never loads the flanks.
 
     Notes
     -----
-    The intervals know the noise and its colour, not an error of the equations: eccentric gears, bending shafts, a wrong
-    exponent. The motor's inertia lies ahead of the torque sensor and cannot be told at all.
+    The intervals cover noise and its colour, not errors of the equations: eccentric gears, bending shafts, a wrong
+    exponent. The motor's inertia is upstream of the torque sensor and cannot be identified.
     """
     if motion.torque_nm is None:
         raise RefusalError(
@@ -457,7 +457,7 @@ def identify(motion: PairMotion) -> Identification:
 
 
 def _load_with_inertia(motion: PairMotion, contact: RobustFit) -> RobustFit:
-    """Fit the load, and widen its covariance by what the driver's inertia is not known to."""
+    """Fit the load and widen its covariance by the uncertainty of the driver's inertia."""
     inertia, deviation = contact.value("driver inertia"), contact.deviation("driver inertia")
     fit = _fit_load(motion, inertia)
     if not np.isfinite(deviation):
@@ -467,15 +467,15 @@ def _load_with_inertia(motion: PairMotion, contact: RobustFit) -> RobustFit:
 
 
 def _fit_load(motion: PairMotion, inertia_kg_m2: float) -> RobustFit:
-    """Fit α2 = (r_b2 F − T_c sgn ω2 − c ω2)/J2, F the driver's tooth force turned by the friction of the flanks."""
+    """Fit α2 = (r_b2 F − T_c sgn ω2 − c ω2)/J2, with F the driver's tooth force corrected for flank friction."""
     r1, r2 = motion.path.base_radii_m
     (torque, _), w = motion.torque_and_tooth_force(), motion.driven_speed_rad_s
     force = (torque - inertia_kg_m2 * motion.driver_acceleration_rad_s2) / r1
     drive = r2 * force * friction_share(motion, force, 1) / friction_share(motion, force, 0)
-    # From a tenth of the ordinary speed on the driven gear's friction slides.
+    # Above a tenth of the typical speed the driven gear's friction is sliding.
     turning = np.abs(w) > 0.1 * float(np.quantile(np.abs(w), 0.95))
     if np.sum(turning) < 10 * MIN_SAMPLES:
-        raise RefusalError("the driven gear hardly turns", remedy="record a start or a stop")
+        raise RefusalError("the driven gear barely turns", remedy="record a start or a stop")
 
     def residuals(values: FloatArray) -> FloatArray:
         inverse, level, viscous = values
@@ -484,7 +484,7 @@ def _fit_load(motion: PairMotion, inertia_kg_m2: float) -> RobustFit:
 
     guess = motion.contact.driven_inertia_kg_m2 or 10.0
     ordinary = float(np.quantile(np.abs(drive), 0.9)) or 1.0
-    # The load's equation leaves out a thousandth of the ordinary acceleration.
+    # The load equation neglects about a thousandth of the typical acceleration.
     return robust_fit(
         residuals,
         np.array([1.0 / guess, 0.5 * ordinary, 0.05 * ordinary]),
@@ -504,7 +504,7 @@ def _contact_parameters(motion: PairMotion, fit: RobustFit, *, has_both_flanks: 
         play = _parameter(fit, "half_backlash", "half_backlash_um", "um", c.half_backlash_um, lambda a_m: 1e6 * a_m)
     return [
         play,
-        # From one flank a filter ahead of the torque's samples feigns the stiffness, twenty times too high.
+        # From one flank, a filter ahead of the torque sampling can simulate a stiffness twenty times too high.
         _parameter(
             fit,
             "log stiffness",
@@ -548,31 +548,31 @@ def _parameter(
     *,
     why_not: str = "",
 ) -> FittedParameter:
-    """Return the parameter that a term of an equation stands for; `turned` makes it of the term's value.
+    """Return the parameter of an equation's term; `turned` converts the term's value to it.
 
-    It is told where the term is: a logarithm within a half, others within half of their value, which those that fall
-    as the parameter grows must have above zero.
+    It is determined if the term is: a logarithm to within 0.5, other terms to within half of their value, and those
+    that decrease as the parameter grows must be above zero.
     """
     value, half = fit.value(term), NORMAL_95 * fit.deviation(term)
     size = 1.0 if term == "log stiffness" else value if term in FALLING else abs(value)
     low, high = sorted((turned(value - half), turned(value + half)))
     is_determined = half < MAX_RELATIVE_HALF_WIDTH * size and not why_not
     alike = _alike(fit, term)
-    why = "the record hardly depends on it" + (f", and it is mistaken for {alike}" if alike else "")
+    why = "the record hardly depends on it" + (f", and it may be confused with {alike}" if alike else "")
     return FittedParameter(
         name, unit, turned(value), (low, high), is_determined, "" if is_determined else why_not or why, rig_value, alike
     )
 
 
 def _restitution(law: str, factor: float) -> float:
-    """Return the restitution at which a law of damping has a factor c = β v."""
+    """Return the restitution at which a damping law has the factor c = β v."""
     grid = np.linspace(0.01, 1.0, 2_001)
     factors = np.array([damping_ratio_s_per_m(law, float(e), 1.0) for e in grid])
     return float(np.interp(factor, factors[::-1], grid[::-1]))
 
 
 def _alike(fit: RobustFit, parameter: str) -> str:
-    """Return what could take a parameter's place, by the name that the result gives it; empty where nothing could."""
+    """Return the parameter that this one may be confused with, by its name in the result; empty if none."""
     like, correlation = fit.correlated_with(parameter)
     if not like:
         return ""
@@ -581,29 +581,29 @@ def _alike(fit: RobustFit, parameter: str) -> str:
 
 
 CERTAIN = 5.0
-"""Standard deviations by which a tooth must stand out of the others."""
+"""Standard deviations by which a tooth must differ from the others."""
 N_PLACES = 12
-"""Parts of the segment in which a pair carries alone: teeth are compared at equal places of their contact."""
+"""Number of sections of single contact: teeth are compared at the same place of their contact."""
 MIN_PART = 0.02
-"""Of the mean deflection: teeth differ by that anyway."""
+"""Minimum fraction of the mean deflection: healthy teeth differ by as much."""
 MIN_SAMPLES_PER_TOOTH = 4
 
 
 @dataclass(frozen=True)
 class ToothYielding(Result, columns=("extra_um", "uncertainty_um", "n_samples")):
-    """How much more than the fitted contact each tooth of the driver yields, while it carries alone.
+    """Additional deflection of each tooth of the driver, relative to the fitted contact, in single contact.
 
     Parameters
     ----------
     extra_um : array, (n_teeth,)
-        Median over the samples of a tooth, less the median of all teeth; nan where it was hardly passed.
+        Median over the samples of a tooth, minus the median of all teeth; nan if it has too few samples.
     uncertainty_um : array, (n_teeth,)
-        One standard deviation, from the scatter of the teeth's own samples.
+        One standard deviation, from the scatter of each tooth's samples.
     deflection_um : float
-        Median deflection of a pair in those samples; with the rig's stiffness where only one flank was loaded.
+        Median deflection of a pair in those samples; by the rig's stiffness if only one flank was loaded.
     n_samples : array of int, (n_teeth,)
     weak_teeth : tuple of int
-        Those that stand out, from 1, the weakest first.
+        Teeth that stand out, counted from 1, the weakest first.
     """
 
     extra_um: FloatArray
@@ -613,11 +613,11 @@ class ToothYielding(Result, columns=("extra_um", "uncertainty_um", "n_samples"))
     weak_teeth: tuple[int, ...]
 
     def stiffness_loss(self, tooth: int, exponent: float) -> float:
-        """Part of the stiffness of a pair that such an extra deflection stands for: 1 − (1 + x/g)^−λ."""
+        """Relative stiffness loss of a pair that corresponds to the tooth's extra deflection: 1 − (1 + x/g)^−λ."""
         return self._loss(float(self.extra_um[tooth - 1]), exponent)
 
     def min_loss(self, exponent: float) -> float:
-        """Part of its stiffness that an ordinary tooth must have lost to stand out."""
+        """Relative stiffness loss at which a typical tooth would stand out."""
         ordinary = float(np.nanmedian(self.uncertainty_um))
         return self._loss(max(CERTAIN * ordinary, MIN_PART * self.deflection_um), exponent)
 
@@ -628,18 +628,18 @@ class ToothYielding(Result, columns=("extra_um", "uncertainty_um", "n_samples"))
 def tooth_compliance(motion: PairMotion) -> ToothYielding:
     """Return the extra deflection of each tooth of the driver on the drive flank.
 
-    The contact's equation is fitted to the whole record; what is left of the compression where one pair carries alone
-    belongs to one tooth. A cracked tooth yields more each time it comes round.
+    The contact equation is fitted to the whole record; the residual compression in single contact belongs to one
+    tooth. A cracked tooth deflects more in each revolution.
 
     Raises
     ------
     RefusalError
-        If there is no torque, or fewer than half of the teeth carried alone.
+        If there is no torque, or fewer than half of the teeth were seen in single contact.
 
     Notes
     -----
-    The teeth of the driven gear differ each time round and widen the scatter. Run-out moves the compression over a
-    revolution in a wave: it is in the extra deflection as well, over many teeth.
+    The mating teeth of the driven gear change from revolution to revolution and widen the scatter. Run-out varies the
+    compression as a wave over the revolution; it is included in the extra deflection, spread over many teeth.
     """
     equation = contact_equation(motion)
     fit = equation.solve(with_jackknife=False)
@@ -660,11 +660,11 @@ def tooth_compliance(motion: PairMotion) -> ToothYielding:
         middle[j] = np.median(of_tooth)
         spread[j] = median_deviation(of_tooth - middle[j])
     extra = middle - np.nanmedian(middle)
-    # Neighbouring samples are alike; the teeth's own differences say by how much a median can be off.
+    # Neighbouring samples are correlated; the differences between teeth show the error of a median.
     alone = 1.25 * np.nanmedian(spread) / np.sqrt(np.maximum(counts, 1))
     among = median_deviation(extra[~np.isnan(extra)])
     uncertainty = np.where(np.isnan(extra), np.nan, np.maximum(alone, among))
-    known = float(np.log(motion.contact.stiffness_n_per_m_lambda))  # one flank hardly tells it from the angles' zero
+    known = float(np.log(motion.contact.stiffness_n_per_m_lambda))  # one flank hardly separates it from the datum
     deflection = _deflection(equation, fit.value("log stiffness") if equation.has_both_flanks else known, single)
     return ToothYielding(
         1e6 * extra, 1e6 * uncertainty, 1e6 * deflection, counts, _weak_teeth(extra, uncertainty, deflection)
@@ -672,7 +672,7 @@ def tooth_compliance(motion: PairMotion) -> ToothYielding:
 
 
 def _single_contact(equation: ContactEquation) -> NDArray[np.bool_]:
-    """Samples in which one pair carries alone on the drive flank, calm enough for its equation."""
+    """Samples of single contact on the drive flank, steady enough for the equation."""
     _, force = equation.motion.torque_and_tooth_force()
     speed = np.abs(equation.motion.driver_speed_rad_s)
     loaded = force > LOADED * float(np.quantile(np.abs(force), 0.95))
@@ -682,7 +682,7 @@ def _single_contact(equation: ContactEquation) -> NDArray[np.bool_]:
 
 
 def _without_common_profile(equation: ContactEquation, residual: FloatArray, single: NDArray[np.bool_]) -> FloatArray:
-    """Take off what all teeth have in common at a place: friction that turns, pairs that come and go."""
+    """Subtract the profile common to all teeth: friction that reverses, pairs that enter and leave."""
     path = equation.motion.path
     edge = path.contact_ratio - 1.0
     u = path.position(equation.motion.driver_angle_rad)

@@ -1,4 +1,4 @@
-"""Impacts of the flanks from the motion of both gears: when, which tooth, how hard, with what restitution."""
+"""Impacts of the flanks from the motion of both gears: time, tooth, speed and restitution."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MAX_SAMPLES = 60
 
 @dataclass(frozen=True)
 class FlightFit:
-    """q(t) = c0 + c1 t + c2 t² near one end of a flight, t from `origin_s`."""
+    """q(t) = c0 + c1 t + c2 t² near one end of a flight, with t from `origin_s`."""
 
     origin_s: float
     coefficients: tuple[float, float, float]
@@ -29,7 +29,7 @@ class FlightFit:
         return c1 + 2.0 * c2 * (time_s - self.origin_s)
 
     def crossing(self, level_m: float, low_s: float, high_s: float) -> float:
-        """Time at which the parabola reaches a level within two times; their nearer end where it does not."""
+        """Time at which the parabola reaches a level between two times; the closer of these if it does not."""
         c0, c1, c2 = self.coefficients
         roots = np.roots([c2, c1, c0 - level_m]) if c2 else np.array([(level_m - c0) / c1 if c1 else np.nan])
         times = roots[np.isreal(roots)].real + self.origin_s
@@ -51,24 +51,23 @@ def fit_flight(
     *,
     at_end: bool,
 ) -> FlightFit:
-    """Fit a parabola to the samples of a flight next to its end, or its beginning.
+    """Fit a parabola to the samples of a flight at its end, or at its beginning.
 
-    Motor, brake and friction are constant over so few milliseconds, so that the flanks move towards each other at a
-    constant acceleration.
+    Motor, brake and friction are constant over a few milliseconds, so the flanks approach at constant acceleration.
 
     Parameters
     ----------
     compression_m : array
     rate_mps : array or None
-        Measured by itself; None: derived from the compression, and of no use of its own so near to a blow.
+        Measured independently; None: derived from the compression, and of no additional use so close to an impact.
     first, last : int
-        Samples of the flight; the last is not in it.
+        Samples of the flight; the last is exclusive.
     sampling_rate_hz : float
     scatter : (float, float)
         Standard deviations of compression and rate.
     at_end : bool
     """
-    # 3 ms next to the flank: before that, a valve that moves or friction that turns has changed the acceleration.
+    # 3 ms next to the flank: further away, a moving valve or reversing friction has changed the acceleration.
     n_max = int(np.clip(round(3e-3 * sampling_rate_hz), 3, MAX_SAMPLES))
     chosen = np.arange(max(first, last - n_max), last) if at_end else np.arange(first, min(last, first + n_max))
     t = (chosen - chosen[0]) / sampling_rate_hz
@@ -85,38 +84,38 @@ def fit_flight(
 
 
 NOISE_DEPTH = 4.0
-"""Depth that counts as touching, in standard deviations of the compression's noise."""
+"""Minimum depth of a contact, in standard deviations of the compression's noise."""
 MIN_FLIGHT_SAMPLES = 2
-"""In the play ahead of a contact: fewer, and the speed of impact is that of a contact that never ended."""
+"""Minimum samples in the gap before a contact: with fewer, the contact counts as never interrupted."""
 
 
 @dataclass(frozen=True)
 class Impact:
-    """Flanks that met.
+    """One impact of the flanks.
 
     Parameters
     ----------
     time_s : float
-        Between samples, where the straight line of the approach crosses the flank.
+        Interpolated between samples, where the fitted approach crosses the flank.
     flank : int
         1: drive flank; −1: back flank.
     driver_tooth, driven_tooth : int
-        That entered last, from 1, counted from the angles' zero.
+        Teeth that last entered contact, from 1, counted from the zero of the angles.
     driver_angle_deg : float
         0 to 360.
     speed_mps : float
-        Of approach, along the line of action.
+        Approach speed along the line of action.
     energy_j : float
-        ½ m v², m the mass of both gears reduced to the line of action; nan where an inertia is not known.
+        ½ m v², with m the mass of both gears reduced to the line of action; nan if an inertia is not known.
     restitution : float
-        Speed of parting over speed of approach; nan where the flanks stayed in contact, or where it comes out above 1,
-        which no impact has: see `note`.
+        Separation speed divided by approach speed; nan if the flanks stayed in contact, or if the estimate is above 1,
+        which is impossible: see `note`.
     lost_j : float
-        ½ m v² (1 − e²); nan likewise.
+        ½ m v² (1 − e²); nan in the same cases.
     peak_force_n : float
-        By the contact's stiffness from the greatest depth; short of the truth where samples are rare.
+        From the maximum depth and the contact stiffness; too low if samples are sparse.
     note : str
-        What is wrong with it; empty: nothing.
+        Problem with this impact; empty if none.
     """
 
     time_s: float
@@ -133,27 +132,27 @@ class Impact:
 
 
 def find_impacts(motion: PairMotion, datum_m: float, *, half_backlash_m: float | None = None) -> tuple[Impact, ...]:
-    """Find the moments at which the flanks met after a flight through the play.
+    """Find the impacts of the flanks after a flight through the backlash.
 
-    Approaches slower than five standard deviations of the compression rate's scatter are left out.
+    Approaches slower than five standard deviations of the compression rate's noise are left out.
 
     Parameters
     ----------
     motion : PairMotion
     datum_m : float
-        Compression in the middle of the play, from `estimate_backlash` or `find_datum`.
+        Compression at the middle of the backlash, from `estimate_backlash` or `find_datum`.
     half_backlash_m : float or None
-        None: the rig's. A measured one finds flanks that are worn.
+        None: the rig's. A measured value allows for worn flanks.
 
     Raises
     ------
     RefusalError
-        If the compression's noise is a quarter of the play or more, or no play is known.
+        If the compression's noise is a quarter of the backlash or more, or the backlash is not known.
 
     Notes
     -----
-    An impact lasts a millisecond or so and its rebounds follow in some more: at 1 kHz those are missed whose flight
-    holds fewer than two samples. The tooth counts from the angles' zero.
+    An impact lasts about a millisecond and its rebounds follow within a few more: at 1 kHz, those with fewer than two
+    samples of flight are missed. Teeth are counted from the zero of the angles.
     """
     a = (
         motion.contact.half_backlash_um * 1e-6
@@ -162,15 +161,15 @@ def find_impacts(motion: PairMotion, datum_m: float, *, half_backlash_m: float |
     )
     if a == 0.0:
         raise RefusalError(
-            "the rig says that the flanks have no play: there is none to cross",
+            "the rig says that there is no backlash, so that there are no impacts",
             remedy="give half_backlash_um in its [contact] table, or record a braked stop, which shows it",
         )
     q, rate = motion.compression_m - datum_m, motion.compression_rate_mps
     noise = scatter_of(q)
     if noise > 0.5 * a:
         raise RefusalError(
-            f"the compression scatters by {1e6 * noise:.3g} µm in a play of {2e6 * a:.3g} µm: flights cannot be seen",
-            remedy="encoders of more counts; where the motion is slow, --bandwidth of gearsig start-stop",
+            f"the noise of the compression is {1e6 * noise:.3g} µm in a backlash of {2e6 * a:.3g} µm: it hides flights",
+            remedy="use encoders of more counts; if the motion is slow, --bandwidth of gearsig start-stop",
         )
     g = depth(q, a)
     rate_noise = scatter_of(rate)
@@ -187,9 +186,9 @@ def find_impacts(motion: PairMotion, datum_m: float, *, half_backlash_m: float |
 
 
 def meeting_speeds(motion: PairMotion, datum_m: float, half_backlash_m: float) -> FloatArray:
-    """Speed at which the flanks of each sample met, (n,): the floor at least; nan where the flight was too short.
+    """Impact speed of the contact of each sample in m/s, (n,), at least the floor; nan if the flight was too short.
 
-    In the play it is the floor, too.
+    Samples in the backlash also have the floor.
     """
     q = motion.compression_m - datum_m
     scatter = (scatter_of(q), scatter_of(motion.compression_rate_mps))
@@ -206,7 +205,7 @@ def meeting_speeds(motion: PairMotion, datum_m: float, half_backlash_m: float) -
 
 
 def reduced_mass_kg(motion: PairMotion) -> float:
-    """1/(r_b1²/J1 + r_b2²/J2), J1 with the motor; nan where an inertia is not known."""
+    """1/(r_b1²/J1 + r_b2²/J2), where J1 includes the motor; nan if an inertia is not known."""
     contact = motion.contact
     driver = contact.driver_inertia_kg_m2 + contact.motor_inertia_kg_m2
     if driver <= 0.0 or contact.driven_inertia_kg_m2 is None:
@@ -216,18 +215,18 @@ def reduced_mass_kg(motion: PairMotion) -> float:
 
 
 def scatter_of(values: FloatArray) -> float:
-    """Standard deviation of what changes from sample to sample: by the median of second differences, deaf to blows."""
+    """Standard deviation of sample-to-sample noise, by the median of second differences, robust to impacts."""
     moving = np.diff(values, 2)
     moving = moving[moving != 0.0]
     return median_deviation(moving) / np.sqrt(6.0) if len(moving) else 0.0
 
 
 Run = tuple[int, int, int]
-"""Flank or 0, first sample, sample after the last."""
+"""Flank (0: in the gap), first sample, sample after the last."""
 
 
 def _runs(side: np.ndarray, g: FloatArray, min_depth_m: float) -> list[Run]:
-    """Segments on one flank or in the play; a touch no deeper than the noise counts as flight."""
+    """Segments on one flank or in the gap; a contact no deeper than the noise counts as flight."""
     runs: list[Run] = []
     edges = np.flatnonzero(np.diff(side)) + 1
     for first, last in zip(np.concatenate([[0], edges]), np.concatenate([edges, [len(side)]]), strict=True):
@@ -243,7 +242,7 @@ def _runs(side: np.ndarray, g: FloatArray, min_depth_m: float) -> list[Run]:
 
 @dataclass(frozen=True)
 class _Flights:
-    """Fits flights on either side of a contact."""
+    """Fits to the flights before and after a contact."""
 
     motion: PairMotion
     compression_m: FloatArray
@@ -251,14 +250,14 @@ class _Flights:
     scatter: tuple[float, float]
 
     def meets(self, flight: Run, flank: int) -> tuple[float, float]:
-        """Time and speed at which a flight ends on a flank."""
+        """Time and approach speed at which a flight ends on a flank."""
         fit = self._fit(flight, at_end=True)
         rate = self.motion.sampling_rate_hz
         time = fit.crossing(flank * self.half_backlash_m, (flight[2] - 1) / rate, flight[2] / rate)
         return time, flank * fit.rate(time)
 
     def leaves(self, flight: Run, flank: int) -> float:
-        """Speed at which a flight begins on a flank."""
+        """Separation speed at which a flight begins on a flank."""
         fit = self._fit(flight, at_end=False)
         rate = self.motion.sampling_rate_hz
         time = fit.crossing(flank * self.half_backlash_m, (flight[1] - 1) / rate, flight[1] / rate)
@@ -280,12 +279,12 @@ def _impact(motion: PairMotion, flights: _Flights, g: FloatArray, before: Run, r
     angle = float(np.interp(time, [(first - 1) * step, first * step], motion.driver_angle_rad[first - 1 : first + 1]))
     restitution, note = float("nan"), ""
     bounced = after is not None and after[0] == 0 and after[2] - after[1] >= MIN_FLIGHT_SAMPLES
-    # A contact longer than six free elastic impacts is carried, not bounced off.
+    # A contact longer than six free elastic impacts carries load and is no bounce.
     if bounced and speed > 0.0 and (last - first - 1) * step < 6.0 * _bounce_s(motion, speed, mass):
         assert after is not None  # noqa: S101  bounced says so
         restitution = max(flights.leaves(after, flank), 0.0) / speed
         if restitution > 1.0:
-            note = f"parting is {restitution:.3g} times as fast as approach: noise, or too few samples in the flights"
+            note = f"separation is {restitution:.3g} times as fast as approach: noise, or too few samples in flight"
             restitution = float("nan")
     energy = 0.5 * mass * speed**2
     deepest = float(np.max(np.abs(g[first:last])))

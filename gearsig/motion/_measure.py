@@ -1,4 +1,4 @@
-"""From a recording to the motion of a gear pair: channels, units, derivatives, checks."""
+"""Motion of a gear pair from a recording: channels, units, derivatives, checks."""
 
 from __future__ import annotations
 
@@ -34,17 +34,17 @@ class PairMotion(Result, columns=("time_s", "driver_angle_rad", "driven_angle_ra
     ----------
     sampling_rate_hz : float
     driver_angle_rad, driven_angle_rad : array, (n,)
-        Each in its own direction, so that both rise in forward motion.
+        Each counted in its gear's direction, so that both increase in forward motion.
     driver_speed_rad_s, driven_speed_rad_s : array, (n,)
     driver_acceleration_rad_s2, driven_acceleration_rad_s2 : array, (n,)
     path : PathOfContact
     contact : ToothContact
     methods : mapping
-        Where each came from: a channel, or the filter that made it.
+        Origin of each quantity: a channel, or the filter that derived it.
     torque_nm : array or None
         On the driver's shaft.
     force_n : array or None
-        Of the teeth, where something else measured or simulated it.
+        Tooth force, if measured or simulated.
     source : str
     notes : tuple of str
     """
@@ -71,7 +71,7 @@ class PairMotion(Result, columns=("time_s", "driver_angle_rad", "driven_angle_ra
 
     @property
     def compression_m(self) -> FloatArray:
-        """Distance r_b1 θ1 − r_b2 θ2 between the flanks along the line of action, against an unknown zero."""
+        """Compression r_b1 θ1 − r_b2 θ2 along the line of action, (n,), with an unknown zero."""
         return self._difference(self.driver_angle_rad, self.driven_angle_rad)
 
     @property
@@ -91,11 +91,11 @@ class PairMotion(Result, columns=("time_s", "driver_angle_rad", "driven_angle_ra
 
     @property
     def tooth_force_from_torque_n(self) -> FloatArray | None:
-        """(τ − J1 α1)/r_b1: what is left of the torque for the teeth, with their friction."""
+        """(τ − J1 α1)/r_b1: the part of the torque that acts on the teeth, including their friction."""
         return None if self.torque_nm is None else self.torque_and_tooth_force()[1]
 
     def torque_and_tooth_force(self) -> tuple[FloatArray, FloatArray]:
-        """Return the torque in N m and the tooth force from it in N, (n,) each.
+        """Return the torque in N m and the tooth force derived from it in N, each (n,).
 
         Raises
         ------
@@ -113,28 +113,28 @@ class PairMotion(Result, columns=("time_s", "driver_angle_rad", "driven_angle_ra
 
 
 def median_deviation(values: FloatArray) -> float:
-    """Return the standard deviation of Gaussian values about 0 by their median magnitude: outliers do not count."""
+    """Return the standard deviation of Gaussian values about 0 by their median magnitude, robust to outliers."""
     return 1.4826 * float(np.median(np.abs(values)))
 
 
 def stands(driver_angle_rad: FloatArray, path: PathOfContact, contact: ToothContact) -> bool:
-    """Say whether the driver turns by less than its play and a quarter of a tooth pitch."""
-    # A machine that turns by less than that stands, though a blow may rattle it.
+    """Whether the driver turns by less than its backlash plus a quarter of a tooth pitch."""
+    # A machine that turns by less than that is at rest, though impacts may rattle it.
     return float(np.ptp(driver_angle_rad)) < _play_rad(path, contact) + 2.0 * pi / path.teeth[0] * 0.25
 
 
 def check_motion(value: object) -> None:
-    """Raise unless the value is the motion of a pair."""
+    """Raise unless the value is a `PairMotion`."""
     instance_of(value, PairMotion, "motion", remedy="gearsig.measure_motion(recording, rig) makes one")
 
 
 def check_turns(motion: PairMotion) -> None:
-    """Refuse a record in which the driver turns by less than its play and a quarter of a tooth pitch.
+    """Refuse a record in which the driver turns by less than its backlash plus a quarter of a tooth pitch.
 
     Raises
     ------
     RefusalError
-        If the machine stands.
+        If the machine is at rest.
     """
     check_motion(motion)
     check_driver_turns(motion.driver_angle_rad, motion.path, motion.contact, motion.sampling_rate_hz, motion.source)
@@ -143,13 +143,14 @@ def check_turns(motion: PairMotion) -> None:
 def check_driver_turns(
     driver_angle_rad: FloatArray, path: PathOfContact, contact: ToothContact, sampling_rate_hz: float, source: str
 ) -> None:
-    """Refuse the angle of a driver that stands; see `check_turns`."""
+    """Refuse the angle of a driver at rest; see `check_turns`."""
     if not stands(driver_angle_rad, path, contact):
         return
     turned, duration_s = float(np.ptp(driver_angle_rad)), len(driver_angle_rad) / sampling_rate_hz
     raise RefusalError(
         f"{source or 'the recording'}: the driver turns by {1e3 * turned:.3g} mrad in {duration_s:.4g} s, against a "
-        f"play of {1e3 * _play_rad(path, contact):.3g} mrad: the machine stands, its stop is longer than the record",
+        f"backlash of {1e3 * _play_rad(path, contact):.3g} mrad: the machine stands still, its stop is "
+        "longer than the record",
         remedy="record a start and a braked stop",
     )
 
@@ -160,7 +161,7 @@ def _play_rad(path: PathOfContact, contact: ToothContact) -> float:
 
 QUANTITY_OF = {"angle": ("angle", "encoder"), "speed": ("rotational_speed",), "acceleration": ("angular_acceleration",)}
 ROLES = (*(f"{side} {what}" for what in QUANTITY_OF for side in SIDES), "torque", "force")
-"""What a channel can be: angle, speed and acceleration of either gear, torque of the driver's shaft, tooth force."""
+"""Roles of channels: angle, speed and acceleration of each gear, torque of the driver's shaft, tooth force."""
 
 _UNITS = {
     "angle": {"rad": 1.0, "mrad": 1e-3, "deg": pi / 180.0, "°": pi / 180.0, "rev": 2.0 * pi},
@@ -173,17 +174,17 @@ _UNITS = {
 
 
 def find_roles(recording: Recording, pair: GearPair, assigned: Mapping[str, str] | None = None) -> dict[str, str]:
-    """Return the channel of each role that the recording has.
+    """Find the channel of each role that the recording has.
 
-    A channel belongs to a gear if its position is the name of that gear's shaft, or its own name holds it (or "driver",
-    "driven").
+    A channel belongs to a gear if its position is the name of that gear's shaft, or if its name contains the shaft's
+    name (or "driver", "driven").
 
     Parameters
     ----------
     recording : Recording
     pair : GearPair
     assigned : mapping or None
-        Role → channel, taken as they stand; an empty channel leaves the role out.
+        Role → channel, used without checks; an empty channel leaves the role out.
 
     Raises
     ------
@@ -199,7 +200,7 @@ def find_roles(recording: Recording, pair: GearPair, assigned: Mapping[str, str]
         fitting = [c.name for c in recording.channels if _fits(c, role, pair)]
         if role not in chosen and len(fitting) > 1:
             raise InputError(
-                f"channels {', '.join(map(repr, fitting))} may all be the {role}",
+                f"channels {', '.join(map(repr, fitting))} could each be the {role}",
                 where=recording.provenance.source or "recording",
                 remedy=f'give positions in their [[sensor]] tables, or say which to use as "{role}"',
             )
@@ -214,7 +215,7 @@ def role_values(recording: Recording, rig: Rig, role: str, name: str) -> FloatAr
     Raises
     ------
     InputError
-        If the unit is not known or measures something else.
+        If the unit is not known or belongs to another quantity.
     """
     channel = recording.channels[recording.index(name)]
     return np.asarray(recording.values(name), dtype=np.float64) * _si_scale(channel, rig, role.rpartition(" ")[2])
@@ -246,7 +247,7 @@ def _fits(channel: Channel, role: str, pair: GearPair) -> bool:
 
 
 def side_of(channel: Channel, pair: GearPair) -> str:
-    """Return "driver", "driven" or nothing; the longer name decides where one shaft's name holds the other's."""
+    """Return "driver", "driven" or ""; if one shaft's name contains the other's, the longer one decides."""
     names = sorted(((pair.driver, "driver"), (pair.driven, "driven")), key=lambda entry: -len(entry[0]))
     for shaft, side in names:
         if channel.position == shaft:
@@ -259,12 +260,12 @@ def side_of(channel: Channel, pair: GearPair) -> str:
 
 
 ALLOWED = {1: 0.03, 2: 0.06}
-"""Parts by which scales of speeds and of accelerations may differ."""
+"""Maximum relative errors of the scales of speeds and accelerations."""
 MIN_RATE_HZ = {1: 0.0, 2: 4000.0}
-"""Sampling rates from which on they are compared: slower, an acceleration that rings is folded down, alike in each
-start, so that its sum is off and its scatter does not say so."""
+"""Minimum sampling rates for the comparison: below, ringing of an acceleration aliases in the same way in each start,
+so that its sum is wrong and its scatter does not show it."""
 CERTAIN = 5.0
-"""Standard errors of the scale."""
+"""Minimum error of a scale, in standard errors."""
 
 
 def channel_scale(
@@ -272,9 +273,9 @@ def channel_scale(
 ) -> tuple[float, float]:
     """Return the scale of a speed or acceleration against the angle, and its standard error.
 
-    Speed: ∫ ω dt = s Δθ over windows of a twentieth of a second. Acceleration: the second difference of ∬ α dt² is s
-    times that of θ. Least squares, in which the angle, which a counter gives nearly without noise, explains the
-    rate; the error by leaving out each window (jackknife), as blows between samples spoil single ones.
+    Speed: ∫ ω dt = s Δθ over windows of 50 ms. Acceleration: the second difference of ∬ α dt² is s times that of θ.
+    Least squares with the angle as regressor, as counters measure it nearly without noise. The error comes from
+    leaving out each window (jackknife), as impacts between samples spoil single ones.
 
     Parameters
     ----------
@@ -288,9 +289,9 @@ def channel_scale(
     Returns
     -------
     scale, standard_error : float
-        1 where both agree; nan and nan where hardly anything moved, or in one window alone.
+        The scale is 1 if both agree; both are nan if there was hardly any motion, or motion in one window only.
     """
-    # Changes over 50 ms are compared: longer than flanks ring, shorter than a start.
+    # Compare changes over 50 ms: longer than flanks ring, shorter than a start.
     step = max(2, round(0.05 * sampling_rate_hz))
     edges = np.arange(0, len(angle_rad), step)
     if len(edges) <= 8:
@@ -301,7 +302,7 @@ def channel_scale(
     x, y = np.diff(angle_rad[edges], order), np.diff(summed[edges], order)
     powers, products = x * x, x * y
     total = float(np.sum(powers))
-    # A single window may have half of the sum of squares at most.
+    # A single window may contribute at most half of the sum of squares.
     if float(np.max(powers)) >= 0.5 * total:
         return float("nan"), float("nan")
     without = (np.sum(products) - products) / (total - powers)
@@ -312,7 +313,7 @@ def channel_scale(
 def check_scale(
     angle_rad: FloatArray, rate: FloatArray, sampling_rate_hz: float, *, order: int, names: tuple[str, str], where: str
 ) -> None:
-    """Refuse a speed or acceleration that does not go with the angle.
+    """Refuse a speed or acceleration that is inconsistent with the angle.
 
     Parameters
     ----------
@@ -328,7 +329,7 @@ def check_scale(
     Raises
     ------
     InputError
-        If the scale is off by more than 3 % (speeds) or 6 % (accelerations, from 4 kHz on), and by five of its standard
+        If the scale is off by more than 3 % (speeds) or 6 % (accelerations, from 4 kHz) and by more than five standard
         errors.
     """
     if sampling_rate_hz < MIN_RATE_HZ[order]:
@@ -337,7 +338,7 @@ def check_scale(
     if not abs(scale - 1.0) > max(ALLOWED[order], CERTAIN * error):
         return
     raise InputError(
-        f"channel {names[1]!r} reads {scale:.3g} times what {names[0]!r} says",
+        f"channel {names[1]!r} reads {scale:.3g} times what follows from {names[0]!r}",
         where=where,
         allowed=f"1 ± {ALLOWED[order]:g}",
         remedy=f"correct unit or scale of {names[1]!r} in its [[sensor]] table, or leave that channel out of the file",
@@ -345,7 +346,7 @@ def check_scale(
 
 
 def check_angle(angle_rad: FloatArray, sampling_rate_hz: float, name: str, where: str = "") -> None:
-    """Raise where an angle that should run on does not.
+    """Raise if an angle that should be continuous is not.
 
     Parameters
     ----------
@@ -357,14 +358,14 @@ def check_angle(angle_rad: FloatArray, sampling_rate_hz: float, name: str, where
     Raises
     ------
     InputError
-        At the first step by nearly a whole revolution (an encoder that wraps), or at a jump.
+        At the first step of nearly a whole revolution (an encoder that wraps), or at a jump.
     """
     check_wrap(angle_rad, sampling_rate_hz, name, where)
     steps, beyond = _steps(angle_rad)
     moving = np.abs(steps[steps != 0.0])
     quantum = float(moving.min()) if len(moving) else 0.0
-    # A thousandth of a revolution: no gear with its load gets there and stays within one sample; fifty times the
-    # ordinary change of the increments, of which an impact reaches a tenth; four steps of a coarse encoder.
+    # A jump exceeds a thousandth of a revolution, which no loaded gear moves within one sample; fifty times the typical
+    # change of the increments, of which an impact reaches a tenth; and four steps of a coarse encoder.
     limit = max(2e-3 * pi, 50.0 * median_deviation(beyond), 4.0 * quantum)
     jumps = np.flatnonzero(beyond > limit)
     if len(jumps):
@@ -373,13 +374,13 @@ def check_angle(angle_rad: FloatArray, sampling_rate_hz: float, name: str, where
             f"channel {name!r} jumps by {abs(steps[i]):.4g} rad {_time_text(i, sampling_rate_hz)} "
             f"({counted(len(jumps), 'such jump')})",
             where=where,
-            allowed="an angle that runs on",
+            allowed="a continuous angle",
             remedy="cut the recording there; lost counts make all later forces wrong",
         )
 
 
 def check_wrap(angle_rad: FloatArray, sampling_rate_hz: float, name: str, where: str = "") -> None:
-    """Raise where an angle steps by nearly a whole revolution: an encoder that starts again after each.
+    """Raise if an angle steps by nearly a whole revolution: an encoder that restarts after each.
 
     Parameters
     ----------
@@ -396,7 +397,7 @@ def check_wrap(angle_rad: FloatArray, sampling_rate_hz: float, name: str, where:
     if len(angle_rad) < 4:
         raise InputError(f"channel {name!r} has {len(angle_rad)} samples", where=where, allowed="at least 4")
     turns = _steps(angle_rad)[1] / (2.0 * pi)
-    # An encoder's new beginning is a whole revolution, within a tenth.
+    # An encoder's restart is a step of one revolution, to within a tenth.
     jumps = np.flatnonzero(np.abs(turns - 1.0) < 0.1)
     if len(jumps):
         i = int(jumps[0])
@@ -404,16 +405,16 @@ def check_wrap(angle_rad: FloatArray, sampling_rate_hz: float, name: str, where:
             f"channel {name!r} steps by {turns[i]:.3g} revolutions {_time_text(i, sampling_rate_hz)}: the encoder "
             "starts again after each revolution",
             where=where,
-            allowed="an angle that runs on",
+            allowed="a continuous angle",
             remedy=f"give wraps = true in the rig file, in [speed] or in the [[sensor]] table of {name!r} (force, "
             "start-stop and identify also take --unwrap)",
         )
 
 
 def _steps(angle_rad: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the angle's steps, and what each has beyond the steps around it."""
+    """Return the angle's steps, and the excess of each over the steps around it."""
     steps = np.diff(angle_rad)
-    # Around it: the middle one of three, so that a jump does not hide itself.
+    # The steps around it: the median of three, so that a jump does not hide itself.
     around = np.sort(np.stack([np.roll(steps, 1), steps, np.roll(steps, -1)]), axis=0)[1]
     around[0], around[-1] = steps[1], steps[-2]
     return steps, np.abs(steps - around)
@@ -425,12 +426,12 @@ def _time_text(step: int, sampling_rate_hz: float) -> str:
 
 ORDER = 3
 SHORTEST = 7
-"""Samples of the shortest window: cubic through seven."""
+"""Samples of the shortest window, for a cubic through seven."""
 
 
 @dataclass(frozen=True)
 class LocalPolynomial:
-    """A cubic fitted to a sliding window; value and derivatives at its middle.
+    """Savitzky–Golay filter: a cubic fitted to a sliding window gives value and derivatives at its middle.
 
     Parameters
     ----------
@@ -440,8 +441,8 @@ class LocalPolynomial:
 
     Notes
     -----
-    Its smoothing is flat to the third power of frequency, its derivatives to the same order; what lies beyond the
-    bandwidth is lost, an impact shorter than the window is smeared over it.
+    Smoothing and derivatives are flat to the third power of frequency. Anything beyond the bandwidth is lost, and an
+    impact shorter than the window is smeared over it.
 
     Source: A. Savitzky, M. J. E. Golay, Smoothing and differentiation of data by simplified least squares procedures,
     Analytical Chemistry 36 (1964); R. W. Schafer, What is a Savitzky–Golay filter?, IEEE Signal Processing Magazine 28
@@ -470,11 +471,11 @@ class LocalPolynomial:
 
     @property
     def text(self) -> str:
-        """For the reader of a result."""
+        """Description of the filter for users."""
         return f"Savitzky–Golay, cubic over {self.window} samples, −3 dB at {self.bandwidth_hz:.4g} Hz"
 
     def apply(self, values: FloatArray, derivative: int = 0) -> FloatArray:
-        """Smoothed values, or their first or second derivative, (n,); the ends are those of the last window's cubic."""
+        """Smoothed values, or their first or second derivative, (n,); the last window's cubic gives the ends."""
         from scipy.signal import savgol_filter
 
         if len(values) < self.window:
@@ -486,7 +487,7 @@ class LocalPolynomial:
 
 
 def local_polynomial(sampling_rate_hz: float, bandwidth_hz: float | None = None) -> LocalPolynomial:
-    """Return the filter whose bandwidth is nearest below the wanted one; None: the shortest.
+    """Return the filter with the largest bandwidth up to the one requested; None: the shortest filter.
 
     Raises
     ------
@@ -502,7 +503,7 @@ def local_polynomial(sampling_rate_hz: float, bandwidth_hz: float | None = None)
             f"bandwidth_hz is {bandwidth_hz:g} Hz",
             allowed=f"up to {shortest.bandwidth_hz:.4g} Hz at {sampling_rate_hz:g} Hz sampling rate",
         )
-    # The bandwidth falls as 1/window, nearly: a start, then step by step.
+    # The bandwidth falls nearly as 1/window: an initial guess, then step by step.
     window = int(SHORTEST * shortest.bandwidth_hz / bandwidth_hz) // 2 * 2 + 1
     window = max(window - 4, SHORTEST)
     while LocalPolynomial(window, sampling_rate_hz).bandwidth_hz > bandwidth_hz:
@@ -512,7 +513,7 @@ def local_polynomial(sampling_rate_hz: float, bandwidth_hz: float | None = None)
 
 RATIO_TOLERANCE = 0.02
 MAX_PLAY_TEETH = 0.5
-"""Of a tooth pitch: both angles may differ by the backlash."""
+"""Maximum difference of both angles as a fraction of a tooth pitch, for the backlash."""
 
 
 def measure_motion(
@@ -525,9 +526,9 @@ def measure_motion(
 ) -> PairMotion:
     """Return the motion of the gear pair whose contact the rig describes.
 
-    What is measured is taken as it is. A missing speed is the slope of the angle, a missing acceleration that of the
-    speed (else the second derivative of the angle), by a Savitzky–Golay filter. A missing angle is the sum of the
-    speed, which drifts.
+    Measured quantities are used unchanged. A missing speed is the derivative of the angle, a missing acceleration that
+    of the speed (else the second derivative of the angle), by a Savitzky–Golay filter. A missing angle is the integral
+    of the speed, which drifts.
 
     Parameters
     ----------
@@ -537,15 +538,15 @@ def measure_motion(
     use : mapping or None
         Role → channel, see `gearsig.motion.ROLES`; the others are found by name.
     bandwidth_hz : float or None
-        Everything is smoothed to it. None: what is measured stays as it is, derivatives come from seven samples.
+        Everything is smoothed to it. None: measured quantities are unchanged and derivatives use seven samples.
     unwrap : bool
-        Whether angles start again after each revolution.
+        Whether angles restart after each revolution.
 
     Raises
     ------
     InputError
-        If an angle jumps or wraps, both angles do not go together as the teeth want, a speed or acceleration does not
-        go with its angle, or a unit is not known.
+        If an angle jumps or wraps, the ratio of both angles contradicts the teeth, a speed or acceleration contradicts
+        its angle, or a unit is not known.
     RefusalError
         If the rig has no contact, or neither angle nor speed of a gear was measured.
     """
@@ -587,7 +588,7 @@ def measure_motion(
 
 @dataclass
 class _Reader:
-    """Reads channels and derives what is missing, keeping book of it."""
+    """Reads channels, derives what is missing and records the origin of each."""
 
     recording: Recording
     rig: Rig
@@ -599,7 +600,7 @@ class _Reader:
     notes: list[str] = field(default_factory=list)
 
     def measured(self, role: str) -> FloatArray:
-        """Return a measured channel in SI units, smoothed where a bandwidth is wanted."""
+        """Return a measured channel in SI units, smoothed if a bandwidth is given."""
         name = self.roles[role]
         values = role_values(self.recording, self.rig, role, name)
         if role.endswith(" angle"):
@@ -617,7 +618,7 @@ class _Reader:
         )
         if angle_role not in self.roles and speed_role not in self.roles:
             raise RefusalError(
-                f"neither angle nor speed of the {side} gear was measured: how far the flanks are apart is not known",
+                f"neither angle nor speed of the {side} gear was measured: the distance of the flanks is not known",
                 remedy='give its channel quantity = "angle" and the shaft\'s name as position in its [[sensor]] table, '
                 f'or use it as "{angle_role}"; an acceleration alone drifts away',
             )
@@ -664,19 +665,19 @@ class _Reader:
 
 
 def _check_ratio(driver_rad: FloatArray, driven_rad: FloatArray, path: PathOfContact, where: str) -> None:
-    """Refuse angles that do not belong to one gear pair: another sense, another unit, another shaft."""
+    """Refuse angles that do not belong to one gear pair: wrong sign, unit or shaft."""
     z1, z2 = path.teeth
     first, last = int(np.argmin(driver_rad)), int(np.argmax(driver_rad))
     turned, follows = driver_rad[last] - driver_rad[first], driven_rad[last] - driven_rad[first]
     expected = turned * z1 / z2
-    # Below 0.2 rad of the driver the ratio of both angles says nothing.
+    # Below 0.2 rad of the driver the ratio of both angles is not significant.
     if turned < 0.2 or abs(follows - expected) < RATIO_TOLERANCE * expected + MAX_PLAY_TEETH * 2.0 * pi / z2:
         return
     against = abs(follows + expected) < RATIO_TOLERANCE * expected + MAX_PLAY_TEETH * 2.0 * pi / z2
     raise InputError(
         f"the driver turns by {turned:.4g} rad and the driven gear by {follows:.4g} rad"
-        + (", the other way round" if against else ""),
+        + (", in the opposite direction" if against else ""),
         where=where,
-        allowed=f"{expected:.4g} rad, by {z1} and {z2} teeth, both counted in their gear's own direction",
+        allowed=f"{expected:.4g} rad, by {z1} and {z2} teeth, each counted in its gear's direction",
         remedy="give scale = -1 in the driven angle's [[sensor]]" if against else "check units, scales and teeth",
     )

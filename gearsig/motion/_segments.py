@@ -1,4 +1,4 @@
-"""How one shaft moves: segments forwards, backwards and at rest; starts, stops, reversals; signals over its angle."""
+"""Motion of one shaft: segments forwards, backwards and at rest; starts, stops, reversals; signals over its angle."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from gearsig.results import Result
 from gearsig.spectra import Spectrum, amplitude_spectrum
 
 AT_ONCE, FIRST_S = 0.15, 0.01
-"""Of the top speed of the first segment: slower on average in its first hundredth of a second, it begins from rest."""
+"""The first segment starts from rest if its mean speed in the first FIRST_S seconds is below this share of its top."""
 
 
 @dataclass(frozen=True)
 class MotionSegment:
-    """A time in which a shaft turns one way, or stands.
+    """A period in which a shaft turns in one direction, or is at rest.
 
     Parameters
     ----------
     direction : int
         1, −1, or 0 at rest.
     first, last : int
-        Samples; the last is not in it.
+        Samples; the last is exclusive.
     start_s, end_s : float
     turned_rad : float
     top_speed_rad_s : float
-        Largest magnitude.
+        Maximum magnitude.
     """
 
     direction: int
@@ -52,14 +52,14 @@ class MotionSegment:
 
 @dataclass(frozen=True)
 class MotionSegments(Result, rows="segments"):
-    """The segments of a recording, and what they add up to.
+    """The segments of a recording, and their totals.
 
     Parameters
     ----------
     segments : tuple of MotionSegment
-        One after the other, without gaps.
+        Consecutive, without gaps.
     starts_at_once : bool
-        Whether the shaft stands at the first sample and moves from it on: a start without a rest ahead of it.
+        Whether the shaft is at rest in the first sample and moves from then on: a start without a preceding rest.
     """
 
     segments: tuple[MotionSegment, ...]
@@ -83,7 +83,7 @@ class MotionSegments(Result, rows="segments"):
 
     @property
     def summary(self) -> str:
-        """Starts and stops in words; a record that begins or ends in motion holds one less of them."""
+        """Numbers of starts and stops in words, and whether the record begins or ends in motion."""
         counts = f"{counted(len(self.starts_s), 'start')} and {counted(len(self.stops_s), 'stop')}"
         moves = {"begins": self.segments[0].direction and not self.starts_at_once, "ends": self.segments[-1].direction}
         ends = [name for name, is_moving in moves.items() if is_moving]
@@ -91,23 +91,23 @@ class MotionSegments(Result, rows="segments"):
 
     @property
     def n_reversals(self) -> int:
-        """Changes from one direction to the other, with or without a rest between."""
+        """Number of changes of direction, with or without a rest between."""
         return sum(a.direction != b.direction for a, b in pairwise(self.moving))
 
     @property
     def standing_part(self) -> float:
-        """Part of the time at rest."""
+        """Fraction of the time at rest."""
         total = sum(s.duration_s for s in self.segments)
         return sum(s.duration_s for s in self.segments if not s.direction) / total
 
     @property
     def top_speed_rpm(self) -> float:
-        """Highest speed of all segments; 0 where nothing turns."""
+        """Maximum speed of all segments; 0 if nothing turns."""
         return max((s.top_speed_rad_s for s in self.moving), default=0.0) * 30.0 / np.pi
 
     @property
     def backwards_rad(self) -> float:
-        """Angle turned against the direction in which most is turned."""
+        """Angle turned against the predominant direction."""
         turned = [sum(abs(s.turned_rad) for s in self.segments if s.direction == d) for d in (1, -1)]
         return float(min(turned))
 
@@ -118,18 +118,18 @@ class MotionSegments(Result, rows="segments"):
 def motion_segments(
     angle_rad: FloatArray, sampling_rate_hz: float, speed_rad_s: FloatArray | None = None
 ) -> MotionSegments:
-    """Cut a shaft's motion into segments forwards, backwards and at rest.
+    """Divide a shaft's motion into segments forwards, backwards and at rest.
 
-    At rest is a speed below 2 % of its 95 % quantile, or within five standard deviations of its scatter from sample to
-    sample, for at least 30 ms. A segment that turns by less than 2 % of the longest one is rest as well.
+    The shaft is at rest if its speed is below 2 % of the 95 % quantile, or within five standard deviations of its
+    sample-to-sample noise, for at least 30 ms. A segment that turns by less than 2 % of the longest is also rest.
 
     Parameters
     ----------
     angle_rad : array, (n,)
-        Running on.
+        Continuous.
     sampling_rate_hz : float
     speed_rad_s : array, (n,), or None
-        None: derived from the angle within 50 Hz, see `shaft_speed_rad_s`.
+        None: derived from the angle up to 50 Hz, see `shaft_speed_rad_s`.
 
     Raises
     ------
@@ -140,15 +140,15 @@ def motion_segments(
     if speed_rad_s is None:
         speed_rad_s = shaft_speed_rad_s(angle_rad, sampling_rate_hz)
     if len(angle_rad) != len(speed_rad_s) or len(speed_rad_s) < 8:
-        raise InputError(f"{len(angle_rad)} angles for {len(speed_rad_s)} speeds", allowed="as many, at least 8")
+        raise InputError(f"{len(angle_rad)} angles for {len(speed_rad_s)} speeds", allowed="equal numbers, at least 8")
     scatter = median_deviation(np.diff(speed_rad_s, 2)) / np.sqrt(6.0)
     threshold = max(0.02 * float(np.quantile(np.abs(speed_rad_s), 0.95)), 5.0 * scatter, 1e-12)
     directions = np.where(np.abs(speed_rad_s) < threshold, 0, np.sign(speed_rad_s)).astype(np.int64)
-    # A shorter rest is the turning point of a swing, a shorter motion a tremor.
+    # A shorter rest is the turning point of an oscillation, a shorter motion a tremor.
     shortest = max(2, round(0.03 * sampling_rate_hz))
     _absorb(directions, shortest)
     segments = _cut(directions, angle_rad, speed_rad_s, sampling_rate_hz)
-    # What turns by less than 2 % of the longest segment is a standing machine that is struck, not started.
+    # A segment that turns by less than 2 % of the longest is a machine at rest that is struck, not started.
     min_turned_rad = 0.02 * max(abs(s.turned_rad) for s in segments)
     for segment in segments:
         if abs(segment.turned_rad) < min_turned_rad:
@@ -158,24 +158,24 @@ def motion_segments(
 
 
 def is_start_stop(segments: MotionSegments) -> bool:
-    """Say whether a motion starts and stops, or reverses: no speed to count orders by.
+    """Whether a motion starts and stops, or reverses, so that it has no speed for orders.
 
-    A run-up from rest does not: what follows can be counted in revolutions. Nor does less than 5 % of the time at rest,
-    or a tenth of a radian turned back.
+    Not so for a run-up from rest, which can be tracked in revolutions, or for less than 5 % of the time at rest or
+    0.1 rad turned backwards.
     """
     rests = bool(segments.starts_s) and bool(segments.stops_s) and segments.standing_part >= 0.05
     return rests or segments.backwards_rad >= 0.1
 
 
 def _starts_at_once(first: MotionSegment, angle_rad: FloatArray, rate_hz: float) -> bool:
-    """Say whether the first segment moves, and began to with the record."""
+    """Whether the first segment moves and started with the record."""
     n = min(max(2, round(FIRST_S * rate_hz)), first.last - 1)
     speed = abs(float(angle_rad[n] - angle_rad[0])) * rate_hz / n
     return bool(first.direction) and speed < AT_ONCE * first.top_speed_rad_s
 
 
 def _absorb(directions: np.ndarray, shortest: int) -> None:
-    """Give runs that are too short the direction of the run before them, the shortest first; in place."""
+    """Give runs that are too short the direction of the run before, shortest first; in place."""
     while True:
         bounds = _bounds(directions)
         lengths = np.diff(bounds)
@@ -196,7 +196,7 @@ def _cut(
 
 
 def _bounds(directions: np.ndarray) -> NDArray[np.intp]:
-    """Return where runs of one direction begin, and where the last one ends."""
+    """Return the starts of runs of one direction, and the end of the last."""
     return np.concatenate([[0], np.flatnonzero(np.diff(directions)) + 1, [len(directions)]])
 
 
@@ -214,7 +214,7 @@ RUN_UP, RUNNING, RUN_DOWN, AT_REST = "run-up", "running", "run-down", "at rest"
 
 @dataclass(frozen=True)
 class Phase:
-    """A time with a name: one of `RUN_UP`, `RUNNING`, `RUN_DOWN`, `AT_REST`."""
+    """A named period: `RUN_UP`, `RUNNING`, `RUN_DOWN` or `AT_REST`."""
 
     name: str
     start_s: float
@@ -222,27 +222,27 @@ class Phase:
 
 
 def shaft_speed_rad_s(angle_rad: FloatArray, sampling_rate_hz: float) -> FloatArray:
-    """Return the speed of a shaft within 50 Hz, (n,), from its angle."""
-    # A shaft starts and stops within 50 Hz; what is faster is ringing.
+    """Return the speed of a shaft up to 50 Hz, (n,), from its angle."""
+    # Starts and stops of a shaft are slower than 50 Hz; anything faster is ringing.
     smoother = local_polynomial(sampling_rate_hz, min(50.0, 0.1 * sampling_rate_hz))
     return smoother.apply(angle_rad, 1)
 
 
 def find_phases(segments: MotionSegments, speed_rad_s: FloatArray, sampling_rate_hz: float) -> tuple[Phase, ...]:
-    """Cut every segment in motion where it first reaches, and where it last has, 90 % of its highest speed.
+    """Divide each moving segment where it first reaches, and where it last has, 90 % of its maximum speed.
 
     Parameters
     ----------
     segments : MotionSegments
     speed_rad_s : array, (n,)
-        The smoothed one that the segments were found from: ringing would pass for running.
+        The smoothed speed that the segments were found from: with ringing, the result would be wrong.
     sampling_rate_hz : float
 
     Returns
     -------
     tuple of Phase
-        One after the other from the record's begin to its end; a phase of no length is left out. A segment that is
-        cut by the record's end has no run-down, one that is cut by its begin no run-up.
+        Consecutive, from the start of the record to its end, without phases of zero length. A segment cut off by the
+        end of the record has no run-down, and one cut off by its start no run-up.
     """
     phases: list[Phase] = []
     for segment in segments.segments:
@@ -262,13 +262,13 @@ def _of_motion(segment: MotionSegment, speed_rad_s: FloatArray, rate_hz: float) 
 
 @dataclass(frozen=True)
 class AngleProfile:
-    """Level of a signal in each tooth pitch of a shaft, forwards and backwards apart.
+    """Level of a signal in each tooth pitch of a shaft, separately for forward and backward motion.
 
     Parameters
     ----------
     n_teeth : int
     rms_forwards, rms_backwards : arrays, (n_teeth,)
-        In the signal's unit; nan where a tooth was never passed that way.
+        In the signal's unit; nan if a tooth was never passed in that direction.
     passes_forwards, passes_backwards : array of int, (n_teeth,)
     """
 
@@ -280,17 +280,17 @@ class AngleProfile:
 
 
 def angle_profile(values: FloatArray, angle_rad: FloatArray, segments: MotionSegments, n_teeth: int) -> AngleProfile:
-    """Return the root mean square over angle of a signal within each tooth pitch.
+    """Return the RMS over angle of a signal within each tooth pitch.
 
-    Every segment of one direction is followed by its own angle, so that a stop in the middle of a tooth or a turn back
-    needs no speed; samples weigh by the angle they cover, so that a slow passage counts no more than a fast one.
-    Samples at rest have no angle and are left out.
+    The angle itself assigns samples to teeth, so that stops within a tooth and reversals need no speed. Samples are
+    weighted by the angle they cover, so that a slow passage counts no more than a fast one. Samples at rest are left
+    out.
 
     Parameters
     ----------
     values : array, (n,)
     angle_rad : array, (n,)
-        Of the shaft, running on.
+        Of the shaft, continuous.
     segments : MotionSegments
     n_teeth : int
 
@@ -333,22 +333,22 @@ def segment_order_spectrum(
     source: str = "",
     shaft: str = "",
 ) -> Spectrum:
-    """Return the order spectrum of all segments of one direction, however fast, slow or short they are.
+    """Return the order spectrum of all segments of one direction, at any speed.
 
-    Each segment is cut into equal steps of angle; a step holds the signal's mean over it, ∫x dθ/Δθ, so that slow
-    passages are averaged and do not fold back, and the passage to and from standstill needs no speed. Blocks of
-    whole steps are windowed (Hann), and their power is averaged over all segments.
+    Each segment is divided into equal steps of angle that hold the signal's mean, ∫x dθ/Δθ: slow passages are averaged
+    and do not alias, and motion from and to rest needs no speed. Blocks of whole steps are windowed (Hann), and their
+    power is averaged over all segments.
 
     Parameters
     ----------
     values : array, (n,)
     angle_rad : array, (n,)
-        Of the shaft, running on.
+        Of the shaft, continuous.
     segments : MotionSegments
     direction : str
-        "forwards" or "backwards"; backwards orders count up as well.
+        "forwards" or "backwards"; orders are positive in both.
     revolutions_per_block : float
-        Segments that are shorter are left out. The lines lie 1/this apart.
+        Shorter segments are left out. The line spacing is its reciprocal.
     unit, source, shaft : str
 
     Returns
@@ -359,13 +359,13 @@ def segment_order_spectrum(
     Raises
     ------
     InputError
-        On another direction, or if values and angles differ in number.
+        If the direction is unknown, or values and angles differ in number.
     RefusalError
         If no segment of that direction is long enough.
 
     Notes
     -----
-    Phases differ from segment to segment and are not kept. A resonance that rings on in time smears here.
+    Phases differ between segments and are not kept. A resonance, which rings in time, is smeared over orders.
     """
     one_of(direction, "direction", ("forwards", "backwards"))
     positive(revolutions_per_block, "revolutions_per_block")
@@ -378,8 +378,8 @@ def segment_order_spectrum(
     if not long:
         longest = max(turns, default=0.0)
         raise RefusalError(
-            f"no segment {direction} holds {revolutions_per_block:g} revolutions (the longest {longest:.3g})",
-            remedy="give fewer revolutions per block: the lines then lie further apart",
+            f"no segment {direction} holds {revolutions_per_block:g} revolutions (the longest has {longest:.3g})",
+            remedy="give fewer revolutions per block: the resolution is then coarser",
         )
     per_revolution = _samples_per_revolution(angle_rad, long)
     n_block = floor(revolutions_per_block * per_revolution)
@@ -409,27 +409,27 @@ def steps_of_angle(
 
 
 def _samples_per_revolution(angle_rad: FloatArray, segments: list[MotionSegment]) -> int:
-    """As many as the fastest passage has samples, no more."""
+    """Steps of angle per revolution: as many as the fastest passage has samples."""
     step = max(float(np.quantile(np.abs(np.diff(angle_rad[s.first : s.last])), 0.99)) for s in segments)
     n_orders = floor(2.0 * np.pi / step)
     if n_orders < MIN_SAMPLES:
         raise RefusalError(
-            f"the shaft turns by {step:.3g} rad between samples: {n_orders} samples a revolution",
+            f"the shaft turns by {step:.3g} rad between samples: {n_orders} samples per revolution",
             remedy="record at a higher rate",
         )
     return n_orders
 
 
 def _mean(spectra: list[Spectrum], per_revolution: int, unit: str, source: str, shaft: str) -> Spectrum:
-    """Mean power of the segments, as amplitude over order, what the steps' means lost made up."""
+    """Mean power of the segments, as amplitude over order, corrected for the attenuation of the steps' means."""
     weights = np.array([s.n_averages for s in spectra], dtype=np.float64)
     power = np.average([s.values for s in spectra], axis=0, weights=weights)
     first = spectra[0]
-    # At a quarter of the samples per revolution the mean over a step of angle has lost a tenth, which is made up.
+    # At a quarter of the samples per revolution the mean over a step attenuates by a tenth, which is corrected.
     keep = first.positions <= 0.25 * per_revolution
     lost = np.sinc(first.positions[keep] / per_revolution)
     amplitude = np.sqrt(2.0 * power[keep]) / lost
-    amplitude[0] /= np.sqrt(2.0)  # of a mean the amplitude is the value itself
+    amplitude[0] /= np.sqrt(2.0)  # the amplitude of a mean is its value
     return Spectrum(
         amplitude,
         first.positions[keep],
@@ -447,22 +447,22 @@ def _mean(spectra: list[Spectrum], per_revolution: int, unit: str, source: str, 
 
 @dataclass(frozen=True)
 class Burst:
-    """A blow: time of its beginning and largest magnitude in its first milliseconds."""
+    """A burst: time of its onset and maximum magnitude in its first milliseconds."""
 
     time_s: float
     peak: float
 
 
 def find_bursts(values: FloatArray, sampling_rate_hz: float) -> tuple[Burst, ...]:
-    """Find where a vibration rises at once, far over its quiet level.
+    """Find where a vibration rises suddenly, far above its quiet level.
 
-    Those below 35 % of the hardest are left out. The level is the root mean square over 2 ms; quiet is its 20 %
-    quantile, which a machine that stands now and then has.
+    Bursts below 35 % of the hardest are left out. The level is the RMS over 2 ms; the quiet level is its 20 % quantile,
+    which exists for machines that rest at times.
 
     Raises
     ------
     InputError
-        If the rate is below 2 kHz, where a blow would be a single sample, or the record is shorter than 40 ms.
+        If the rate is below 2 kHz, where a burst would be a single sample, or the record is shorter than 40 ms.
     """
     positive(sampling_rate_hz, "sampling_rate_hz", "Hz")
     if sampling_rate_hz < 2000.0:
@@ -475,10 +475,10 @@ def find_bursts(values: FloatArray, sampling_rate_hz: float) -> tuple[Burst, ...
     level = np.sqrt((power[n:] - power[:-n]) / n)  # level[i] covers samples i to i + n
     quiet = float(np.quantile(level, 0.2))
     ahead, behind = level[n:], level[:-n]
-    # White noise does not reach 8 times the quiet level in an hour; a blow begins at once, ringing does not.
+    # White noise does not reach 8 times the quiet level in an hour; an impact rises suddenly, ringing does not.
     rises = (ahead > 8.0 * quiet) & (ahead > 2.0 * behind)
     bursts: list[Burst] = []
-    # A blow rings; the next one is looked for after 4 ms, where it stands out of the ringing.
+    # An impact rings; look for the next one after 4 ms, where it exceeds the ringing.
     dead, next_free = round(4e-3 * sampling_rate_hz), 0
     for i in map(int, np.flatnonzero(rises)):
         if i < next_free:
@@ -488,5 +488,5 @@ def find_bursts(values: FloatArray, sampling_rate_hz: float) -> tuple[Burst, ...
         bursts.append(Burst(begin / sampling_rate_hz, float(segment.max())))
         next_free = i + dead
     hardest = max((burst.peak for burst in bursts), default=0.0)
-    # Below a third of the hardest blow, teeth that merely take up their load are counted as well.
+    # Below a third of the hardest burst, teeth that only take up their load would be counted, too.
     return tuple(burst for burst in bursts if burst.peak >= 0.35 * hardest)

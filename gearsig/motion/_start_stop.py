@@ -1,4 +1,4 @@
-"""Everything that start–stop motion of a gear pair shows, in one result."""
+"""All results from the start–stop motion of a gear pair."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from gearsig.results import Result
 
 @dataclass(frozen=True)
 class StartStop(Result, rows="impacts"):
-    """What a start–stop motion shows.
+    """All results from a start–stop motion.
 
     Parameters
     ----------
@@ -32,14 +32,14 @@ class StartStop(Result, rows="impacts"):
     impacts : tuple of Impact
     loop : TorqueTwist or None
     portrait : PhasePortrait or None
-        Compression and its rate, from the middle of the play.
-    teeth : ToothCompliance or None
-        Of the driver's teeth one by one.
+        Compression and its rate, from the middle of the backlash.
+    teeth : ToothYielding or None
+        Of each tooth of the driver.
     indicators : tuple of Indicator
     refusals : tuple of str
-        What could not be told, with the reason.
+        Results that the record does not allow, with the reason.
     notes : tuple of str
-        What is told in part.
+        Limitations of the results.
     """
 
     motion: PairMotion
@@ -55,14 +55,14 @@ class StartStop(Result, rows="impacts"):
 
 
 def examine_start_stop(motion: PairMotion) -> StartStop:
-    """Find segments, backlash, impacts, the loop of torque over twist and the phase plane of a pair's motion.
+    """Find segments, backlash, impacts, the torque–twist loop and the phase plane of a pair's motion.
 
-    What the record does not allow is left out and said in `refusals`.
+    Results that the record does not allow are listed in `refusals` instead.
 
     Raises
     ------
     RefusalError
-        If the machine stands all the time: its stop is longer than the record.
+        If the machine is at rest in the whole record.
     """
     check_turns(motion)
     segments = motion_segments(motion.driver_angle_rad, motion.sampling_rate_hz)
@@ -102,7 +102,7 @@ def examine_start_stop(motion: PairMotion) -> StartStop:
 
 
 def phase_plane_of_teeth(motion: PairMotion, datum_m: float) -> PhasePortrait:
-    """Return compression and its rate: two walls a backlash apart, with the flights between them."""
+    """Return the phase plane of compression and its rate: two flanks a backlash apart, with flights between them."""
     points = np.stack([motion.compression_m - datum_m, motion.compression_rate_mps], axis=1)
     return PhasePortrait(
         points, motion.sampling_rate_hz, ("compression", "compression rate"), ("m", "m/s"), "states", motion.source
@@ -118,8 +118,8 @@ def start_stop_indicators(
 ) -> tuple[Indicator, ...]:
     """Return indicators that need no steady speed.
 
-    Starts, stops, rests, reversals; run-down; backlash; impacts: number, hardest, energy lost per cycle, restitution;
-    loss and work per cycle, lost motion.
+    Starts, stops, rests, reversals; run-down; backlash; number of impacts, hardest impact, energy lost per cycle,
+    restitution; loss and work per cycle, lost motion.
     """
     n_cycles = max(1, len(segments.moving))
     top_rpm = segments.top_speed_rpm
@@ -156,7 +156,7 @@ def start_stop_indicators(
 
 
 def run_down_rad_s2(motion: PairMotion, segments: MotionSegments) -> float:
-    """Median over stops of the driver's mean deceleration from 80 to 20 % of its top speed; nan for none."""
+    """Median over stops of the driver's mean deceleration from 80 to 20 % of its top speed; nan without stops."""
     slopes = []
     for segment in segments.moving:
         speed = np.abs(motion.driver_speed_rad_s[segment.first : segment.last])
@@ -169,15 +169,15 @@ def run_down_rad_s2(motion: PairMotion, segments: MotionSegments) -> float:
 
 
 def _notes(impacts: tuple[Impact, ...], rate_hz: float) -> tuple[str, ...]:
-    """Say of how many bounces the restitution cannot be read off the samples."""
+    """Say for how many bounces the restitution cannot be estimated."""
     n = sum(bool(i.note) for i in impacts)
     if not n:
         return ()
     known = n + sum(not np.isnan(i.restitution) for i in impacts)
-    # From 4 kHz on all hard impacts of the manipulator are found.
+    # From 4 kHz, all hard impacts of the manipulator are found.
     remedy = "; record at 4 kHz or more" if rate_hz < 4000.0 else ""
     text = (
-        f"The restitution of {n} of {known} bounces cannot be read: they part faster than they met, as noise is too "
-        f"large or samples at {rate_hz:g} Hz are too few for their flights{remedy}."
+        f"The restitution of {n} of {known} bounces cannot be estimated: separation is faster than approach, as there "
+        f"is too much noise or too few samples per flight at {rate_hz:g} Hz{remedy}."
     )
     return (text,)

@@ -23,30 +23,30 @@ NAME, UNIT = "transmission error", "um"
 
 USUAL_PRESSURE_ANGLE_DEG = 20.0
 LARGEST_STEPS, SMALLEST_STEPS = 32, 4
-"""Of a tooth pitch: more show nothing that a mesh makes, fewer do not show the mesh."""
+"""Steps per tooth pitch: more show nothing further of the mesh, fewer do not resolve it."""
 MIN_TURNS = 2.0
-"""Revolutions of the slower gear, from which what either gear repeats can be told from what the other does."""
+"""Minimum revolutions of the slower gear to separate what each gear repeats."""
 
 
 @dataclass(frozen=True)
 class TransmissionError(Result):
-    """δ = r_b1 θ1 − r_b2 θ2 over the driver's tooth pitches, and what either gear repeats of it.
+    """δ = r_b1 θ1 − r_b2 θ2 over the driver's tooth pitches, and the parts of it that each gear repeats.
 
-    δ is how far the driven gear lags behind perfect transmission, along the line of action; its mean is taken off.
-    Textbooks that count the driven gear's lead have the other sign. δ/r_b2 is the angle by which the driven gear lags.
+    δ is the lag of the driven gear behind perfect transmission along the line of action, with its mean removed; δ/r_b2
+    is the lag as an angle. Textbooks that count the driven gear's lead have the opposite sign.
 
     Parameters
     ----------
     cycles_um : array, (n_cycles, n_steps)
         δ; row n is the driver's pitch `first_pitch` + n from its angle 0.
     first_pitch, first_driven_pitch : int
-        Pitches of either gear from its angle 0 on which the first row lies: modulo its teeth, which tooth it is.
+        Pitch of each gear, from its angle 0, at the first row; modulo the number of teeth it gives the tooth.
     mesh_um : array, (n_steps,)
-        What each tooth pair repeats, mean 0.
+        Pattern common to all tooth pairs, mean 0.
     driver_um, driven_um : arrays, (z, n_steps)
-        What each tooth of that gear adds, mean 0 at each step.
+        Deviation of each tooth of that gear, mean 0 at each step.
     driver_error_um, driven_error_um : arrays, (z, n_steps)
-        Standard errors of these, from what nothing repeats.
+        Standard errors of these, from the residual.
     base_radii_m : (float, float)
     shafts : (str, str)
     time_s : array, (n_cycles,)
@@ -80,12 +80,12 @@ class TransmissionError(Result):
 
     @property
     def teeth(self) -> tuple[int, int]:
-        """Of driver and driven gear."""
+        """Numbers of teeth of driver and driven gear."""
         return len(self.driver_um), len(self.driven_um)
 
     @property
     def n_steps(self) -> int:
-        """Steps of a tooth pitch."""
+        """Number of steps per tooth pitch."""
         return int(self.cycles_um.shape[1])
 
     @property
@@ -96,21 +96,21 @@ class TransmissionError(Result):
 
     @property
     def mesh_hz(self) -> float:
-        """Tooth pairs per second."""
+        """Mesh frequency."""
         return self.speed_rpm / 60.0 * self.teeth[0]
 
     @cached_property
     def residual_um(self) -> FloatArray:
-        """What neither the mesh nor a gear repeats, (n_cycles, n_steps)."""
+        """Part that neither the mesh nor a gear repeats, (n_cycles, n_steps)."""
         return np.asarray(self.cycles_um - self.mesh_um - self.driver_um[self.tooth(0)] - self.driven_um[self.tooth(1)])
 
     def tooth(self, side: int) -> np.ndarray:
-        """Tooth of the driver (0) or the driven gear (1) that is in each row's pitch, from 0, (n_cycles,)."""
+        """Tooth of the driver (0) or the driven gear (1) in each row's pitch, from 0, (n_cycles,)."""
         first = (self.first_pitch, self.first_driven_pitch)[side]
         return np.asarray((first + np.arange(len(self.cycles_um))) % self.teeth[side])
 
     def average(self, side: int) -> SynchronousAverage:
-        """Return one revolution of the driver (0) or the driven gear (1): what that gear adds, without the mesh."""
+        """Return one revolution of the part of the driver (0) or the driven gear (1), without the mesh."""
         values, error = ((self.driver_um, self.driver_error_um), (self.driven_um, self.driven_error_um))[side]
         n_revolutions = int(len(self.cycles_um) / self.teeth[side])
         highest = self.teeth[side] * self.n_steps / 2.0
@@ -130,26 +130,26 @@ class TransmissionError(Result):
         return AngleSignal(values, per_revolution, angle, start, (NAME,), (UNIT,), per_revolution / 2.0)
 
     def spectrum(self) -> Spectrum:
-        """Return the peak amplitudes over orders of the driver."""
+        """Return the spectrum of peak amplitudes over orders of the driver."""
         return order_spectrum(self.signal(), NAME)
 
 
 def transmission_error(
     recording: Recording, rig: Rig | None = None, *, pair: str = "", use: Mapping[str, str] | None = None
 ) -> TransmissionError:
-    """Return the transmission error of a gear pair, and what the mesh, the driver and the driven gear repeat of it.
+    """Return the transmission error of a gear pair, separated into mesh, driver and driven gear.
 
-    δ = r_b1 θ1 − r_b2 θ2, r_b = m z cos α/2. Sampled over the driver's angle it is split as
+    δ = r_b1 θ1 − r_b2 θ2, r_b = m z cos α/2. Sampled over the driver's angle it is separated as
 
     δ(n, s) = mesh(s) + driver(n mod z1, s) + driven(n mod z2, s) + residual,
 
-    n the mesh cycle and s the place in it, by least squares at each s. Patterns that both gears repeat together, as
-    where teeth have a common divisor, are shared out evenly.
+    with n the mesh cycle and s the position in it, by least squares at each s. Patterns that both gears repeat, because
+    their tooth counts have a common divisor, are divided evenly.
 
     Parameters
     ----------
     recording : Recording
-        With an encoder, an angle or a tachometer of many pulses on each of both shafts.
+        With an encoder, an angle or a tachometer of many pulses on each shaft.
     rig : Rig or None
         With teeth and module; default: the recording's own.
     pair : str
@@ -167,13 +167,13 @@ def transmission_error(
 
     Notes
     -----
-    Quasi-static where the mesh harmonics in question lie well below the first resonance in which the teeth yield; else
-    the dynamic transmission error.
+    The result is quasi-static if the mesh harmonics of interest are well below the first resonance with tooth
+    deflection; otherwise it is the dynamic transmission error.
 
     An encoder's own errors repeat with its shaft and are in that gear's part: an eccentric disc looks like an eccentric
-    gear (order 1), errors of its lines like pitch errors. Neither changes with load, and both cancel in the difference
-    of two recordings between which the encoder was not moved. Errors within a line come back many times per tooth and
-    average out. Encoders that sit away from their gears add the twist of the shaft between.
+    gear (order 1), line errors look like pitch errors. Neither changes with load, and both cancel in the difference of
+    two recordings unless the encoder was moved in between. Errors within a line repeat many times per tooth and average
+    out. Encoders at a distance from their gears add the twist of the shaft between.
 
     Sources: J. D. Smith, *Gear Noise and Vibration*, 2nd ed., ch. 7 and 8; D. R. Houser, "Gear noise sources and their
     prediction using mathematical models", 1990.
@@ -185,7 +185,7 @@ def transmission_error(
     teeth, radii_m = _geometry(gears)
     (t1, angle_1), (t2, angle_2), notes = _both_angles(recording, known, gears, use or {})
 
-    # Both angles at the recording's own samples, wherever both are known.
+    # Both angles at the recording's samples, wherever both are known.
     rate = recording.sampling_rate_hz
     low, high = max(t1[0], t2[0]), min(t1[-1], t2[-1])
     time_s = np.arange(np.ceil(low * rate), np.floor(high * rate) + 1) / rate
@@ -196,7 +196,7 @@ def transmission_error(
     _check_pair(pitches, driven_pitches, teeth)
     error_um = 1e6 * (radii_m[0] * theta[0] - radii_m[1] * theta[1])
 
-    # Means over equal steps of the driver's angle: each is a low-pass at the step, and averages the readings in it.
+    # Means over equal steps of the driver's angle: a low-pass filter that averages the readings in each step.
     turned = float(pitches[-1] - pitches[0])
     readings = [turned / len(time_s), *(float(np.ptp(a)) * z / (2.0 * pi) / len(t) for t, a, z in
                 ((t1, angle_1, teeth[0]), (t2, angle_2, teeth[1])))]  # fmt: skip
@@ -240,7 +240,7 @@ def _geometry(pair: GearPair) -> tuple[tuple[int, int], tuple[float, float]]:
 
 
 # --------------------
-# From channels to the angle of either gear: times and angles running on.
+# From channels to the angle of each gear: times and continuous angles.
 # --------------------
 
 Angle = tuple[FloatArray, FloatArray]
@@ -267,7 +267,7 @@ def _both_angles(
     missing = [side for side in SIDES if side not in angles]
     if missing:
         raise RefusalError(
-            f"the angle of the {missing[0]} gear was not measured: a transmission error takes both",
+            f"the angle of the {missing[0]} gear was not measured: a transmission error needs both",
             remedy="fit an encoder to each shaft, and give its channel the shaft's name as position in its [[sensor]] "
             f'table, or use it as "{missing[0]} angle"',
         )
@@ -276,12 +276,12 @@ def _both_angles(
     for side, (time_s, angle) in list(angles.items()):
         if angle[-1] < angle[0]:
             angles[side] = time_s, -angle
-            notes.append(f"the {side} angle counts down; it is counted up")
+            notes.append(f"the {side} angle counts down; its sign was reversed")
     return angles["driver"], angles["driven"], notes
 
 
 def _from_encoder(angle_rad: FloatArray, recording: Recording, name: str) -> Angle:
-    """Read an angle at its samples; where it stands still between counts, at the instants when it counts."""
+    """Read an angle at its samples; if it is constant between counts, at the times of the counts."""
     angle, step_s = np.unwrap(angle_rad), 1.0 / recording.sampling_rate_hz
     steps = np.diff(angle)
     sizes = np.unique(np.abs(steps))
@@ -290,15 +290,15 @@ def _from_encoder(angle_rad: FloatArray, recording: Recording, name: str) -> Ang
     count_rad = float(np.min(apart[apart > 1e-3 * largest], initial=largest))
     moved = np.abs(steps) > 0.5 * count_rad
     if largest == 0.0:
-        raise RefusalError(f"the angle in channel {name!r} stands still", remedy="record while it turns")
-    if np.mean(moved) < 0.5:  # what is known is when a count was passed, to within a sample
+        raise RefusalError(f"the angle in channel {name!r} is constant", remedy="record while it turns")
+    if np.mean(moved) < 0.5:  # only the time of each count is known, to within a sample
         at = np.flatnonzero(moved)
         return (at + 0.5) * step_s, 0.5 * (angle[at] + angle[at + 1])
     return np.arange(len(angle)) * step_s, angle
 
 
 def _stated_pulses(recording: Recording, rig: Rig, shaft: str) -> Angle | None:
-    """Return the angle by the speed source, where that is pulses on this shaft."""
+    """Return the angle from the speed source if that is pulses on this shaft."""
     source = recording.speed_source if recording.speed_source is not None else rig.speed
     if isinstance(source, PulseTimes | TachometerChannel) and (source.shaft or rig.reference_shaft) == shaft:
         if isinstance(source, PulseTimes):
@@ -310,15 +310,15 @@ def _stated_pulses(recording: Recording, rig: Rig, shaft: str) -> Angle | None:
 
 
 def _counted(recording: Recording, channel: Channel, counterpart: Angle, ratio: float) -> Angle:
-    """Return the angle by a tachometer whose pulses per revolution follow from the other gear's turns and the teeth."""
+    """Return the angle from a tachometer; the other gear's angle and the teeth give its pulses per revolution."""
     edges = find_pulse_edges(recording.values(channel.name), recording.sampling_rate_hz)
     ends = edges.times_s[[0, -1]] if len(edges.times_s) > 1 else np.zeros(2)
     turned = abs(float(np.diff(np.interp(ends, counterpart[0], counterpart[1]))[0])) / (2.0 * pi) * ratio
     pulses = (len(edges.times_s) - 1) / turned if turned > 0.0 else 0.0
     if pulses < 1.0 or abs(pulses - round(pulses)) > 0.1:
         raise RefusalError(
-            f"tachometer {channel.name!r} makes {pulses:.4g} pulses per revolution as the teeth have it: that is no "
-            "whole number",
+            f"tachometer {channel.name!r} gives {pulses:.4g} pulses per revolution by the teeth, which is not a whole "
+            "number",
             remedy="check teeth and pulses, and record longer",
         )
     return _from_pulses(edges.times_s, round(pulses), edges.tick_s)
@@ -330,12 +330,12 @@ def _from_pulses(times_s: FloatArray, per_revolution: int, tick_s: float) -> Ang
 
 
 # --------------------
-# Over the driver's pitches, and what each gear repeats.
+# Averages over the driver's pitches, and the parts that each gear repeats.
 # --------------------
 
 
 def _check_pair(pitches: FloatArray, driven: FloatArray, teeth: tuple[int, int]) -> None:
-    """Refuse a shaft that turns back, and angles that are not those of one pair of gears in mesh."""
+    """Refuse a shaft that turns backwards, and angles that do not belong to one pair of gears in mesh."""
     back = float(np.max(np.maximum.accumulate(pitches) - pitches))
     if back > 0.5:
         raise RefusalError(
@@ -357,9 +357,9 @@ def _n_steps(pitches_per_reading: float, pair: GearPair) -> int:
     n = min(int(1.0 / pitches_per_reading), LARGEST_STEPS)
     if n < SMALLEST_STEPS:
         raise RefusalError(
-            f"a tooth pitch of pair {pair.name!r} holds {1.0 / pitches_per_reading:.2g} readings of an angle, "
-            f"{SMALLEST_STEPS} at least are needed",
-            remedy="encoders or tachometers with more lines, a lower speed, or a higher sampling rate",
+            f"a tooth pitch of pair {pair.name!r} holds {1.0 / pitches_per_reading:.2g} readings of an angle; at least "
+            f"{SMALLEST_STEPS} are needed",
+            remedy="use encoders or tachometers with more lines, a lower speed, or a higher sampling rate",
         )
     return n
 
@@ -367,7 +367,7 @@ def _n_steps(pitches_per_reading: float, pair: GearPair) -> int:
 def _check_length(n_cycles: int, teeth: tuple[int, int]) -> None:
     if n_cycles < MIN_TURNS * max(teeth):
         raise RefusalError(
-            f"the recording holds {n_cycles} tooth pitches, {MIN_TURNS:g} revolutions of the slower gear are "
+            f"the recording holds {n_cycles} tooth pitches; {MIN_TURNS:g} revolutions of the slower gear are "
             f"{MIN_TURNS * max(teeth):.0f}",
             remedy="record longer",
         )
@@ -376,7 +376,7 @@ def _check_length(n_cycles: int, teeth: tuple[int, int]) -> None:
 def _over_pitches(
     error_um: FloatArray, pitches: FloatArray, time_s: FloatArray, n_steps: int
 ) -> tuple[FloatArray, int, FloatArray]:
-    """Return means over steps of the pitch, (n_cycles, n_steps), the first pitch, and each pitch's mean time."""
+    """Return means over steps of the pitch, (n_cycles, n_steps), the first pitch, and the mean time of each pitch."""
     place = np.floor(pitches * n_steps).astype(np.int64)
     start = int(place.min() // n_steps)
     place -= start * n_steps
@@ -385,12 +385,12 @@ def _over_pitches(
     n = np.bincount(place, minlength=size).reshape(n_rows, n_steps)
     sums = np.bincount(place, error_um, minlength=size).reshape(n_rows, n_steps)
     times = np.bincount(place, time_s, minlength=size).reshape(n_rows, n_steps)
-    # Steps hardly longer than a reading now and then hold none: a single one lies on the line between its neighbours.
+    # Steps hardly longer than a reading are sometimes empty: a single one is interpolated from its neighbours.
     empty = n.ravel() == 0
     means = np.interp(np.arange(size), np.flatnonzero(~empty), sums.ravel()[~empty] / n.ravel()[~empty])
     full = np.flatnonzero(~(empty & np.roll(empty, 1)).reshape(n_rows, n_steps).any(axis=1) & (n.sum(axis=1) > 0))
-    full = full[(full > 0) & (full < n_rows - 1)]  # of the first and the last pitch a part may be missing
-    if len(full) and np.any(np.diff(full) > 1):  # the longest run without a hole
+    full = full[(full > 0) & (full < n_rows - 1)]  # the first and last pitch may be incomplete
+    if len(full) and np.any(np.diff(full) > 1):  # the longest run without a gap
         runs = np.split(full, np.flatnonzero(np.diff(full) > 1) + 1)
         full = max(runs, key=len)
     if not len(full):
@@ -402,10 +402,10 @@ def _over_pitches(
 def _parts(
     rows: FloatArray, first: int, first_driven: int, teeth: tuple[int, int]
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Split rows into mesh, driver's and driven gear's teeth, with standard errors of both.
+    """Separate rows into mesh, driver teeth and driven teeth, with standard errors of both.
 
-    The normal equations hold how often each tooth and each pair of teeth came; their pseudo-inverse gives the solution
-    of least norm, which shares out evenly what both gears repeat.
+    The normal equations contain how often each tooth and each pair of teeth occurred; their pseudo-inverse gives the
+    minimum-norm solution, which divides evenly what both gears repeat.
     """
     z1, z2 = teeth
     n = np.arange(len(rows))

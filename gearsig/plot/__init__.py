@@ -1,9 +1,9 @@
-"""Figures of results; no arithmetic beyond display units.
+"""Figures of results, without arithmetic beyond display units.
 
-A method with its figure is one call: `order_spectrum(recording, "a1")`, `order_map`, `envelope_spectrum`, `kurtogram`,
-`stft`, `cwt`, … of the methods' own names. A result is drawn by `figure_of(result)`, or, with limits, marks and titles,
-by the function named after it: `spectrum_figure`, `order_map_figure`, `time_frequency_figure`, `average_figure`, ….
-`figure_svg` and `embed` write a figure, `marks_of` gives a rig's expected lines.
+One call runs a method and draws its figure, under the method's own name: `order_spectrum(recording, "a1")`,
+`order_map`, `envelope_spectrum`, `kurtogram`, `stft`, `cwt`, …. `figure_of(result)` draws a result; the function named
+after the result also takes limits, marks and titles: `spectrum_figure`, `order_map_figure`, `time_frequency_figure`,
+`average_figure`, …. `figure_svg` and `embed` write a figure, `marks_of` gives the places on a shaft that findings name.
 """
 
 from gearsig.plot._average import average_figure, polar_figure

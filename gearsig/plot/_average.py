@@ -1,4 +1,4 @@
-"""The synchronous average along the angle: average above, residual below."""
+"""Synchronous averages over the angle, in straight and polar figures."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ if TYPE_CHECKING:
 def average_figure(
     averages: Sequence[SynchronousAverage], *, n_teeth: int | None = None, marks: Sequence[AngleMark] = ()
 ) -> Figure:
-    """Draw averages of one shaft below each other over the angle, with bands of ± 2 standard errors.
+    """Draw averages of one shaft in rows over the angle, with bands of ± 2 standard errors.
 
     Parameters
     ----------
     averages : sequence of SynchronousAverage
         E.g. average and residual; at least one.
     n_teeth : int or None
-        Draws a tick per tooth.
+        Draw a tick per tooth.
     marks : sequence of AngleMark
 
     Returns
@@ -89,7 +89,7 @@ def _name(axes: Axes, mark: AngleMark) -> None:
     )
 
 
-# Radii of the picture, in its own units: zero of the signal, its largest swing, and the gear outside.
+# Radii of the picture, in its own units: zero of the signal, its maximum swing, and the gear outside.
 ZERO, SWING, ROOT, TIP, NUMBERS, LABELS, EDGE = 1.0, 0.55, 1.66, 1.81, 1.93, 2.22, 2.36
 
 
@@ -103,20 +103,20 @@ def polar_figure(
 ) -> Figure:
     """Draw one mean revolution around the circle with its band of ± 2 standard errors.
 
-    Angle runs clockwise from the top, where the average starts; tooth 1 begins there. Outwards is positive.
+    The angle runs clockwise from the top, where the average and tooth 1 start. Outwards is positive.
 
     Parameters
     ----------
     average : SynchronousAverage
-        Usually the residual or difference signal: there a single tooth stands out.
+        Usually the residual or difference signal, in which a single tooth stands out.
     n_teeth : int or None
-        Draws the teeth.
+        Draw the teeth.
     marks : sequence of AngleMark
-        Drawn in the colour of faults, with their tooth.
+        Drawn in the fault colour, with their tooth.
     largest : float or None
-        Value drawn at full swing, for pictures that are to be compared; None: this average's own.
+        Value drawn at full swing, for pictures to be compared; None: the maximum of this average.
     numbered : bool
-        Whether the teeth have numbers: those of a shaft without a mark have none.
+        Whether to number the teeth; a shaft without a reference mark has no tooth numbers.
 
     Returns
     -------
@@ -157,7 +157,7 @@ def _draw_signal(axes: PolarAxes, average: SynchronousAverage, scale: float) -> 
 
 
 def _rings(axes: PolarAxes, full: float, unit: str) -> None:
-    """Draw zero and one round value either side of it."""
+    """Draw rings at zero and at one round value on each side of it."""
     ring = np.linspace(0, 2 * np.pi, 361)
     axes.plot(ring, np.full_like(ring, ZERO), color=style.QUIET, linewidth=0.7, zorder=1)
     value = _round_below(full)
@@ -171,19 +171,19 @@ def _rings(axes: PolarAxes, full: float, unit: str) -> None:
 
 
 def _round_below(value: float) -> float:
-    """Return the largest of 1, 2, 5 × 10ⁿ that is not above `value`."""
+    """Return the largest number 1, 2 or 5 × 10ⁿ that does not exceed `value`."""
     power = 10.0 ** floor(log10(value))
     return max(step * power for step in (1, 2, 5) if step * power <= value * (1 + 1e-12))
 
 
 def draw_gear(axes: PolarAxes, n_teeth: int, marked_deg: Sequence[float], *, numbered: bool = True) -> None:
-    """Draw the toothed rim; marked teeth in the colour of faults. Without a mark on the shaft, teeth have no number."""
+    """Draw the toothed rim, with marked teeth in the fault colour; `numbered` needs a reference mark on the shaft."""
     damaged = {int(angle % 360.0 * n_teeth / 360.0) for angle in marked_deg}
     every = next(step for step in (1, 2, 5, 10, 20, 50, 100, 10_000) if n_teeth / step <= 45)
     ring = np.linspace(0, 2 * np.pi, 361)
     axes.plot(ring, np.full_like(ring, ROOT), color=style.FLOOR, linewidth=0.8, zorder=1)
     for tooth in range(n_teeth):
-        # A tooth is half a pitch wide at the root and stands in the middle of its pitch.
+        # A tooth is half a pitch wide at the root and centred in its pitch.
         corners = (tooth + np.array([0.22, 0.36, 0.64, 0.78])) * 2 * np.pi / n_teeth
         radii: FloatArray = np.array([ROOT, TIP, TIP, ROOT])
         hit = tooth in damaged
@@ -203,7 +203,7 @@ def draw_gear(axes: PolarAxes, n_teeth: int, marked_deg: Sequence[float], *, num
 
 
 def draw_degrees(axes: PolarAxes, has_teeth: bool) -> None:
-    """Draw rays at every quarter of a revolution and name them."""
+    """Draw and label rays at each quarter of a revolution."""
     inner, outer, at = (0.32, ROOT, LABELS) if has_teeth else (0.32, ROOT, 1.8)
     for degrees in range(0, 360, 90):
         axes.plot([np.radians(degrees)] * 2, [inner, outer], color=style.RULE, linewidth=0.7, zorder=0)
@@ -223,12 +223,12 @@ def draw_mark(axes: PolarAxes, mark: AngleMark, n_teeth: int | None) -> None:
 
 
 def write_corner(axes: PolarAxes, text: str, height: float, colour: str, weight: str = "normal") -> None:
-    """Write into the left corners, where no tooth is."""
+    """Write into the left corners, outside the teeth."""
     looks: dict[str, Any] = {"fontsize": style.TEXT_PT, "fontweight": weight, "ha": "left", "va": "top"}
     style.put_text(axes, 0.0, height, text, colour=colour, n_max=24, transform=axes.transAxes, **looks)
 
 
 def _middle(axes: PolarAxes, average: SynchronousAverage) -> None:
-    """Say in the middle what is drawn."""
+    """Write in the middle what is drawn."""
     text = f"{average.kind}\n{plain(average.shaft, 12)}"
     axes.text(0, 0, text, ha="center", va="center", fontsize=style.SMALL_PT, color=style.INK, parse_math=False)

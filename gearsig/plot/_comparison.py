@@ -1,4 +1,4 @@
-"""A simulation's order spectrum over a recording's, and the difference of every line that counts."""
+"""A simulation compared with a recording: spectra, averages and band levels, with their differences."""
 
 from __future__ import annotations
 
@@ -37,18 +37,18 @@ def order_overlay_figure(
     limits: tuple[float, float] | None = None,
     title: str = "",
 ) -> Figure:
-    """Draw both spectra in one panel, and below it how far each line of the simulation is off, in dB.
+    """Draw both spectra in one panel, and below it the difference of each line of the simulation in dB.
 
     Parameters
     ----------
     recorded, simulated : Spectrum
         Over the same axis, in the same unit and scaling.
     lines : sequence of LineLevel
-        Those that neither record shows are left out. Whiskers: twice the repeatability. A triangle: the line is missing
-        on one side, and the difference is at least so large.
+        Those visible in neither record are left out. Whiskers: twice the repeatability. Triangle: the line is missing
+        in one record, and the difference is at least that large.
     cursors : sequence of Cursor
     limits : (float, float) or None
-        Of the axis; None: all that both have.
+        Of the axis; None: the range common to both.
     title : str
 
     Returns
@@ -89,7 +89,7 @@ def _draw_spectra(axes: Axes, spectra: tuple[Spectrum, Spectrum], limits: tuple[
     tops, floors = [], []
     for spectrum, (name, colour) in zip(spectra, SIDES, strict=True):
         start, stop = spectrum.index_of(limits[0]), spectrum.index_of(limits[1]) + 1
-        # The first lines hold the sensor's offset and the window's foot around it.
+        # The first lines contain the sensor's offset and its leakage by the window.
         start = max(start, min(1 + int(2 * spectrum.noise_bandwidth / spectrum.resolution), stop - 2))
         values = above_zero(spectrum.values[start:stop])
         at, _, peaks = envelope(spectrum.positions[start:stop], values, 1200)
@@ -128,7 +128,7 @@ def _draw_differences(axes: Axes, lines: Sequence[LineLevel]) -> list[Line2D]:
 
 
 def difference_bars(axes: Axes, x: FloatArray, levels: Sequence[LevelPair], width: float) -> None:
-    """Draw differences as bars with whiskers of twice the repeatability; those within it are pale."""
+    """Draw differences as bars with whiskers of twice the repeatability; smaller differences are pale."""
     y = np.array([level.difference_db for level in levels])
     beyond = np.array([level.is_beyond for level in levels])
     axes.axhline(0.0, color=style.QUIET, linewidth=0.8, zorder=1)
@@ -149,22 +149,22 @@ def average_overlay_figure(
     n_teeth: int | None = None,
     title: str = "",
 ) -> Figure:
-    """Draw both averages over a revolution, the first teeth of it enlarged, and each tooth's difference in dB.
+    """Draw both averages over a revolution, its first teeth enlarged, and each tooth's difference in dB.
 
     Parameters
     ----------
     recorded, simulated : SynchronousAverage
         Of one shaft, aligned, at the same angles. Bands: twice the standard error.
     tooth_levels : sequence of LevelPair
-        One per tooth from angle 0 on; empty: no such panel.
+        One per tooth, from angle 0; empty: no such panel.
     n_teeth : int or None
-        Draws a tick per tooth.
+        Draw a tick per tooth.
     title : str
 
     Returns
     -------
     Figure
-        Where one is more than four times as large as the other, each is drawn over its own rms, and the axis says so.
+        If one is more than four times as large as the other, each is divided by its own rms, and the axis says so.
 
     Raises
     ------
@@ -177,7 +177,7 @@ def average_overlay_figure(
     sizes = [float(np.sqrt(np.mean(a.values**2))) for a in (recorded, simulated)]
     if min(sizes) > 0 and max(sizes) / min(sizes) <= 4.0:
         scales, label = (1.0, 1.0), with_unit("average", recorded.unit)
-    else:  # over one scale, the smaller were a flat line
+    else:  # on a common scale, the smaller one would be a flat line
         scales, label = (sizes[0] or 1.0, sizes[1] or 1.0), "over its own rms"
     end = 360.0 * 4 / n_teeth if n_teeth else 60.0
     for axes, limit in zip(panels[:2], (360.0, end), strict=True):
@@ -203,7 +203,7 @@ def _overlay(
     curves: list[Line2D] = []
     for average, scale, (name, colour) in zip(averages, scales, SIDES, strict=True):
         n = len(average.values)
-        around = np.arange(n + 1)[np.arange(n + 1) * 360.0 / n <= end]  # the first one once more at 360°
+        around = np.arange(n + 1)[np.arange(n + 1) * 360.0 / n <= end]  # including the first again at 360°
         x, y = around * 360.0 / n, average.values[around % n] / scale
         e = 2.0 * average.standard_error[around % n] / scale
         axes.fill_between(x, y - e, y + e, color=colour, alpha=0.2, linewidth=0, zorder=1.5)
@@ -213,20 +213,20 @@ def _overlay(
 
 
 def band_levels_figure(bands: Sequence[BandLevel], unit: str = "", *, title: str = "") -> Figure:
-    """Draw the levels of bands side by side, their difference below, and below that how alike their lines are.
+    """Draw band levels side by side, their differences below, and below these the agreement of their lines (FRAC).
 
     Parameters
     ----------
     bands : sequence of BandLevel
-        Of one axis, ascending.
+        On one axis, ascending.
     unit : str
-        That levels are counted from; empty where it is not known.
+        Reference unit of the levels; empty if not known.
     title : str
 
     Returns
     -------
     Figure
-        The panel of FRAC only where bands have one.
+        Without the FRAC panel if no band has one.
 
     Raises
     ------

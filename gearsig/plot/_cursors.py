@@ -1,4 +1,4 @@
-"""Marks at known orders or frequencies: mesh harmonics, sidebands, shaft and bearing lines."""
+"""Cursors at known orders or frequencies: mesh harmonics, sidebands, shaft and bearing lines."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ if TYPE_CHECKING:
 
 
 PRIORITY = ("mesh", "bearing", "shaft", "hunting", "sideband")
-"""Which kind keeps its place where two marks collide, first wins."""
+"""Kinds of cursors in order of priority when two collide."""
 
 N_ROWS = 4
 ROW_IN = 0.15
-OVERHANG_IN = 0.4  # a label may reach this far out of the panel
-ASIDE = 0.85  # of a label's half width: it still stands over its line
+OVERHANG_IN = 0.4  # how far a label may extend beyond the panel
+ASIDE = 0.85  # share of a label's half width by which it may be shifted and still stand over its line
 LONGEST = 24
 MIN_DISTANCE_IN = 0.03
-CHARACTER_EM = 0.62  # mean width of the font's characters, on the safe side
+CHARACTER_EM = 0.62  # mean character width of the font, on the safe side
 LINE_LOOKS = {
     "mesh": ("-", 0.9, 0.55),
     "sideband": (":", 0.8, 0.6),
@@ -47,7 +47,7 @@ class LabelPlace:
     high_in: float
 
     def collides(self, other: LabelPlace) -> bool:
-        """Whether the labels overlap, or the line up to the higher one crosses the lower one."""
+        """Whether the labels overlap, or the line to the higher one crosses the lower one."""
         if self.row == other.row:
             return self.low_in < other.high_in and other.low_in < self.high_in
         lower, higher = (self, other) if self.row < other.row else (other, self)
@@ -66,7 +66,7 @@ class Cursor:
         "mesh", "sideband", "shaft", "bearing", "hunting".
     label : str
     number : int
-        Of the harmonic, or of the sideband counted from its mesh line: the lower one keeps its label in a collision.
+        Of the harmonic, or of the sideband, counted from its mesh line; in a collision the lower one keeps its label.
     """
 
     position: float
@@ -76,16 +76,16 @@ class Cursor:
 
 
 def order_cursors(lines: Iterable[OrderLine], revolutions_per_s: float = 1.0) -> tuple[Cursor, ...]:
-    """Turn a rig's order lines into cursors with short labels.
+    """Convert a rig's order lines to cursors with short labels.
 
-    Names of pairs and bearings are left out where there is only one, or all have the same orders, so that nothing tells
-    them apart; a sideband is called by its distance.
+    Names of pairs and bearings are left out if there is only one, or if all have the same orders and cannot be
+    distinguished. A sideband is labelled by its distance.
 
     Parameters
     ----------
     lines : iterable of OrderLine
     revolutions_per_s : float
-        1 for an order axis; the speed of the shaft that orders are counted on for a frequency axis (Hz).
+        1 for an order axis; for a frequency axis (Hz) the speed of the shaft that the orders refer to.
 
     Returns
     -------
@@ -105,7 +105,7 @@ def order_cursors(lines: Iterable[OrderLine], revolutions_per_s: float = 1.0) ->
 def rig_cursors(
     rig: Rig | None, angle: ShaftAngle, shown: Spectrum | OrderMap, *, n_sidebands: int
 ) -> tuple[Cursor, ...]:
-    """Return the lines that a rig implies on a spectrum's axis; where it knows no shafts, the shaft's first three.
+    """Return the lines that a rig implies on a spectrum's axis; without known shafts, the shaft's first three.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def rig_cursors(
     shown : Spectrum or OrderMap
         Over frequency or order.
     n_sidebands : int
-        On either side of each mesh line.
+        On each side of each mesh line.
 
     Returns
     -------
@@ -128,13 +128,13 @@ def rig_cursors(
     return order_cursors(order_lines(rig, base, n_sidebands=n_sidebands), scale)
 
 
-WITHOUT_MESH = 50.0  # highest order shown where no mesh is known
+WITHOUT_MESH = 50.0  # maximum order shown if no mesh is known
 
 
 def upper_axis_limit(shown: Spectrum | OrderMap, cursors: Iterable[Cursor]) -> float:
-    """Return where a spectrum or map may end: past the third harmonic of the fastest mesh among its cursors.
+    """Return the upper limit for a spectrum or map: just past the third harmonic of the fastest mesh of its cursors.
 
-    Where there is none, one over orders may end at 50, one over frequency at its own end.
+    Without a mesh, it is 50 on an order axis and the end of the data on a frequency axis.
     """
     end = float(shown.positions[-1])
     meshes = [cursor.position for cursor in cursors if cursor.kind == "mesh"]
@@ -144,7 +144,7 @@ def upper_axis_limit(shown: Spectrum | OrderMap, cursors: Iterable[Cursor]) -> f
 
 
 def modulation_cursors(cursors: Iterable[Cursor]) -> tuple[Cursor, ...]:
-    """Return what an envelope may show: shaft lines, and three harmonics of each bearing line."""
+    """Return the cursors for an envelope: shaft lines, and three harmonics of each bearing line."""
     result: list[Cursor] = []
     for cursor in cursors:
         if cursor.kind == "shaft":
@@ -158,11 +158,11 @@ def modulation_cursors(cursors: Iterable[Cursor]) -> tuple[Cursor, ...]:
 def place(
     cursors: Iterable[Cursor], limits: tuple[float, float], width_in: float
 ) -> list[tuple[Cursor, LabelPlace | None]]:
-    """Choose the cursors to draw and the places of their labels; None: a line without label.
+    """Choose the cursors to draw and the places of their labels; None: a line without a label.
 
-    A cursor nearly on top of a more important one is left out. Labels fill the rows from the lowest, and stand aside
-    where they would be in the way of others that wait; one that would touch another label, or a line on its way up to
-    one, is left out; its line stays.
+    A cursor nearly on top of a more important one is left out. Labels fill the rows from the lowest and move aside to
+    leave room for those not yet placed. A label that would touch another, or the line to another, is left out; its
+    line stays.
 
     Parameters
     ----------
@@ -192,17 +192,17 @@ def place(
         if label is not None:
             places.append(label)
         result.append((cursor, label))
-    used = sorted({label.row for label in places})  # rows that stayed empty are no rows
+    used = sorted({label.row for label in places})  # skip rows that stayed empty
     return [(cursor, label and replace(label, row=used.index(label.row))) for cursor, label in result]
 
 
 def n_rows(placed: Iterable[tuple[Cursor, LabelPlace | None]]) -> int:
-    """Return how many rows of labels are used."""
+    """Return the number of label rows used."""
     return max((label.row + 1 for _, label in placed if label is not None), default=0)
 
 
 def draw(axes: Axes, placed: Iterable[tuple[Cursor, LabelPlace | None]], *, through: bool = True) -> None:
-    """Draw placed cursors into a panel, labels in rows above it; through the panel, or only above it."""
+    """Draw placed cursors with labels in rows above the panel; lines go `through` the panel or stay above it."""
     width, height = style.size_in(axes)
     for cursor, label in placed:
         colour = style.CURSOR_COLOURS.get(cursor.kind, style.QUIET)
@@ -238,9 +238,9 @@ def _cursor(line: OrderLine, scale: float, *, is_only: bool) -> Cursor:
 
 
 def importance(cursor: Cursor) -> tuple[int, int, float]:
-    """Return what cursors are sorted by, the most important first: whose label finds a place before others'."""
+    """Return the sort key of cursors; the most important ones, whose labels are placed first, come first."""
     rank = PRIORITY.index(cursor.kind) if cursor.kind in PRIORITY else len(PRIORITY)
-    if cursor.kind == "shaft" and cursor.number == 1:  # one turn is known to everybody; its harmonics come later
+    if cursor.kind == "shaft" and cursor.number == 1:  # the shaft's own order; its harmonics come later
         rank = PRIORITY.index("mesh")
     return rank, cursor.number, cursor.position
 
@@ -248,10 +248,10 @@ def importance(cursor: Cursor) -> tuple[int, int, float]:
 def _free_place(
     places: Sequence[LabelPlace], waiting: Sequence[float], at_in: float, text: str, width_in: float
 ) -> LabelPlace | None:
-    """Return the free place of a label, inside the figure, that bars the fewest lines that wait for theirs.
+    """Return the free place of a label, inside the figure, that blocks the fewest lines still to be labelled.
 
-    Of several the one in the middle over its own line at `at_in`, and of these the lowest. It bars a line by standing
-    on its way up.
+    Of several, take the one centred over its own line at `at_in`, and of these the lowest. A label blocks a line whose
+    upward path it crosses.
     """
     half = (len(plain(text, LONGEST)) * CHARACTER_EM + 0.8) * style.SMALL_PT / 72 / 2
     best: LabelPlace | None = None
@@ -283,7 +283,7 @@ class AngleMark:
 
 
 def marks_of(findings: Iterable[Finding], shaft: str, n_teeth: int | None = None) -> tuple[AngleMark, ...]:
-    """Return the places on one shaft that faults and suspicions name.
+    """Return the places on one shaft named by faults and suspicions.
 
     A tooth without angle is marked at its middle: tooth k spans (k - 1)/n to k/n of a revolution.
 
@@ -292,7 +292,7 @@ def marks_of(findings: Iterable[Finding], shaft: str, n_teeth: int | None = None
     findings : iterable of Finding
     shaft : str
     n_teeth : int or None
-        Of the gear on that shaft, where known.
+        Of the gear on that shaft, if known.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""A gear's finite elements: the mesh with its quality, mode shapes, stress under load."""
+"""Finite-element results of a gear: mesh quality, mode shapes, stress under load."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 IntArray = np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 Window = tuple[float, float, float, float]
-"""Low and high x, low and high y, in mm."""
+"""Lower and upper x, lower and upper y, in mm."""
 
 
 def draw_shaded(
@@ -33,7 +33,7 @@ def draw_shaded(
     limits: tuple[float, float],
     cmap: str,
 ) -> AxesImage:
-    """Draw values that run straight over each triangle; where triangles lie on each other, their mean.
+    """Draw values interpolated linearly over each triangle; where triangles overlap, their mean.
 
     Parameters
     ----------
@@ -41,16 +41,16 @@ def draw_shaded(
     triangles : array of int, (m, 3)
     values : array, (n,)
     window : tuple
-        Low and high x, low and high y of what is drawn; the axes are as long for it both ways.
+        Lower and upper x, lower and upper y of the region drawn, with equal scales in x and y.
     limits : tuple
-        Values at the ends of the colours.
+        Values at the ends of the colour scale.
     cmap : str
     """
     per_unit = 640 / (window[1] - window[0])
     shape = tuple(round((window[i + 1] - window[i]) * per_unit) for i in (2, 0))
     corners = (np.asarray(points)[triangles] - [window[0], window[2]]) * per_unit  # (m, 3, 2), in pixels
     shown = np.all((corners.max(axis=1) >= 0.0) & (corners.min(axis=1) < shape[::-1]), axis=1)
-    # Each triangle begins where its two shorter sides meet: a long thin one is then sampled along its length only.
+    # Start each triangle where its two shorter sides meet, so that a long thin one is sampled along its length only.
     far = np.linalg.norm(np.roll(corners[shown], -1, axis=1) - np.roll(corners[shown], -2, axis=1), axis=2).argmax(
         axis=1
     )
@@ -79,7 +79,7 @@ def draw_shaded(
 
 
 def _close_holes(image: FloatArray, known: Any) -> None:
-    """Give pixels between two known ones their mean: oblique samples step over one here and there."""
+    """Fill pixels between two known ones with their mean, as oblique samples miss some pixels."""
     for axis in (0, 1):
         before, after = (np.roll(image, step, axis) for step in (1, -1))
         between = ~known & np.roll(known, 1, axis) & np.roll(known, -1, axis)
@@ -88,7 +88,7 @@ def _close_holes(image: FloatArray, known: Any) -> None:
 
 
 def _samples(corners: FloatArray) -> tuple[FloatArray, Any]:
-    """Barycentric coordinates (k, 3) of points close enough for pixels, and their triangles (k,)."""
+    """Barycentric coordinates (k, 3) of points at pixel spacing, and their triangles (k,)."""
     sides = np.linalg.norm(corners[:, 1:] - corners[:, :1], axis=2)
     n = np.maximum(np.ceil(sides / 0.8), 1.0).astype(np.int64)
     count = (n[:, 0] + 1) * (n[:, 1] + 1)
@@ -106,16 +106,16 @@ TALL_IN = 3.95
 
 
 def gear_mesh_figure(outlines_mm: FloatArray, quality: FloatArray, *, near_mm: Window, title: str = "") -> Figure:
-    """Draw the cells of a gear seen along its shaft, coloured by quality, and a tooth close by.
+    """Draw the cells of a gear seen along its shaft, coloured by quality, with a close view of a tooth.
 
     Parameters
     ----------
     outlines_mm : array, (n_faces, n_edge_points, 2)
-        Round each face.
+        Points around each face.
     quality : array, (n_faces,)
         Scaled Jacobian: 1 for a parallelepiped, 0 where a cell folds.
     near_mm : tuple
-        Low and high x, low and high y of the close view.
+        Lower and upper x, lower and upper y of the close view.
     title : str
 
     Returns
@@ -125,7 +125,7 @@ def gear_mesh_figure(outlines_mm: FloatArray, quality: FloatArray, *, near_mm: W
     Raises
     ------
     InputError
-        On outlines of another shape, or a quality for other faces.
+        If the outlines have another shape, or the quality has another number of faces.
     """
     from matplotlib.collections import PolyCollection
 
@@ -160,15 +160,15 @@ def gear_mesh_figure(outlines_mm: FloatArray, quality: FloatArray, *, near_mm: W
 def gear_modes_figure(
     points_mm: FloatArray, triangles: IntArray, shapes: Mapping[str, FloatArray], *, title: str = ""
 ) -> Figure:
-    """Draw mode shapes seen along the shaft: the motion along it as colour, that across it as form, exaggerated.
+    """Draw mode shapes seen along the shaft: axial motion as colour, in-plane motion as exaggerated shape.
 
     Parameters
     ----------
     points_mm : array, (n, 2)
     triangles : array of int, (m, 3)
     shapes : mapping
-        Name of the mode, e.g. "3875 Hz, n = 2" → array (n, 3), motion along x, y, z in any unit; each is drawn to its
-        own largest motion.
+        Name of the mode, e.g. "3875 Hz, n = 2" → array (n, 3), motion along x, y, z in any unit; each is scaled to its
+        maximum.
     title : str
 
     Returns
@@ -178,7 +178,7 @@ def gear_modes_figure(
     Raises
     ------
     InputError
-        Without shapes, or if one has not three numbers for each point.
+        If there are no shapes, or one does not have three values for each point.
     """
     points = np.asarray(points_mm, dtype=np.float64)
     if not shapes:
@@ -222,17 +222,17 @@ def gear_stress_figure(
     Parameters
     ----------
     points_mm : array, (n, 2)
-        Of the body as it is, or with displacement already added.
+        Of the undeformed body, or with displacement already added.
     triangles : array of int, (m, 3)
     stress_pa : array, (n,)
     near_mm : tuple
-        Low and high x, low and high y.
+        Lower and upper x, lower and upper y.
     top_pa : float or None
-        Where the colours end; more is drawn as the last. None: the highest stress shown.
+        Upper end of the colour scale; higher stress has the last colour. None: the maximum stress shown.
     force : (place (2,) in mm, direction (2,), text) or None
-        An arrow that ends at the place.
+        An arrow that ends at that place.
     note : str
-        Below the title.
+        Text below the title.
     title : str
 
     Returns
@@ -273,7 +273,7 @@ def stress_maps_figure(
     near_mm: Window,
     title: str = "",
 ) -> Figure:
-    """Draw several stresses on the end face side by side, those that change sign with white at 0.
+    """Draw several stresses on the end face side by side; signed ones have white at 0.
 
     Parameters
     ----------
@@ -282,7 +282,7 @@ def stress_maps_figure(
     stress_pa : mapping
         Name → (n,).
     near_mm : tuple
-        Low and high x, low and high y.
+        Lower and upper x, lower and upper y.
     title : str
 
     Returns
@@ -292,7 +292,7 @@ def stress_maps_figure(
     Raises
     ------
     InputError
-        If there is no stress, or an array has another length than the points.
+        If there is no stress, or an array differs in length from the points.
     """
     if not stress_pa:
         raise InputError("stress_pa is empty", remedy="give at least one stress")
@@ -306,7 +306,7 @@ def stress_maps_figure(
         stress = style.checked_values(values, len(points), name) * 1e-6
         shown = stress[inside]
         signed = bool(shown.min() < -0.05 * shown.max())
-        top = max(float(np.quantile(np.abs(shown), 0.995)), 1e-12)  # the peak at the force goes beyond
+        top = max(float(np.quantile(np.abs(shown), 0.995)), 1e-12)  # the peak at the force exceeds it
         low, colours = (-top, "RdBu_r") if signed else (0.0, "viridis")
         drawn = _draw_stress(axes, points, triangles, stress, near_mm, (low, top), colours)
         style.label_axes(axes, "x (mm)", "y (mm)", name)
@@ -331,7 +331,7 @@ def _draw_shape(axes: Axes, points: FloatArray, triangles: IntArray, motion: Flo
 
 
 def _inside(points: FloatArray, near_mm: Window) -> NDArray[np.bool_]:
-    """Return which points lie in a window: low and high x, low and high y."""
+    """Return which points lie in a window: lower and upper x, lower and upper y."""
     (x, y), (left, right, bottom, top) = points.T[:2], near_mm
     inside: NDArray[np.bool_] = (x > left) & (x < right) & (y > bottom) & (y < top)
     return inside
@@ -346,7 +346,7 @@ def _draw_stress(
     limits: tuple[float, float],
     colours: str,
 ) -> Any:
-    """Draw a stress with the body's border in a frame around the window; return what a bar of colours is made of."""
+    """Draw a stress with the body's outline in a frame around the window; return the mappable for a colour bar."""
     _frame(axes)
     drawn = draw_shaded(axes, points, triangles, stress, window=near_mm, limits=limits, cmap=colours)
     _draw_border(axes, points, points, triangles)
@@ -356,7 +356,7 @@ def _draw_stress(
 
 
 def _frame(axes: Axes) -> None:
-    """Draw a box, on which a millimetre is as long both ways."""
+    """Draw a box with equal scales in x and y."""
     axes.grid(visible=False)
     axes.spines[:].set_visible(True)
     axes.spines[:].set(color=style.QUIET, linewidth=0.8)
@@ -364,7 +364,7 @@ def _frame(axes: Axes) -> None:
 
 
 def _draw_border(axes: Axes, moved: FloatArray, points: FloatArray, triangles: IntArray) -> None:
-    """Line along edges that belong to one triangle only; points of neighbouring sectors at one place count as one."""
+    """Draw edges that belong to one triangle only; coincident points of neighbouring sectors count as one."""
     from matplotlib.collections import LineCollection
 
     _, first, same = np.unique(np.round(points, 6), axis=0, return_index=True, return_inverse=True)

@@ -1,4 +1,4 @@
-"""A figure in one call: of a result, of what a refusal looked at, or of a method and its signal."""
+"""A figure in one call: of a result, of a refusal's intermediate result, or of a method and its signal."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ OptionsP = ParamSpec("OptionsP")
 
 @singledispatch
 def figure_of(result: object) -> Figure:
-    """Draw a result as the function for its type does, which takes limits, marks and titles besides.
+    """Draw a result with the function for its type, which also takes limits, marks and titles.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def figure_of(result: object) -> Figure:
     Raises
     ------
     InputError
-        If there is no figure of such a result.
+        If there is no figure for this type of result.
     """
     drawn = sorted("TrackedOrder" if cls is tuple else cls.__name__ for cls in figure_of.registry if cls is not object)
     raise InputError(f"there is no figure of a {type(result).__name__}", allowed=", ".join(drawn))
@@ -45,7 +45,7 @@ def _(result: orders.SynchronousAverage) -> Figure:
 
 
 @figure_of.register
-def _(result: tuple) -> Figure:  # type: ignore[type-arg]  # the registry knows no items
+def _(result: tuple) -> Figure:  # type: ignore[type-arg]  # the registry does not see item types
     if not result or not all(isinstance(item, orders.TrackedOrder) for item in result):
         kinds = sorted({type(item).__name__ for item in result})
         raise InputError(f"there is no figure of a tuple of {', '.join(kinds) or 'nothing'}", allowed="TrackedOrder")
@@ -67,12 +67,12 @@ figure_of.register(phase.RecurrencePlot, recurrence_figure)
 
 
 # --------------------
-# What was looked at where nothing was seen.
+# Searches that found nothing.
 # --------------------
 
 
 def search_panels(searched: Sequence[ToothSearch]) -> tuple[LinePanel, ...]:
-    """Return how far each place of a gear stands out, a panel a gear, with the level from which a crack is seen.
+    """Return one panel per gear: how far each angle stands out, with the threshold of a detectable crack.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def search_panels(searched: Sequence[ToothSearch]) -> tuple[LinePanel, ...]:
 
 
 def figure_of_refusal(refusal: RefusalError) -> Figure | None:
-    """Draw what was looked at before an answer was refused; None where there is nothing to see."""
+    """Draw the intermediate result behind a refusal; None if it has none that can be drawn."""
     looked_at = refusal.looked_at
     if isinstance(looked_at, phase.LyapunovExponent):
         return divergence_figure(looked_at)
@@ -114,12 +114,12 @@ def figure_of_refusal(refusal: RefusalError) -> Figure | None:
 
 
 # --------------------
-# Methods followed by the figure of their result.
+# Methods that return the figure of their result.
 # --------------------
 
 
 def _drawn(method: Callable[OptionsP, object]) -> Callable[OptionsP, Figure]:
-    """Return the method followed by the figure of its result; arguments and text are those of the method."""
+    """Return a function that runs the method and draws its result, with the method's arguments and docstring."""
 
     @wraps(method)
     def figure(*args: OptionsP.args, **settings: OptionsP.kwargs) -> Figure:

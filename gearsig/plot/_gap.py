@@ -1,4 +1,4 @@
-"""Figures of a gap: spectra measured and simulated, teeth, averages, evidence, how far it shrinks; of its benchmark."""
+"""Figures of a gap: measured and simulated spectra, teeth, averages, evidence and reduction; of its benchmark."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 def gap_orders_figure(
     curves: SpectrumCurves, *, title: str = "", compared_with: str = "simulated", marked: bool = True
 ) -> Figure:
-    """Draw the order spectra of a recording and of what it is compared with, and below them their difference in dB.
+    """Draw the order spectra of a recording and of its baseline, and below them their difference in dB.
 
     Parameters
     ----------
@@ -37,16 +37,16 @@ def gap_orders_figure(
     title : str
         Default: the curves' label.
     compared_with : str
-        What `curves.before` is of: "simulated", or "reference", see `gearsig.gap.against_reference`.
+        What `curves.before` shows: "simulated", or "reference", see `gearsig.gap.against_reference`.
     marked : bool
-        Whether lines beyond the structural floor are told from the others.
+        Whether to highlight lines that exceed the structural floor.
 
     Returns
     -------
     Figure
-        Above: grey is the repeatability floor; lines below it say nothing. Below: lines above that floor, orange where
-        the gap exceeds the structural floor (grey band) and lines are marked, quiet elsewhere; green dots: what is left
-        with the likeliest effect, where the floor was exceeded.
+        Above: the repeatability floor in grey; lines below it are not significant. Below: lines above that floor, in
+        orange where the gap exceeds the structural floor (grey band) and lines are marked, otherwise pale; green dots:
+        the residual gap with the most likely effect, where the floor was exceeded.
 
     Raises
     ------
@@ -72,11 +72,11 @@ def gap_orders_figure(
 
 def _draw_spectra(axes: Axes, x: FloatArray, curves: SpectrumCurves, compared_with: str) -> list[Line2D]:
     top = max(float(curves.measured.max()), float(curves.before.max())) or 1.0
-    bottom = max(top / 10.0**4.5, 0.3 * float(np.median(curves.floor)))  # what lies deeper is noise
+    bottom = max(top / 10.0**4.5, 0.3 * float(np.median(curves.floor)))  # anything lower is noise
     axes.set_yscale("log")
     axes.set_ylim(bottom, 2.0 * top)
     axes.fill_between(x, bottom, np.maximum(curves.floor, bottom), color=style.FLOOR, alpha=0.25, linewidth=0)
-    # Where the effect changes little both simulations coincide: dashes over a wider line show either.
+    # Where the effect changes little, both simulations coincide: dashes over a wider line show both.
     name = f"{compared_with} before" if len(curves.after) else compared_with
     lines = []
     for values, colour, width, dashes, label in (
@@ -97,7 +97,7 @@ def _floor_key(axes: Axes, label: str) -> list[Line2D]:
 def _draw_gap(axes: Axes, x: FloatArray, curves: SpectrumCurves, *, marked: bool) -> None:
     before = gap_by_order(curves, curves.before)
     beyond = is_beyond(curves, before)
-    # A gap below 12 dB shall look small.
+    # A gap below 12 dB should look small.
     largest = 1.15 * max(12.0, float(np.max(np.abs(before), initial=0.0, where=np.isfinite(before))))
     if len(curves.structural_db):
         band = np.minimum(curves.structural_db, largest)
@@ -120,16 +120,16 @@ def gap_lines_figure(curves: SpectrumCurves, order: float | None = None, *, titl
     Parameters
     ----------
     curves : SpectrumCurves
-        Of which `before`, `after` and `structural_db` are not looked at.
+        `before`, `after` and `structural_db` are ignored.
     order : float or None
-        Of the family that stands out; None: nothing is marked.
+        Fundamental order of the family that stands out; None: nothing is marked.
     title : str
         Default: the curves' label.
 
     Returns
     -------
     Figure
-        Grey is the noise floor; triangles stand above the multiples.
+        The noise floor is grey; triangles mark the multiples.
 
     Raises
     ------
@@ -140,7 +140,7 @@ def gap_lines_figure(curves: SpectrumCurves, order: float | None = None, *, titl
     measured = style.checked_values(curves.measured, len(x), "measured")
     floor = style.checked_values(curves.floor, len(x), "floor")
     figure, (axes,) = style.panels((2.6,), top_in=0.66)
-    # The envelope's mean and its slow drift do not set the height.
+    # The envelope's mean and its slow drift must not set the height.
     top = 1.15 * float(measured[x >= 0.1 * (order or 0.0)].max(initial=0.0)) or 1.0
     axes.fill_between(x, 0.0, floor, color=style.FLOOR, alpha=0.3, linewidth=0)
     keys = axes.plot(x, measured, color=style.MEASURED, linewidth=1.1, label="measured")
@@ -159,23 +159,23 @@ def gap_lines_figure(curves: SpectrumCurves, order: float | None = None, *, titl
 
 
 LOWEST_DB = -9.0
-"""Re the measured median tooth: the inner edge of the picture."""
+"""Level of the picture's inner edge, re the measured median tooth."""
 INNER, OUTER = 0.42, ROOT - 0.08
 
 
 def gap_teeth_figure(curves: AngleCurves, *, mark: AngleMark | None = None) -> Figure:
-    """Draw the energy within one pitch around the circle, in dB over the measured median tooth.
+    """Draw the energy of each pitch around the circle, in dB re the measured median tooth.
 
     Parameters
     ----------
     curves : AngleCurves
     mark : AngleMark or None
-        The tooth that the gap names.
+        The tooth to which the gap points.
 
     Returns
     -------
     Figure
-        Angle clockwise from the top. Teeth have numbers only where the shaft has a mark.
+        Angle clockwise from the top. Teeth are numbered only if the shaft has a reference mark.
     """
     angle = style.checked_axis(curves.angle_deg, "angle_deg")
     every = [
@@ -216,7 +216,7 @@ def _radius(decibels: FloatArray, top: float) -> FloatArray:
 
 
 def _rings(axes: PolarAxes, top: float) -> None:
-    """Draw a ring for every 6 dB, that of the median tooth in stronger ink."""
+    """Draw a ring for every 6 dB, with that of the median tooth darker."""
     ring = np.linspace(0, 2 * np.pi, 361)
     step = 6.0 if top < 20.0 else 12.0
     for value in np.arange(np.ceil(LOWEST_DB / step) * step, top + 1e-9, step):
@@ -232,20 +232,20 @@ def _rings(axes: PolarAxes, top: float) -> None:
 
 
 def gap_averages_figure(curves: AverageCurves, *, mark: AngleMark | None = None, title: str = "") -> Figure:
-    """Draw the teeth's pattern of recording and reference over one revolution, and below them their difference.
+    """Draw the tooth patterns of recording and reference over one revolution, and below them their difference.
 
     Parameters
     ----------
     curves : AverageCurves
     mark : AngleMark or None
-        The tooth that the gap names.
+        The tooth to which the gap points.
     title : str
-        Default: what it is, with shaft and channel.
+        Default: a description with shaft and channel.
 
     Returns
     -------
     Figure
-        Both panels on one scale; small ticks stand at the teeth.
+        Both panels have the same scale; small ticks mark the teeth.
 
     Raises
     ------
@@ -263,13 +263,13 @@ def gap_averages_figure(curves: AverageCurves, *, mark: AngleMark | None = None,
     changed = below.plot(*thin(angle, change), color=style.SIMULATED, linewidth=1.0, label="measured less reference")
     largest = 1.08 * max(float(np.max(np.abs([measured, reference, change]))), 1e-300)
     for axes in (above, below):
-        axes.set_ylim(-largest, largest)  # one scale: a small change shall look small
+        axes.set_ylim(-largest, largest)  # the same scale: a small change should look small
         axes.axhline(0.0, color=style.QUIET, linewidth=0.6, zorder=1)
         if mark is not None:
             axes.axvline(mark.angle_deg, color=style.FAULT, linewidth=0.9, linestyle=":", zorder=1.5)
         style.no_offset(axes)
     if mark is not None:
-        is_left = mark.angle_deg > 270.0  # its name stays within the panel
+        is_left = mark.angle_deg > 270.0  # keep its name within the panel
         below.annotate(
             plain(mark.label, 24), (mark.angle_deg, 0.93), xycoords=("data", "axes fraction"), va="top",
             xytext=(-4 if is_left else 4, 0), textcoords="offset points", ha="right" if is_left else "left",
@@ -286,20 +286,20 @@ def gap_averages_figure(curves: AverageCurves, *, mark: AngleMark | None = None,
 
 
 # --------------------
-# Figures of rows: a text, a horizontal bar, and what it comes to beside it.
+# Figures of rows: a name, a horizontal bar, and its value beside it.
 # --------------------
 
 BAR = 0.56
-"""Height of a bar, of its row."""
+"""Height of a bar, as a share of its row."""
 
 
 def rows_figure(panel: RowPanel) -> Figure:
-    """Draw bars below each other, with their intervals, and what they are compared with.
+    """Draw horizontal bars in rows, with their intervals and the values they are compared with.
 
     Parameters
     ----------
     panel : RowPanel
-        Where some of its rows are totals, the others are the steps between these.
+        If some of its rows are totals, the others are the steps between these.
     """
     marked, names = any(row.mark is not None for row in panel.rows), [row.name for row in panel.rows]
     left_in = 3.6 if marked else 3.0
@@ -345,9 +345,9 @@ def rows_figure(panel: RowPanel) -> Figure:
 
 
 def _name_rows(axes: Axes, names: Sequence[str], n_max: int) -> None:
-    """Name the rows y = 0, 1, … from the top, in two lines of so many letters at most."""
+    """Name the rows y = 0, 1, … from the top, in up to two lines of `n_max` characters."""
     texts = []
-    for name in names:  # a longer one is cut in its middle
+    for name in names:  # longer names are cut in the middle
         lines = wrap(plain(name, 400), n_max)
         texts.append("\n".join(lines if len(lines) <= 2 else wrap(plain(name, 2 * n_max - 6), n_max)[:2]))
     axes.set_yticks(range(len(names)), texts)
@@ -360,7 +360,7 @@ def _name_rows(axes: Axes, names: Sequence[str], n_max: int) -> None:
 
 
 def _write_beyond(axes: Axes, row: int, text: str, below: str = "", colour: str = style.INK) -> None:
-    """Write right of a row, beyond the panel; a quiet line below."""
+    """Write to the right of a row, outside the panel, with a paler line below."""
     place, up = axes.get_yaxis_transform(), 0.17 if below else 0.0
     style.put_text(axes, 1.02, row - up, text, colour=colour, n_max=24, fontweight="bold", va="center", transform=place)
     if below:
@@ -368,17 +368,17 @@ def _write_beyond(axes: Axes, row: int, text: str, below: str = "", colour: str 
 
 
 def gap_evidence_panel(evidence: Sequence[Evidence]) -> RowPanel:
-    """Return predicted and observed changes, feature by feature, with the floor about zero.
+    """Return predicted and observed changes for each feature, with the floor around zero.
 
     Parameters
     ----------
     evidence : sequence of Evidence
-        Strongest first; those past the tenth are left out.
+        Strongest first; only ten are shown.
 
     Raises
     ------
     InputError
-        Without evidence.
+        If there is no evidence.
     """
     if not evidence:
         raise InputError("no evidence to draw", allowed="one or more")
@@ -399,31 +399,31 @@ def gap_evidence_panel(evidence: Sequence[Evidence]) -> RowPanel:
 
 
 def gap_waterfall_panel(steps: Sequence[GapStep], *, held_out: str = "") -> RowPanel:
-    """Return the gap before, what each effect takes away, and what is left, with 90 % intervals.
+    """Return the initial gap, its reduction by each effect, and the residual, with 90 % intervals.
 
     Parameters
     ----------
     steps : sequence of GapStep
-        The first is the gap before anything is added.
+        The first is the gap before any effect is added.
     held_out : str
-        What it was scored on; named with the axis.
+        Data it was scored on; named with the axis.
 
     Returns
     -------
     RowPanel
-        Its span is the structural floor: healthy machines are in it.
+        Its span is the structural floor, within which healthy machines lie.
 
     Raises
     ------
     InputError
-        Without steps.
+        If there are no steps.
     """
     if not steps:
         raise InputError("no steps to draw", allowed="the gap before, and one for each effect")
     rows = [_total(steps[0].label, steps[0].remaining, 1)]
     for last, step in pairwise(steps):
         before, after = last.remaining.value, step.remaining.value
-        sign, colour = ("−", 2) if after <= before else ("+", 1)  # a larger gap in the colour of faults
+        sign, colour = ("−", 2) if after <= before else ("+", 1)  # a larger gap has the fault colour
         share = abs(100.0 * (1.0 - after / before)) if before > 0 else 0.0
         size, part = f"{sign}{abs(after - before):.2g}", f"{sign}{share:.0f} % of the gap"
         ends = (step.remaining.low, step.remaining.high)
@@ -442,7 +442,7 @@ def _total(name: str, residual: Interval, colour: int) -> ChartRow:
 
 
 # --------------------
-# Of a benchmark of gap diagnoses: what was taken for what, and whether probabilities are worth what they say.
+# Benchmark of gap diagnoses: confusions between causes, and calibration of probabilities.
 # --------------------
 
 
@@ -450,12 +450,12 @@ COLOURS = (style.MEASURED, style.FLOOR, style.SHAFT)
 
 
 def confusion_figure(true: Sequence[str], answers: Sequence[str], counts: np.ndarray, *, title: str = "") -> Figure:
-    """Draw how often each cause was taken for which; shades are shares of a row, numbers are cases.
+    """Draw the confusion matrix of causes: shades are shares of a row, numbers are cases.
 
     Parameters
     ----------
     true, answers : sequence of str
-        Rows and columns; what both have in common should come first in both.
+        Names of rows and columns; common names should come first in both.
     counts : array, (n_true, n_said), whole numbers
     title : str
 
@@ -466,11 +466,11 @@ def confusion_figure(true: Sequence[str], answers: Sequence[str], counts: np.nda
     Raises
     ------
     InputError
-        If the table does not fit the names.
+        If the table does not match the names.
     """
     table = np.asarray(counts)
     if table.shape != (len(true), len(answers)):
-        raise InputError(f"counts are {table.shape}", allowed=f"({len(true)}, {len(answers)}), as there are names")
+        raise InputError(f"counts are {table.shape}", allowed=f"({len(true)}, {len(answers)}), to match the names")
     cells_in = 0.27 * len(answers)
     width = max(style.WIDTH_IN, 1.75 + cells_in + 0.75)
     figure, (axes,) = style.panels(
@@ -496,12 +496,12 @@ def confusion_figure(true: Sequence[str], answers: Sequence[str], counts: np.nda
 def calibration_figure(
     curves: Mapping[str, tuple[FloatArray, FloatArray, FloatArray, FloatArray]], *, title: str = ""
 ) -> Figure:
-    """Draw how often answers were right over how sure they were; true probabilities lie on the diagonal.
+    """Draw the share of correct answers over their stated probability; calibrated ones lie on the diagonal.
 
     Parameters
     ----------
     curves : mapping
-        Name → confidence, share right, low and high end of its 90 % interval, each (n_bins,), 0 to 1.
+        Name → confidence, share correct, lower and upper end of its 90 % interval, each (n_bins,), 0 to 1.
     title : str
 
     Returns

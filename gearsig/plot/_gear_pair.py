@@ -1,4 +1,4 @@
-"""Simulated gear pairs: stiffness, load, friction over the mesh; how they answer; maps and sweeps of flexible ones."""
+"""Simulated gear pairs: stiffness, load and friction over the mesh; responses; maps and sweeps of flexible ones."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ def mesh_stiffness_figure(
     mesh_cycles : array, (n,)
         Ascending.
     stiffness_n_per_m : mapping
-        Name of the case → array, (n,); in their order from dark to light.
+        Name of the case → array, (n,); coloured in order from dark to light.
     single_pair : (float, float) or None
         Mesh cycles of the region to enlarge; None: no second panel.
     heading : str
-        Before the names, e.g. "crack depth".
+        Text before the names, e.g. "crack depth".
     title : str
 
     Returns
@@ -53,7 +53,7 @@ def mesh_stiffness_figure(
     Raises
     ------
     InputError
-        On wrong lengths, or a region without two points of the axis.
+        If lengths differ, or the region has fewer than two points of the axis.
     """
     x = style.checked_axis(mesh_cycles, "mesh_cycles")
     curves = style.checked_curves(stiffness_n_per_m, len(x), "stiffness_n_per_m")
@@ -97,7 +97,7 @@ def load_sharing_figure(
     mesh_cycles : array, (n,)
         Ascending.
     pair_forces_n : mapping
-        Name of the pair → array, (n,); where it is 0 the pair does not touch and nothing is drawn.
+        Name of the pair → array, (n,); where it is 0 the pair is not in contact and nothing is drawn.
     transmission_error_m : mapping
         Name of the case → array, (n,).
     title : str
@@ -126,7 +126,7 @@ def load_sharing_figure(
 
 
 def _touching(force: FloatArray) -> FloatArray:
-    """Return the force with NaN where the pair is out of contact, the zero next to a contact kept."""
+    """Return the force with NaN where the pair is out of contact, but with the zero next to a contact."""
     idle = force == 0.0
     inside = idle.copy()
     inside[1:] &= idle[:-1]
@@ -143,19 +143,19 @@ def friction_figure(
     heading: str = "",
     title: str = "",
 ) -> Figure:
-    """Draw the friction coefficient of one tooth pair from its entry to its exit.
+    """Draw the friction coefficient of one tooth pair from entry to exit.
 
     Parameters
     ----------
     mesh_cycles : array, (n,)
         Since the pair's entry, ascending.
     coefficients : mapping
-        Name of the case → array, (n,). Given with a sign it counts as the direction of sliding: positive in approach,
-        negative in recess. NaN: no contact.
+        Name of the case → array, (n,). A sign is the direction of sliding: positive in approach, negative in recess.
+        NaN: no contact.
     pitch_point : float or None
-        Mesh cycles where sliding changes its direction.
+        Mesh cycles at which sliding reverses.
     single_pair : (float, float) or None
-        Where this pair carries alone; shaded.
+        Region of single contact; shaded.
     heading, title : str
         As in `mesh_stiffness_figure`.
 
@@ -166,7 +166,7 @@ def friction_figure(
     Raises
     ------
     InputError
-        If a case holds no number, or lengths differ.
+        If a case contains no number, or lengths differ.
     """
     x = style.checked_axis(mesh_cycles, "mesh_cycles")
     curves = style.checked_curves(coefficients, len(x), "coefficients", gaps=True)
@@ -205,7 +205,7 @@ def backlash_figure(
     heading: str = "",
     title: str = "",
 ) -> Figure:
-    """Draw the backlash over time, and below it the spectrum of its change.
+    """Draw the backlash over time, and below it the spectrum of its variation.
 
     Parameters
     ----------
@@ -214,11 +214,11 @@ def backlash_figure(
     backlash_m : mapping
         Name of the case → b(t) = b₀ + Δb(t), (n,).
     frequency_hz : array, (m,)
-        Ascending, above 0: drawn on a logarithmic axis, as the lines of a fractal profile are a constant ratio apart.
+        Ascending, above 0. The axis is logarithmic, as the lines of a fractal profile have a constant ratio.
     amplitude_m : mapping
-        Same names → peak amplitude of each line, (m,); one whose amplitudes are all 0 is left out.
+        Same names → peak amplitude of each line, (m,); a case whose amplitudes are all 0 is left out.
     lines_hz : sequence of float
-        Expected lines, marked and numbered with their frequencies.
+        Expected lines, marked with their frequencies.
     mesh_frequency_hz : float or None
     heading, title : str
         As in `mesh_stiffness_figure`.
@@ -230,7 +230,7 @@ def backlash_figure(
     Raises
     ------
     InputError
-        On names that differ, or frequencies that begin at 0.
+        If the names differ, or the frequencies begin at 0.
     """
     t = style.checked_axis(time_s, "time_s")
     f = style.checked_axis(frequency_hz, "frequency_hz")
@@ -266,17 +266,17 @@ def backlash_figure(
 
 
 # --------------------
-# A flexible gear pair: maps over mesh angle and torque, sweeps over speed up and down, spectra over speed.
+# A flexible gear pair: maps over mesh angle and torque, speed sweeps up and down, spectra over speed.
 # --------------------
 
 
-N_LEVELS = 7  # lines of equal values in a map
+N_LEVELS = 7  # contour lines in a map
 
 
 def mesh_maps_figure(
     mesh_cycles: FloatArray, torque_nm: FloatArray, maps: Mapping[str, FloatArray], *, title: str = ""
 ) -> Figure:
-    """Draw maps over mesh angle and torque beside each other, each with lines of equal values and a colour bar.
+    """Draw maps over mesh angle and torque side by side, each with contour lines and a colour bar.
 
     Parameters
     ----------
@@ -293,7 +293,7 @@ def mesh_maps_figure(
     Raises
     ------
     InputError
-        On axes that do not ascend, a map of another shape, or more than three.
+        If an axis does not ascend, a map has another shape, or there are more than three.
     """
     x, y = style.checked_axis(mesh_cycles, "mesh_cycles"), style.checked_axis(torque_nm, "torque_nm")
     n = len(maps)
@@ -306,10 +306,10 @@ def mesh_maps_figure(
         mesh = axes.pcolormesh(x, y, array.T, cmap=style.colours(), shading="gouraud", rasterized=True)
         axes.grid(visible=False)
         bar = style.colour_bar(axes, mesh, gap_in=0.1)
-        # Where neighbouring angles are further apart, lines of equal values would run into one another.
+        # If neighbouring angles are further apart, contour lines would run into one another.
         if np.max(np.abs(np.diff(array, axis=0))) < 0.3 * np.ptp(array):
             levels = np.linspace(float(array.min()), float(array.max()), N_LEVELS + 2)[1:-1]
-            # Dark lines where the map is light, light ones where it is dark; the bar has them with their values.
+            # Dark lines where the map is light, light ones where it is dark; the colour bar shows their values.
             inks = [style.INK if i < N_LEVELS / 2 else "white" for i in range(N_LEVELS)]
             axes.contour(x, y, array.T, levels=levels, colors=inks, linewidths=0.7, alpha=0.8)
             bar.hlines(levels, 0.0, 1.0, colors=inks, linewidths=0.7, transform=bar.get_yaxis_transform())
@@ -327,14 +327,14 @@ def speed_sweep_figure(
     jumps_hz: Mapping[str, float] | None = None,
     title: str = "",
 ) -> Figure:
-    """Draw rms of the dynamic transmission error over the mesh frequency, sweeps up in full, sweeps down dashed.
+    """Draw the rms of the dynamic transmission error over the mesh frequency; upward sweeps solid, downward dashed.
 
     Parameters
     ----------
     sweeps : sequence of (name, mesh_hz up, rms_m, …)
-        Name of the case, mesh frequency of the parts (n,), rms up (n,), rms down (n,) at the same frequencies, in m.
+        Name of the case, mesh frequencies (n,), rms up (n,), rms down (n,) at the same frequencies, in m.
     natural_hz : float or None
-        Marked with its half and third.
+        Marked together with its half and third.
     jumps_hz : mapping or None
         Name, e.g. "jump up" → frequency.
     title : str
@@ -359,7 +359,7 @@ def speed_sweep_figure(
         axes.axvline(hertz, color=style.FLOOR, linewidth=0.8, linestyle=(0, (3, 2)), zorder=1)
         style.write(axes, hertz, 1.01, word)
     style.label_axes(axes, "mesh frequency (Hz)", "dynamic transmission error, rms (µm)")
-    style.head(figure, title, lines, "full: up, dashed: down" if len(sweeps) > 1 else "")
+    style.head(figure, title, lines, "solid: up, dashed: down" if len(sweeps) > 1 else "")
     return figure
 
 
@@ -371,7 +371,7 @@ def speed_spectra_figure(
     natural_hz: float | None = None,
     title: str = "",
 ) -> Figure:
-    """Draw amplitude spectra of one quantity at several speeds below each other, on one logarithmic scale.
+    """Draw amplitude spectra of one quantity at several speeds in rows, on one logarithmic scale.
 
     Parameters
     ----------
@@ -392,7 +392,7 @@ def speed_spectra_figure(
     curves = style.checked_curves(spectra_m, len(x), "spectra_m")
     figure, panels = style.panels((0.97,) * len(curves), top_in=0.45, row_gap_in=0.08, share_x=True)
     largest_um = max(float(c.max()) for c in curves.values()) * MICRO
-    floor = 1e-5 * largest_um  # five decades below the greatest amplitude
+    floor = 1e-5 * largest_um  # five decades below the maximum amplitude
     for i, (axes, (name, values)) in enumerate(zip(panels, curves.items(), strict=True)):
         level = np.maximum(values * MICRO, floor)
         axes.fill_between(x, floor, level, color=style.SIMULATED, alpha=0.25, linewidth=0, label=UNDER_A_LINE)
@@ -414,21 +414,21 @@ def speed_spectra_figure(
 def frequency_curves_figure(
     mesh_cycles: FloatArray, frequencies_hz: FloatArray, uncoupled_hz: FloatArray | None = None, *, title: str = ""
 ) -> Figure:
-    """Draw natural frequencies over the mesh angle, one curve each; those that hardly move are drawn quietly.
+    """Draw natural frequencies over the mesh angle, one curve each; those that hardly vary are pale.
 
     Parameters
     ----------
     mesh_cycles : array, (n_c,)
     frequencies_hz : array, (n_c, n)
-        Rising along the second axis.
+        Ascending along the second axis.
     uncoupled_hz : array, (m,), or None
-        Of the two sides without contact: they do not depend on the angle; drawn dashed.
+        Of the two sides without contact, which do not depend on the angle; drawn dashed.
     title : str
 
     Raises
     ------
     InputError
-        If the rows are not as many as mesh angles.
+        If the number of rows differs from that of the mesh angles.
     """
     x = style.checked_axis(mesh_cycles, "mesh_cycles")
     curves = frozen_array(frequencies_hz, "frequencies_hz", ndim=2)
@@ -441,7 +441,7 @@ def frequency_curves_figure(
         line = axes.plot(
             x, curve / 1e3, color=style.SIMULATED if moves else style.FLOOR, linewidth=1.5 if moves else 0.8
         )
-        word = "coupled, moves with the angle" if moves else "coupled, hardly moves"
+        word = "coupled, varies with the angle" if moves else "coupled, hardly varies"
         line[0].set_label(word)
         named.setdefault(word, line[0])
     for hertz in () if uncoupled_hz is None else frozen_array(uncoupled_hz, "uncoupled_hz", ndim=1):
@@ -456,7 +456,7 @@ def frequency_curves_figure(
 
 
 # --------------------
-# How a gear answers: time signal, spectrum, phase portrait and Poincaré section of several cases below each other.
+# Response of a gear: time signal, spectrum, phase portrait and Poincaré section of several cases in rows.
 # --------------------
 
 
@@ -469,7 +469,7 @@ class ResponseCase:
     name : str
         E.g. "Rq 0.45 µm".
     time_s, displacement_m, velocity_mps : arrays, (n,)
-        In the steady state; time ascending.
+        In steady state, with ascending time.
     frequency_hz, amplitude_m : arrays, (m,)
         Spectrum of the displacement, peak amplitudes.
     poincare_displacement_m, poincare_velocity_mps : arrays, (k,)
@@ -511,9 +511,9 @@ def response_figure(
     lines_hz: Sequence[float] = (),
     title: str = "",
 ) -> Figure:
-    """Draw one row per case: signal over time, spectrum, phase portrait with the Poincaré points, and these enlarged.
+    """Draw one row per case: signal over time, spectrum, phase portrait with Poincaré points, and these enlarged.
 
-    Axes of a column are alike in all rows, so that rows compare.
+    The axes of a column are the same in all rows, for comparison.
 
     Parameters
     ----------
@@ -524,11 +524,11 @@ def response_figure(
     limits_hz : (float, float)
         Of the spectra.
     n_periods : int
-        Mesh periods of the time signal that are drawn; the phase portrait has all of it.
+        Mesh periods of the time signal to draw; the phase portrait shows all of them.
     lines_hz : sequence of float
-        Other expected lines, e.g. of a fractal profile: small marks along the top of the spectra.
+        Other expected lines, e.g. of a fractal profile, as small marks along the top of the spectra.
     title : str
-        Says what moves, and which way.
+        Should say what moves, and in which direction.
 
     Returns
     -------
@@ -537,7 +537,7 @@ def response_figure(
     Raises
     ------
     InputError
-        Without cases, or if no line of a spectrum lies inside the limits.
+        If there are no cases, or no line of a spectrum lies within the limits.
     """
     style.check_number(len(cases), f"{len(cases)} cases")
     mesh_hz = positive(mesh_frequency_hz, "mesh_frequency_hz", "Hz")
@@ -597,7 +597,7 @@ def _give_columns_one_scale(
     dots_v = np.concatenate([case.poincare_velocity_mps for case in cases]) * MILLI
     lines = [case.amplitude_m[_inside(case, limits)] * MICRO for case in cases]
     top = max(float(amplitude.max()) for amplitude in lines) or 1.0
-    # The floor: what most lines of the richest case lie above, at most six decades down.
+    # The floor: below most lines of the case with most lines, but at most six decades down.
     richest = max(float(np.median(amplitude)) for amplitude in lines)
     bottom = min(max(richest / 30.0, top * 1e-6), top / 10.0)
     for time, spectrum, phase, section in rows:
@@ -636,7 +636,7 @@ def crack_comparison_figure(
 ) -> Figure:
     """Draw the acceleration over some revolutions, one row per crack depth, and a close view of one impact.
 
-    The first case is the one to compare with: the healthy gear.
+    The first case, the healthy gear, is the baseline.
 
     Parameters
     ----------
@@ -645,17 +645,17 @@ def crack_comparison_figure(
     acceleration_mps2 : mapping
         Name of the case → array, (n,).
     impacts_rev : sequence of float
-        Where the cracked tooth enters the mesh; those on the axis are marked, the middle one is enlarged.
+        Where the cracked tooth enters the mesh; those on the axis are marked and the middle one is enlarged.
     n_teeth : int
         Of the cracked gear: mesh cycles per revolution.
     change_mps2 : mapping or None
-        Name of the case → its acceleration less that of the first case at the same angle, (n,), for all but the first.
-        Given: close views show its magnitude on a logarithmic axis, and that of the first case's acceleration itself.
-        None: they show the acceleration.
+        Name of the case → its acceleration minus that of the first case at the same angle, (n,), for all but the first.
+        If given, close views show its magnitude on a logarithmic axis, and the magnitude of the first case's
+        acceleration. None: they show the acceleration.
     reach_cycles : mapping or None
-        Name of the case → mesh cycles from the entry over which the impact is felt; shaded.
+        Name of the case → mesh cycles from the entry over which the impact is noticeable; shaded.
     zoom_cycles : (float, float)
-        Close view, from the entry.
+        Range of the close view, relative to the entry.
     title : str
 
     Returns
@@ -665,7 +665,7 @@ def crack_comparison_figure(
     Raises
     ------
     InputError
-        If no impact lies on the axis, or a change or reach names a case that is not there.
+        If no impact lies on the axis, or a change or reach names an unknown case.
     """
     x = style.checked_axis(revolutions, "revolutions")
     cases = style.checked_curves(acceleration_mps2, len(x), "acceleration_mps2")
@@ -700,7 +700,7 @@ def crack_comparison_figure(
         close.axvline(0.0, color=style.FAULT, linewidth=0.9, linestyle="--", zorder=1)
         close.set_xlim(*limits)
         if changes:
-            # A change of nothing is drawn below every axis: a logarithm needs a bottom.
+            # A change of zero is drawn below any axis: a logarithm needs a lower bound.
             size = np.maximum(np.abs(changes.get(name, values)[near]), 1e-12)
             close.plot(cycles[near], size, color=style.FAULT if name in changes else style.MEASURED, linewidth=0.9)
             style.label_axes(close, "", "|change| (m/s²)" if name in changes else "|a| (m/s²)")
@@ -711,7 +711,7 @@ def crack_comparison_figure(
             close.set_ylim(-1.08 * closest, 1.08 * closest)
         if (reach := (reach_cycles or {}).get(name, 0.0)) > 0.0:
             style.shade(close, (0.0, reach), style.FAULT, 0.12)
-            style.write(close, limits[1], 1.02, f"felt for {reach:.1f} cycles", colour=style.FAULT, ha="right")
+            style.write(close, limits[1], 1.02, f"noticeable for {reach:.1f} cycles", colour=style.FAULT, ha="right")
         for axes in (whole, close):
             axes.tick_params(labelbottom=i == len(cases) - 1)
             style.no_offset(axes)

@@ -1,4 +1,4 @@
-"""Order and frequency maps along a run."""
+"""Order and frequency maps over time, kurtograms and coherence maps."""
 
 from __future__ import annotations
 
@@ -35,17 +35,17 @@ def order_map_figure(
     ----------
     order_map : OrderMap
     cursors : sequence of Cursor
-        In the map's axis.
+        On the map's axis.
     highest : float or None
-        Highest order or frequency shown; None: all.
+        Maximum order or frequency shown; None: all.
     height_in : float
         Of the figure, in inches.
 
     Returns
     -------
     Figure
-        Colours span 60 dB below the largest value. Where there are more cells than pixels, the largest value of the
-        cells in a pixel is shown.
+        Colours span 60 dB below the maximum. If there are more cells than pixels, each pixel shows the maximum of its
+        cells.
     """
     figure, (speed, axes) = style.panels(
         (height_in - 1.25,), (1.13, 6.0), left_in=0.75, right_in=1.0, top_in=0.7, column_gap_in=0.12
@@ -85,7 +85,7 @@ def _draw_levels(
 def draw_level_map(
     axes: Axes, at: FloatArray, positions: FloatArray, level: FloatArray, unit: str, span_db: float = DYNAMIC_RANGE_DB
 ) -> None:
-    """Draw levels in dB, (n_positions, n_at), the largest of the cells in a pixel, with their bar of colours."""
+    """Draw levels in dB, (n_positions, n_at), as the maximum of the cells in each pixel, with a colour bar."""
     at, level = _fewer_cells(at, level, axis=1, n_max=N_COLUMNS)
     positions, level = _fewer_cells(positions, level, axis=0, n_max=N_ROWS)
     logarithmic = axes.get_yscale() == "log"
@@ -96,7 +96,7 @@ def draw_level_map(
 
 
 def _hide_last_tick_label(axes: Axes) -> None:
-    """Leave out a number that would run into those of the panel on the right."""
+    """Leave out a tick label that would run into those of the panel on the right."""
     from matplotlib.ticker import MaxNLocator
 
     low, high = axes.get_xlim()
@@ -105,7 +105,7 @@ def _hide_last_tick_label(axes: Axes) -> None:
 
 
 def _fewer_cells(middles: FloatArray, values: FloatArray, *, axis: int, n_max: int) -> tuple[FloatArray, FloatArray]:
-    """Keep the largest of neighbouring cells along an axis where there are more than `n_max`, the pixels there are."""
+    """Merge neighbouring cells along an axis by their maximum if there are more than `n_max`, the number of pixels."""
     n = values.shape[axis]
     if n <= n_max:
         return middles, values
@@ -115,7 +115,7 @@ def _fewer_cells(middles: FloatArray, values: FloatArray, *, axis: int, n_max: i
 
 
 def _cell_borders(middles: FloatArray) -> FloatArray:
-    """Return the borders of cells from their middles."""
+    """Return the borders of cells from their centres."""
     if len(middles) == 1:
         return np.array([middles[0] - 0.5, middles[0] + 0.5])
     between = (middles[1:] + middles[:-1]) / 2
@@ -136,18 +136,18 @@ def time_frequency_figure(
     ----------
     levels : TimeFrequencyMap
     ridges : sequence of Ridge
-        Dashed where two of them share their place.
+        Dashed where two of them coincide.
     dynamic_range_db : float
-        Span of the colours below the largest level.
+        Span of the colours below the maximum level.
     numbered : bool
         Number the ridges from 1, at their right ends.
 
     Returns
     -------
     Figure
-        The frequency axis is logarithmic where the lines are. Where there are more cells than pixels, the largest of
-        the cells in a pixel is shown. Between the dashed lines and the ends, a level depends on what was assumed
-        outside of the signal.
+        The frequency axis is logarithmic if the lines are spaced that way. If there are more cells than pixels, each
+        pixel shows the maximum of its cells. Between the dashed lines and the ends, levels depend on the assumed
+        continuation of the signal.
     """
     positive(dynamic_range_db, "dynamic_range_db", "dB")
     figure, (axes,) = style.panels((3.5,), right_in=1.0, top_in=0.55)
@@ -165,7 +165,7 @@ def time_frequency_figure(
         alone, together = (np.where(ridge.shared == shared, ridge.positions, np.nan) for shared in (False, True))
         axes.plot(ridge.at, alone, color=style.FAULT, linewidth=1.2)
         axes.plot(ridge.at, together, color=style.FAULT, linewidth=1.2, linestyle=(0, (3, 2)))
-        if numbered:  # on a light disc near the end, at three places in turn: numbers of ridges that meet stay apart
+        if numbered:  # on a light disc near the end; three places in turn separate ridges that meet
             i = round((0.94 - 0.04 * (number % 3)) * (len(ridge.at) - 1))
             disc = {"boxstyle": "circle,pad=0.15", "facecolor": "white", "edgecolor": style.FAULT, "linewidth": 0.8}
             where = float(ridge.at[i]), float(ridge.positions[i])
@@ -178,18 +178,18 @@ def time_frequency_figure(
 
 
 def kurtogram_figure(kurtogram: Kurtogram, band: BandCandidate | None = None) -> Figure:
-    """Draw the kurtosis of each band over frequency, one row per bandwidth, the widest on top.
+    """Draw the kurtosis of each band over frequency, one row per bandwidth with the widest on top.
 
     Parameters
     ----------
     kurtogram : Kurtogram
     band : BandCandidate or None
-        Outlined and named; None takes the kurtogram's own best one.
+        Outlined and named; None: the kurtogram's best band.
 
     Returns
     -------
     Figure
-        Colours start at 0: bands below are no more impulsive than noise. Remarks on the band stand below the title.
+        Colours start at 0: bands below are no more impulsive than noise. Warnings on the band stand below the title.
     """
     band = kurtogram.best_band() if band is None else band
     figure, (axes,) = style.panels((3.1,), right_in=1.0, top_in=0.55)
@@ -233,17 +233,17 @@ def coherence_figure(
     ----------
     coherence : SpectralCoherence
     mean : EnhancedEnvelope or None
-        The upper panel; None takes the mean over all carriers. The range of its carriers is drawn beside the map.
+        The upper panel; None: the mean over all carriers. Its range of carriers is drawn beside the map.
     cursors : sequence of Cursor
         Lines of shafts and bearings, in cyclic frequencies or orders; see `modulation_cursors`.
     limits : (float, float) or None
-        Cyclic frequencies or orders that are drawn; None: all.
+        Cyclic frequencies or orders to draw; None: all.
 
     Returns
     -------
     Figure
-        Colours are logarithmic and begin at the level that noise exceeds in one cell of 1000. Where there are more
-        cells than pixels, the largest in a pixel is shown. The dashed line is noise's level at the mean's own
+        Colours are logarithmic and begin at the level that noise exceeds in one cell of 1000. If there are more cells
+        than pixels, each pixel shows the maximum of its cells. The dashed line is the level of noise at the mean's
         probability.
 
     Raises
@@ -257,7 +257,7 @@ def coherence_figure(
     if len(mean.spectrum.positions) != len(coherence.alpha) or mean.spectrum.axis != coherence.alpha_axis:
         raise InputError("the mean does not belong to the coherence", remedy="take enhanced_envelope of the same one")
     shown = _between(coherence.alpha, limits)
-    # Of the columns a line of one cell must be wider than a pixel to be seen.
+    # A line of one column must be wider than a pixel to be visible.
     alpha, values = _fewer_cells(coherence.alpha[shown], coherence.coherence_squared[shown], axis=0, n_max=500)
     low = coherence.level(1e-3)
     norm = LogNorm(low, max(float(values.max()), 2.0 * low))
@@ -275,7 +275,7 @@ def coherence_figure(
     at, _, high = style.envelope(mean.spectrum.positions[shown], mean.spectrum.values[shown], 1200)
     above.plot(at, high, color=style.MEASURED, linewidth=0.9)
     above.axhline(mean.level, color=style.FLOOR, linewidth=1.0, linestyle=(0, (4, 3)))
-    # A slow change of level stands at the first lines: it must not squeeze the others.
+    # A slow change of level appears in the first lines: it must not compress the others.
     above.set_ylim(0.0, 1.08 * max(float(high[int(0.02 * len(high)) :].max()), 1.5 * mean.level))
     if mean.band_hz != (float(coherence.frequency_hz[0]), float(coherence.frequency_hz[-1])):
         where = "carriers {:.5g} to {:.5g} Hz".format(*mean.band_hz)

@@ -1,4 +1,4 @@
-"""Panels of lines and of levels: one description for figures that are printed and figures that are zoomed."""
+"""Panels of lines, levels and rows: one description for printed and for interactive figures."""
 
 from __future__ import annotations
 
@@ -27,22 +27,22 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ChartLine:
-    """A line to draw; nan where it has a gap.
+    """A line to draw; nan leaves a gap.
 
     Parameters
     ----------
     x, y : array, (n,)
     name : str
     colour : int or str
-        0 what was measured, 1 a fault or what a method takes out, -1 quiet; further numbers are further colours; or
-        the colour itself.
+        0: measured; 1: a fault, or what a method removes; -1: pale; higher numbers: other colours; or the colour
+        itself.
     band : (low, high) or None
-        A pale band behind it.
+        A pale band behind the line.
     dotted : bool
     peaks : bool
-        Where there are more points than pixels, join the highest, over a pale band down to the lowest: of spectra.
+        For spectra: with more points than pixels, join the highest, over a pale band down to the lowest.
     dots : bool
-        Points that are not joined.
+        Draw points without joining them.
     """
 
     x: FloatArray
@@ -65,19 +65,19 @@ class LinePanel:
     x, y : str
         Names of the axes with units.
     limits : (float, float) or None
-        Of the value axis; None: about what is shown.
+        Of the value axis; None: chosen to fit the lines.
     logarithmic : bool
-        The value axis.
+        Whether the value axis is logarithmic.
     cursors : sequence of Cursor
         Lines that the machine implies.
     x_limits : (float, float) or None
-        None: from the first to the last point of a line.
+        None: from the first to the last point of the lines.
     spans : sequence of (low, high, colour)
         Shaded parts of the x axis.
     is_plane : bool
         Whether `x` need not ascend.
     title : str
-        What the panel shows, where that is not plain.
+        What the panel shows, if that is not obvious.
     dates : bool
         Whether x is days since 1970.
     """
@@ -106,17 +106,17 @@ class LevelPanel:
     at, positions : array, (n_x,) and (n_y,)
         Ascending; `at` in equal steps.
     x, y, unit : str
-        Names of the axes with units; what the levels refer to.
+        Names of the axes with units; reference of the levels.
     logarithmic : bool
-        The axis of positions.
+        Whether the axis of positions is logarithmic.
     lines : sequence of ChartLine
     cursors : sequence of Cursor
         On the x axis.
     span : float or None
-        Of the colours below the largest level; None: what the reader wants.
+        Of the colours below the maximum level; None: chosen by the user.
     title : str
     square : bool
-        Whether both axes are of one kind and equally long, and levels are yes or no: no bar of colours tells them.
+        Whether both axes have the same quantity and length and levels are yes or no, without a colour bar.
     """
 
     levels: FloatArray
@@ -135,7 +135,7 @@ class LevelPanel:
 
 @dataclass(frozen=True)
 class ChartRow:
-    """A bar with its name.
+    """A named bar.
 
     Parameters
     ----------
@@ -143,19 +143,19 @@ class ChartRow:
     start, end : float
         Of the bar.
     colour : int or str
-        As of a `ChartLine`.
+        As in `ChartLine`.
     beside, below : str
-        What stands right of the row, and quietly below that.
+        Text to the right of the row, and paler text below it.
     verdict : int or str or None
-        Colour of `beside`; None: that of text.
+        Colour of `beside`; None: the text colour.
     interval : (float, float) or None
-        In which the bar's end lies.
+        Uncertainty of the bar's end.
     mark : float or None
-        What the bar's end is compared with.
+        Value to compare the bar's end with.
     band : float or None
-        What is nothing yet, to both sides of zero.
+        Half width of the insignificant range around zero.
     is_total : bool
-        Whether its bar is a level, not a change.
+        Whether the bar is a level rather than a change.
     """
 
     name: str
@@ -173,7 +173,7 @@ class ChartRow:
 
 @dataclass(frozen=True)
 class RowPanel:
-    """Bars below each other over one axis.
+    """Bars in rows over one axis.
 
     Parameters
     ----------
@@ -182,11 +182,11 @@ class RowPanel:
     x : str
         Name of the axis with its unit.
     bar, mark, band : str
-        What these are.
+        Names of these for the legend.
     limits : (float, float) or None
-        Of the axis; None: about what is shown.
+        Of the axis; None: chosen to fit the bars.
     span : (float, float) or None
-        Of the axis, shaded behind all rows: what is nothing yet.
+        Range of the axis shaded behind all rows as insignificant.
     """
 
     rows: Sequence[ChartRow]
@@ -199,9 +199,9 @@ class RowPanel:
 
 
 def cell_limits(positions: FloatArray, *, logarithmic: bool = False) -> tuple[float, float]:
-    """Return where the cells of ascending positions begin and end: half a step beyond the first and the last.
+    """Return the outer limits of the cells of ascending positions: half a step beyond the first and the last.
 
-    What cannot be negative does not begin below 0.
+    If no position is negative, the limits do not extend below 0.
 
     Examples
     --------
@@ -219,18 +219,18 @@ def cell_limits(positions: FloatArray, *, logarithmic: bool = False) -> tuple[fl
 def pooled_levels(
     levels: FloatArray, positions: FloatArray, n_columns: int, n_rows: int, *, logarithmic: bool = False
 ) -> tuple[FloatArray, NDArray[np.intp]]:
-    """Return the largest known level of each pixel, and a row of `levels` that is in each row of pixels.
+    """Return the maximum known level of each pixel, and a row of `levels` for each row of pixels.
 
-    Rows of pixels share out the span of `cell_limits` equally. One that holds no position shows the nearest: speeds of
-    a run-up are not equally far apart, and the next one up would lie beside the orders that are drawn over them.
+    Rows of pixels divide the range of `cell_limits` equally. A row without a position shows the nearest one, as the
+    speeds of a run-up are unequally spaced and the next higher one would not match the orders drawn over the map.
 
     Parameters
     ----------
     levels : array, (n_y, n_x)
     positions : array, (n_y,)
-        Ascending; rows of pixels lie at equal steps of it, or of its logarithm.
+        Ascending; rows of pixels have equal steps of it, or of its logarithm.
     n_columns, n_rows : int
-        At most.
+        Maximum numbers.
     logarithmic : bool
     """
     n_columns = min(levels.shape[1], n_columns)
@@ -248,7 +248,7 @@ def pooled_levels(
     is_empty = first == past
     nearest = np.searchsorted((at[:-1] + at[1:]) / 2.0, (edges[:-1] + edges[1:]) / 2.0)
     rows = np.where(is_empty, nearest, first)
-    # a row more than there are, for empty rows of pixels past the last position
+    # one additional row, for empty rows of pixels past the last position
     largest = np.fmax.reduceat(np.vstack([levels, levels[-1:]]), first, axis=0)
     pooled = np.where(is_empty[:, None], levels[nearest], largest)
     return np.fmax.reduceat(pooled, columns, axis=1), rows
@@ -276,7 +276,7 @@ def curve_panel(
     Raises
     ------
     InputError
-        If a curve's length is not that of its axis, or there are more than eight.
+        If a curve's length differs from that of its axis, or there are more than eight.
     """
     style.check_number(len(curves), f"{len(curves)} curves in one panel")
     for name, values in curves.items():
@@ -287,7 +287,7 @@ def curve_panel(
 
 
 def tracked_panel(tracked: Sequence[TrackedOrder]) -> LinePanel:
-    """Return the panel of tracked orders: peak amplitudes over speed where it changes by more than 5 %, else over time.
+    """Return the panel of tracked orders: peak amplitudes over speed if it varies by more than 5 %, else over time.
 
     Parameters
     ----------
@@ -310,7 +310,7 @@ def panels_figure(
     heading: str = "",
     height_in: float | None = None,
 ) -> Figure:
-    """Draw panels in rows; names stand above all where every panel has the same ones, else above each.
+    """Draw panels in rows, with one legend above if all panels have the same names, else one above each.
 
     Parameters
     ----------
@@ -319,9 +319,9 @@ def panels_figure(
     n_columns : int
     title : str
     heading : str
-        Before the names, e.g. "roughness".
+        Text before the names, e.g. "roughness".
     height_in : float or None
-        Of a row; None: what lines, or levels, take.
+        Of a row; None: the default for lines or levels.
 
     Raises
     ------
@@ -382,7 +382,7 @@ _CYCLE = (style.MEASURED, style.FAULT, style.MESH, style.BEARING, style.SHAFT)
 
 
 def line_colour(colour: int | str) -> str:
-    """Return the colour of a `ChartLine` on paper."""
+    """Return the colour of a `ChartLine` for printed figures."""
     if isinstance(colour, str):
         return colour
     return style.QUIET if colour < 0 else _CYCLE[colour % len(_CYCLE)]
@@ -400,20 +400,20 @@ def _draw(axes: Axes, line: ChartLine, *, thinned: bool) -> Line2D:
 
 
 # --------------------
-# The other way: what a figure shows, as panels.
+# The inverse: the content of a figure as panels.
 # --------------------
 
 
 UNDER_A_LINE = "_under a line"
-"""Label of what is filled below a line that is drawn as well."""
+"""Label of an area filled below a line that is also drawn."""
 
 
 def panels_of(figure: Figure) -> list[list[list[LinePanel | LevelPanel]]]:
-    """Return what a figure of lines, bars and points shows: rows of columns of panels, to be zoomed.
+    """Return the content of a figure of lines, bars and points as rows of columns of panels, to be zoomed.
 
-    Axes that share a place, for two quantities over one axis, are panels of one column. A map of equal steps is a
-    panel without its lines of equal values, as hovering tells them. Empty where a figure shows what no panel can: polar
-    axes, places with names instead of numbers, surfaces, filled areas but those below a line (`UNDER_A_LINE`).
+    Axes at the same place, for two quantities over one axis, are panels of one column. A map of equal steps becomes a
+    panel without contour lines, as hovering shows the values. Empty if a figure contains what no panel can show: polar
+    axes, categorical axes, surfaces, or filled areas other than those below a line (`UNDER_A_LINE`).
     """
     from matplotlib.collections import QuadMesh
     from matplotlib.ticker import FixedFormatter
@@ -438,7 +438,7 @@ def panels_of(figure: Figure) -> list[list[list[LinePanel | LevelPanel]]]:
 
 
 def _fits_a_panel(drawn: Collection) -> bool:
-    """Whether it is upright lines, a map of equal steps, lines of equal values in one, or what fills below a line."""
+    """Whether a panel can show it: vertical lines, a map of equal steps, its contour lines, or an area below a line."""
     from matplotlib.collections import LineCollection, QuadMesh
     from matplotlib.contour import ContourSet
 
@@ -451,7 +451,7 @@ def _fits_a_panel(drawn: Collection) -> bool:
 
 
 def _axes_of_mesh(mesh: QuadMesh) -> tuple[FloatArray, FloatArray]:
-    """Return where the columns and the rows of a map's values lie: the middles of cells, or their corners."""
+    """Return the positions of a map's columns and rows: the centres of cells, or their corners."""
     corners = np.asarray(mesh.get_coordinates(), dtype=np.float64)
     x, y = corners[0, :, 0], corners[:, 0, 1]
     if np.asarray(mesh.get_array()).shape == corners.shape[:2]:  # shaded from corner to corner
@@ -460,7 +460,7 @@ def _axes_of_mesh(mesh: QuadMesh) -> tuple[FloatArray, FloatArray]:
 
 
 def _names_of_looks(figure: Figure, axes: Axes) -> dict[tuple[str, bool], str]:
-    """Return what legends call lines, by colour and whether they are broken."""
+    """Return the legend names of lines, by colour and whether they are broken."""
     from matplotlib.lines import Line2D
 
     legends = [legend for legend in (*figure.legends, axes.get_legend()) if legend is not None]
@@ -473,7 +473,7 @@ def _names_of_looks(figure: Figure, axes: Axes) -> dict[tuple[str, bool], str]:
 
 
 def _own_name(drawn: Any) -> str:
-    """Return what the drawing calls a line; matplotlib's own names begin with an underscore."""
+    """Return the name given to a line; matplotlib's automatic names begin with an underscore."""
     name = str(drawn.get_label() or "")
     return "" if name.startswith("_") else name
 
@@ -503,7 +503,7 @@ def _text_of(axes: Axes) -> str:
 
 
 def _names_of_upright_lines(axes: Axes) -> dict[float, str]:
-    """Return the texts that stand at upright lines, by their places."""
+    """Return the texts at vertical lines, by position."""
     upright = axes.get_xaxis_transform()
     at = {float(np.ravel(line.get_xdata())[0]) for line in axes.lines if line.get_transform() == upright}
     texts = {float(text.get_position()[0]): text.get_text() for text in axes.texts if text.get_transform() == upright}
@@ -511,7 +511,7 @@ def _names_of_upright_lines(axes: Axes) -> dict[float, str]:
 
 
 def _x_label(axes: Axes) -> str:
-    """Return the name of the x axis; of panels below each other over the same range only the last shows it."""
+    """Return the name of the x axis; of stacked panels with the same range, only the last one shows it."""
     left = round(axes.get_position().x0, 2)
     alike = [other for other in _panels_beside(axes) if other.get_xlim() == axes.get_xlim()]
     names = [other.get_xlabel() for other in (axes, *alike) if round(other.get_position().x0, 2) == left]
@@ -519,7 +519,7 @@ def _x_label(axes: Axes) -> str:
 
 
 def _y_label(axes: Axes) -> str:
-    """Return the name of the y axis; of panels beside each other over the same range only the first shows it."""
+    """Return the name of the y axis; of side-by-side panels with the same range, only the first one shows it."""
     top = round(axes.get_position().y1, 2)
     alike = [other for other in _panels_beside(axes) if other.get_ylim() == axes.get_ylim()]
     names = [other.get_ylabel() for other in (axes, *alike) if round(other.get_position().y1, 2) == top]
@@ -582,7 +582,7 @@ def _line_panel(axes: Axes, names: Mapping[tuple[str, bool], str]) -> LinePanel:
         elif len(np.ravel(x)):
             take(x, y, line.get_color(), _own_name(line), dotted=_is_broken(line), dots=not joined)
     collections: list[Any] = [drawn for drawn in axes.collections if drawn.get_label() != UNDER_A_LINE]
-    for collection in collections:  # upright lines
+    for collection in collections:  # vertical lines
         ends = np.array(collection.get_segments()).reshape(-1, 2, 2)
         gaps = np.concatenate([ends, np.full((len(ends), 1, 2), np.nan)], axis=1)
         gaps[:, 2, 0] = ends[:, 1, 0]
@@ -615,16 +615,16 @@ def _line_panel(axes: Axes, names: Mapping[tuple[str, bool], str]) -> LinePanel:
 
 
 # --------------------
-# And as a table: what a figure draws, whatever its axes are.
+# The content of any figure as a table.
 # --------------------
 
 
 def figure_table(figure: Figure) -> DataFrame:
-    """Return what a figure draws: panel, series, x, y, and the level of what is coloured by one.
+    """Return the content of a figure as a table: panel, series, x, y, and the level of what is coloured by one.
 
-    Lines and points by their places, images and meshes by the middles of their cells, bars by middle and height, filled
-    areas and surfaces by their corners; of polar panels x is the angle in rad and y the radius. Panels and series are
-    called as titles, axes and legends call them.
+    Lines and points are given by position, images and meshes by cell centres, bars by centre and height, filled areas
+    and surfaces by their corners. For polar panels, x is the angle in rad and y the radius. Panels and series are named
+    as in titles, axes and legends.
     """
     import pandas as pd
 
@@ -648,7 +648,7 @@ _Series = tuple[str, FloatArray, FloatArray, FloatArray]
 
 
 def _drawn_series(axes: Axes) -> Iterator[_Series]:
-    """Yield name, places and levels of everything that is drawn in data's coordinates."""
+    """Yield name, positions and levels of everything drawn in data coordinates."""
     from matplotlib.collections import PathCollection, QuadMesh
 
     def row(name: str, x: Any, y: Any, level: Any = np.nan) -> _Series:
@@ -693,7 +693,7 @@ def _drawn_series(axes: Axes) -> Iterator[_Series]:
 
 
 def _thinned(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Fewer points where x ascends; what runs to and fro is drawn whole."""
+    """Thin the points if x ascends; other paths are drawn in full."""
     return style.thin(x, y) if _has_many_ascending(x) else (x, y)
 
 

@@ -1,4 +1,4 @@
-"""Motion in phase space: portraits with their Poincaré points, recurrences, delays, dimensions, chaos."""
+"""Motion in phase space: portraits with Poincaré points, recurrences, delays, dimensions, chaos."""
 
 from __future__ import annotations
 
@@ -42,30 +42,30 @@ def phase_portrait_figure(
     n_points: int = 20_000,
     title: str = "",
 ) -> Figure:
-    """Draw two axes of a path against each other; with a section, its points on the path and alone beside it.
+    """Draw two axes of a path against each other; a section adds its points on the path and in a panel beside it.
 
     Parameters
     ----------
     portrait : PhasePortrait
     section : PoincareSection or None
-        Of the same axes.
+        With the same axes.
     axes : (int, int)
-        Which are drawn.
+        Axes to draw.
     n_points : int
-        The last so many of the path are drawn, and the figure says so; more are a blot.
+        Number of last points of the path to draw, which the figure states; more would overlap too much.
     title : str
 
     Raises
     ------
     InputError
-        If an axis is missing, or the section's axes are others.
+        If an axis is missing, or the section has other axes.
     """
     count(n_points, "n_points", minimum=2)
     if not all(0 <= axis < portrait.n_axes for axis in axes):
         raise InputError(f"axes is {axes}", allowed=f"two of 0 to {portrait.n_axes - 1}")
     if section is not None and section.axis_names != portrait.axis_names:
         raise InputError(f"the section's axes are {section.axis_names}", allowed=f"{portrait.axis_names}")
-    # beside a path alone half the figure would be empty
+    # without a section, half the figure would be empty
     figure, panels = style.panels((3.5,), top_in=0.42, width_in=5.2) if section is None else _two_panels()
     path = panels[0]
     shown = [display_unit(portrait.units[axis], float(portrait.extent[axis])) for axis in axes]
@@ -83,7 +83,7 @@ def phase_portrait_figure(
             panel.plot(*dots, "o", color=style.FAULT, markersize=size, markeredgewidth=0.0, zorder=3)
         style.label_axes(points, names[0], names[1], f"{section.n_points} points")
         style.note(points, f"once per {section.section}" if section.kind == "locked" else section.section)
-        # At least a twentieth of the path's size: one point must not be blown up to a cloud of rounding.
+        # At least a twentieth of the path's size, so that a single point is not enlarged to a cloud of rounding errors.
         limits = []
         for values, axis, factor in zip(dots, axes, factors, strict=True):
             middle, half = 0.5 * float(values.max() + values.min()), 0.58 * float(np.ptp(values))
@@ -100,9 +100,9 @@ _DRAWN_PER_PERIOD = 20.0
 
 
 def _path(portrait: PhasePortrait, axes: tuple[int, int], n_points: int) -> FloatArray:
-    """Return the last points of two axes, (n, 2): between samples of a filtered path as its band demands, not straight.
+    """Return the last points of two axes, (n, 2), with band-limited interpolation between samples of a filtered path.
 
-    Samples that lie wide apart in the highest period would make chords of what is a curve.
+    With few samples in the shortest period, straight lines would cut the corners of a curve.
     """
     points = portrait.points[:, axes]
     part = portrait.band_hz[1] / portrait.sampling_rate_hz
@@ -113,10 +113,10 @@ def _path(portrait: PhasePortrait, axes: tuple[int, int], n_points: int) -> Floa
 
 
 def recurrence_figure(plot: RecurrencePlot, measures: RecurrenceMeasures | None = None, *, title: str = "") -> Figure:
-    """Draw recurrent pairs as dots over both times; with measures, their values beside."""
+    """Draw recurrent pairs as dots over both times, with the values of the measures beside them, if given."""
     from matplotlib.colors import ListedColormap
 
-    side_in = 5.5  # a thousand points a side get a pixel each on the page
+    side_in = 5.5  # a pixel for each of a thousand points per side
     figure, (axes,) = style.panels((side_in,), right_in=style.WIDTH_IN - 0.85 - side_in, top_in=0.42)
     axes.grid(visible=False)
     limits = (float(plot.times_s[0]), float(plot.times_s[-1]))
@@ -130,7 +130,7 @@ def recurrence_figure(plot: RecurrencePlot, measures: RecurrenceMeasures | None 
     )
     style.label_axes(axes, "time (s)", "time (s)", title or plot.source or "recurrence plot")
     style.no_offset(axes)
-    rows = [f"radius {plot.radius:.3g} standard deviations", f"every {plot.stride}. point" if plot.stride > 1 else ""]
+    rows = [f"radius {plot.radius:.3g} standard deviations", f"1 in {plot.stride} points" if plot.stride > 1 else ""]
     if measures is not None:
         rows += [
             f"recurrence rate {measures.recurrence_rate:.3f}",
@@ -148,7 +148,7 @@ def recurrence_figure(plot: RecurrencePlot, measures: RecurrenceMeasures | None 
 
 
 def embedding_figure(information: MutualInformation, dimension: EmbeddingDimension, *, title: str = "") -> Figure:
-    """Draw mutual information over delay and false neighbours over dimension, with what was chosen from them."""
+    """Draw mutual information over delay and false neighbours over dimension, with the values chosen from them."""
     figure, (left, right) = _two_panels()
     left.plot(1e3 * information.delays_s, information.information_nats, color=style.MEASURED, linewidth=1.2)
     left.axvline(1e3 * information.delay_s, color=style.FAULT, linewidth=1.0)
@@ -177,7 +177,7 @@ def embedding_figure(information: MutualInformation, dimension: EmbeddingDimensi
 def divergence_figure(exponent: LyapunovExponent, *, title: str = "") -> Figure:
     """Draw the divergence curve with its fitted segment and line, and the distance of unrelated points.
 
-    Without a fit, as of what a `RefusalError` looked at, the curve and that distance alone.
+    Without a fit, as for the intermediate result of a `RefusalError`, draw only the curve and that distance.
     """
     figure, (axes,) = style.panels((2.43,), top_in=0.42)
     axes.plot(exponent.times_s, exponent.log_distance, color=style.MEASURED, linewidth=1.2, label="neighbours")
@@ -223,7 +223,7 @@ def _two_panels() -> tuple[Figure, list[Axes]]:
 
 
 def display_unit(unit: str, size: float) -> tuple[float, str]:
-    """Return the factor and unit in which values of that size have few digits: a power of a thousand where none is.
+    """Return the factor and unit in which values of that size have few digits; without a unit, a power of 1000.
 
     Examples
     --------
@@ -243,34 +243,33 @@ def display_unit(unit: str, size: float) -> tuple[float, str]:
 
 
 FEW_DIGITS = 0.02, 1e5
-"""Between these values are written out."""
+"""Values between these are written in full."""
 
 
 BRANCHES = (("rising", style.MEASURED, 2.6, True, 1.02), ("falling", style.FAULT, 5.0, False, 1.08))
-"""Names, colours, sizes of points, filled or hollow, height at which periods stand: where both hold the same motion,
-either is seen."""
+"""Name, colour, point size, filled or hollow, height of period labels; both are visible where they coincide."""
 
 
 def bifurcation_figure(
     diagram: BifurcationDiagram, down: BifurcationDiagram | None = None, *, title: str = ""
 ) -> Figure:
-    """Draw every Poincaré point over the parameter, and the standard deviation of the motion below.
+    """Draw all Poincaré points over the parameter, and the standard deviation of the motion below.
 
-    Segments whose section repeats are named by their period in cycles above, those of each branch in its colour. With
-    a second branch both are drawn; where they hold different motions is shaded, see `coexistence_ranges`.
+    Ranges with a periodic section are labelled above with their period in cycles, in the colour of their branch. If
+    there are two branches, ranges with different motions are shaded; see `coexistence_ranges`.
 
     Parameters
     ----------
     diagram : BifurcationDiagram
-        One branch; of two the one with the parameter rising.
+        One branch; of two, the one with increasing parameter.
     down : BifurcationDiagram or None
-        The other one, with the parameter falling.
+        The other one, with decreasing parameter.
     title : str
 
     Raises
     ------
     InputError
-        If the branches are of different things.
+        If the branches show different quantities.
     """
     from matplotlib.lines import Line2D
 
@@ -318,11 +317,11 @@ def bifurcation_figure(
 
 
 def _draw_branch(axes: Axes, branch: BifurcationDiagram, factor: float, looks: tuple[str, str, float, bool]) -> Line2D:
-    """Draw one branch; return what names it in the legend."""
+    """Draw one branch; return its legend entry."""
     from matplotlib.lines import Line2D
 
     name, colour, size, filled = looks
-    many = len(branch.points) > 20_000  # drawn smaller, and as pixels in a vector file
+    many = len(branch.points) > 20_000  # draw them smaller, and as pixels in a vector file
     shown = 0.5 * size if many else size
     look: dict[str, Any] = {
         "linestyle": "none",
@@ -338,7 +337,7 @@ def _draw_branch(axes: Axes, branch: BifurcationDiagram, factor: float, looks: t
 
 
 def _runs_of_equal_period(diagram: BifurcationDiagram) -> list[tuple[float, float, int]]:
-    """Segments of neighbouring values with one period, those that repeat and are wide enough to be named."""
+    """Ranges of neighbouring values with one period that repeat and are wide enough for a label."""
     width = float(np.ptp(diagram.values))
     runs: list[tuple[float, float, int]] = []
     for value, period in zip(diagram.values, diagram.periods, strict=True):

@@ -1,6 +1,6 @@
-"""Figures as pictures of a page that is one file: small SVG without matplotlib, and matplotlib's as data URIs.
+"""Figures embedded in a single-file page: small SVG without matplotlib, and matplotlib's figures as data URIs.
 
-Text and axes of the small SVG take the colour of the text around them, so that one serves light and dark pages.
+Text and axes of the small SVG inherit the colour of the surrounding text, so that they suit light and dark pages.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from PIL import Image
 
-PNG_DOTS_PER_INCH = 128  # 1152 pixels for 900 on the page: sharp, and a page of eight stays below 250 kB
-N_BLENDS = 12  # steps from each of the style's colours to white, for smoothed edges
+PNG_DOTS_PER_INCH = 128  # 1152 pixels for 900 on the page: sharp, and eight figures stay below 250 kB
+N_BLENDS = 12  # steps from each of the style's colours to white, for anti-aliased edges
 N_LEVELS = 124  # steps of the colours of maps
 
 
@@ -45,13 +45,13 @@ class Picture:
     width_px, height_px : int
         On the page.
     caption : str
-        One sentence on what to look at.
+        One sentence on what to look for.
     alternative : str
-        What the picture shows, for those who do not see it.
+        Text alternative for readers who cannot see the picture.
     svg : str
-        An <svg> element that stands in the page itself instead of an address.
+        An inline <svg> element instead of an address.
     title : str
-        What is drawn; empty where the figure itself says it.
+        What is drawn; empty if the figure itself says so.
     """
 
     uri: str
@@ -66,13 +66,13 @@ class Picture:
     def of_svg(cls, svg: str, caption: str, alternative: str, title: str = "") -> Picture:
         """Return a picture of an <svg> element with a viewBox from 0 0."""
         width, height = re.findall(r'viewBox="0 0 (\d+)[\d.]* (\d+)', svg)[0]
-        inline = svg.replace(' xmlns="http://www.w3.org/2000/svg"', "", 1)  # within HTML the namespace is known
+        inline = svg.replace(' xmlns="http://www.w3.org/2000/svg"', "", 1)  # HTML implies the namespace
         return cls("", int(width), int(height), caption, alternative, inline, title)
 
 
 @dataclass(frozen=True)
 class CaptionedFigure:
-    """A figure with the words that belong to it; see `Picture`."""
+    """A figure with caption and text alternative; see `Picture`."""
 
     figure: Figure
     caption: str
@@ -80,20 +80,20 @@ class CaptionedFigure:
 
 
 def embed(figure: Figure, caption: str, alternative: str, *, vector: bool = False) -> Picture:
-    """Turn a figure into a picture: PNG, or SVG where `vector` says that it has few lines."""
+    """Convert a figure to a picture: PNG, or SVG with `vector`, for figures of few lines."""
     width, height = figure.get_size_inches()
     uri = "data:image/svg+xml;base64," + b64encode(figure_svg(figure).encode()).decode() if vector else _png(figure)
     return Picture(uri, round(100 * width), round(100 * height), caption, alternative)
 
 
 def figure_svg(figure: Figure, *, transparent: bool = False) -> str:
-    """Draw a figure as SVG in the typeface of the page around it.
+    """Return a figure as SVG in the font of the surrounding page.
 
     Parameters
     ----------
     figure : Figure
     transparent : bool
-        Without its paper.
+        Whether to leave out the background.
     """
     from matplotlib import rc_context
 
@@ -110,14 +110,14 @@ def _png(figure: Figure) -> str:
     pixels, buffer = BytesIO(), BytesIO()
     figure.savefig(pixels, format="png", dpi=PNG_DOTS_PER_INCH, pil_kwargs={"compress_level": 0})
     image = Image.open(pixels).convert("RGB")
-    # A palette is a third of the size; a fixed one keeps a small mark's colour, which a counted one would blend away.
+    # A palette needs a third of the size; a fixed one keeps the colours of small marks, unlike an adaptive one.
     image.quantize(palette=_palette(), dither=Image.Dither.NONE).save(buffer, format="png", optimize=True)
     return "data:image/png;base64," + b64encode(buffer.getvalue()).decode("ascii")
 
 
 @cache
 def _palette() -> Image.Image:
-    """Return the colours that figures are made of."""
+    """Return the palette of all colours in figures."""
     from matplotlib.colors import to_rgb
     from PIL import Image
 
@@ -137,7 +137,7 @@ def _palette() -> Image.Image:
         for share in (step / N_BLENDS for step in range(1, N_BLENDS + 1))
     ]
     levels = [style.colours()(step / (N_LEVELS - 1))[:3] for step in range(N_LEVELS)]
-    # Pillow looks colours up in steps of 4 of 255: nothing else may lie so near to the white of the paper.
+    # Pillow looks colours up in steps of 4 of 255: no other colour may be so close to the white of the paper.
     tinted = [colour for colour in [*blends, *levels] if min(colour) < 0.965]
     numbers = [round(255 * part) for colour in [(1.0, 1.0, 1.0), *tinted] for part in colour]
     palette = Image.new("P", (1, 1))
@@ -146,7 +146,7 @@ def _palette() -> Image.Image:
 
 
 # --------------------
-# Panels and rings as small SVG, for pages that many recordings get one of, and for the dashboard.
+# Panels and rings as small SVG, for pages of many recordings and for the dashboard.
 # --------------------
 
 
@@ -154,10 +154,10 @@ LEFT, RIGHT, BOTTOM, ROW, BAR = 62, 12, 38, 14, 46
 N_COLUMNS, N_ROWS = 420, 160
 N_SHADES = 48
 MAX_IMAGE_BYTES = 24_000
-"""Levels of gears compress to half of it; where noise alone does not, a quarter of the pixels shows as much."""
+"""Levels of gears compress to half of it; pure noise does not, but then a quarter of the pixels shows as much."""
 MAX_ROWS = 4
 LETTER = 6.2
-"""Width of a letter in units of the drawing, for keeping labels apart."""
+"""Width of a character in units of the drawing, to keep labels apart."""
 
 
 def svg_panel(
@@ -167,17 +167,17 @@ def svg_panel(
     width: int = 760,
     height: int | None = None,
 ) -> str:
-    """Draw a panel of lines or of levels; of levels the largest in each pixel, with the bar of their colours.
+    """Draw a panel of lines, or of levels as the maximum in each pixel with a colour bar.
 
-    Labels of cursors that find no room are left out, families keep their first. Several lines are named above.
+    Cursor labels without room are left out, but families keep their first. Several lines are named above the panel.
 
     Parameters
     ----------
     panel : LinePanel or LevelPanel
     marked : sequence of (x, y)
-        Points on lines that findings name.
+        Points on lines, named by findings.
     width, height : int
-        Of the drawing, and of its panel; None: 170 of lines, 230 of levels.
+        Width of the drawing and height of its panel; None: 170 for lines, 230 for levels.
 
     Returns
     -------
@@ -208,7 +208,7 @@ def svg_panel(
 
 
 def _image_of_levels(panel: LevelPanel, n_columns: int, n_rows: int) -> bytes:
-    """Return the levels as PNG, the largest of each pixel."""
+    """Return the levels as PNG, with the maximum of each pixel."""
     from PIL import Image
 
     levels, _ = pooled_levels(panel.levels, panel.positions, n_columns, n_rows, logarithmic=panel.logarithmic)
@@ -221,7 +221,7 @@ def _image_of_levels(panel: LevelPanel, n_columns: int, n_rows: int) -> bytes:
 
 
 def _range_of(panel: LevelPanel) -> tuple[float, float]:
-    """Return the highest level, and how far the colours reach below it."""
+    """Return the maximum level, and the span of the colours below it."""
     return float(panel.levels.max()), 60.0 if panel.span is None else panel.span
 
 
@@ -263,10 +263,10 @@ def svg_ring(
     ink: str = "",
     line: str = style.MEASURED,
 ) -> str:
-    """Draw one mean revolution around the circle, with the gear's teeth; marked ones in the colour of faults.
+    """Draw one mean revolution around the circle with the gear's teeth, marked ones in the fault colour.
 
-    Angle runs clockwise from the top, where the average starts; tooth 1 begins there, and without numbers of teeth the
-    quarters are marked. Outwards is positive.
+    The angle runs clockwise from the top, where the average and tooth 1 start; without tooth numbers, quarters are
+    marked. Outwards is positive.
 
     Parameters
     ----------
@@ -275,9 +275,9 @@ def svg_ring(
         Of the gear.
     marks : sequence of AngleMark
     numbered : bool
-        Whether the teeth have numbers: those of a shaft without a mark have none.
+        Whether to number the teeth; a shaft without a reference mark has no tooth numbers.
     ink : str
-        Colour of text and axes; empty: of the text around.
+        Colour of text and axes; empty: that of the surrounding text.
     line : str
         Colour of the average.
     """
@@ -364,7 +364,7 @@ class _Panel:
         return "".join(_path(self.across(x[a:b]), self.up(y[a:b])) for a, b in zip(starts, stops, strict=True))
 
     def line(self, line: ChartLine, x: FloatArray, y: FloatArray) -> str:
-        """Draw the points of a line that are shown."""
+        """Draw the visible points of a line."""
         stroke, dash = line_colour(line.colour), ' stroke-dasharray="2 4"' if line.dotted else ""
         return f'<path d="{self.path(x, y)}" fill="none" stroke="{stroke}" stroke-width="1.1"{dash}/>'
 
@@ -428,7 +428,7 @@ class _Panel:
 
 
 def _path(x: FloatArray, y: FloatArray) -> str:
-    """Return a path in steps of a tenth of a unit, each from the one before: half the letters of places.
+    """Return a path of relative steps, rounded to a tenth of a unit: half the characters of absolute positions.
 
     Examples
     --------
@@ -437,12 +437,12 @@ def _path(x: FloatArray, y: FloatArray) -> str:
     """
     places = np.rint(10 * np.column_stack([x, y])).astype(int)
     steps = " ".join(f"{across / 10:g} {up / 10:g}" for across, up in np.diff(places, axis=0))
-    steps = re.sub(r"\b0\.", ".", steps).replace(" -", "-")  # a fifth of the letters, which say nothing
+    steps = re.sub(r"\b0\.", ".", steps).replace(" -", "-")  # redundant: a fifth of the characters
     return f"M{places[0, 0] / 10:g} {places[0, 1] / 10:g}" + (f"l{steps}" if steps else "")
 
 
 def _placed(cursors: Sequence[Cursor], limits: tuple[float, float], width: int) -> tuple[list[tuple[Cursor, int]], int]:
-    """Return labels with their rows, and the number of rows."""
+    """Return cursors with the rows of their labels, and the number of rows."""
     rows: list[list[tuple[float, float]]] = [[] for _ in range(MAX_ROWS)]
     placed = []
     for cursor in sorted(cursors, key=lambda c: c.number):
@@ -458,7 +458,7 @@ def _placed(cursors: Sequence[Cursor], limits: tuple[float, float], width: int) 
 
 
 def _names(lines: Sequence[ChartLine], width: int) -> tuple[list[str], int]:
-    """Return the names of lines in rows, and the height of these."""
+    """Return the names of lines arranged in rows, and the total height."""
     parts, x, y = [], float(LEFT), 10
     for line in lines:
         if name := style.cut(line.name, 40):
@@ -474,14 +474,14 @@ def _names(lines: Sequence[ChartLine], width: int) -> tuple[list[str], int]:
 
 
 def _columns(line: ChartLine, limits: tuple[float, float], n_columns: int = N_COLUMNS) -> tuple[FloatArray, FloatArray]:
-    """Return what is shown of a line, with the extremes of each column at their own places."""
+    """Return the points of a line to draw: the extremes of each column, at their own positions."""
     start = max(int(np.searchsorted(line.x, limits[0])), 0)
     stop = max(int(np.searchsorted(line.x, limits[1], side="right")), start + 1)
     x, y = np.asarray(line.x[start:stop]), np.asarray(line.y[start:stop])
     if len(x) <= 2 * n_columns:
         return x, y
     borders = list(pairwise(np.linspace(0, len(x), n_columns + 1).astype(int)))
-    chosen = [a + int(np.argmax(y[a:b])) for a, b in borders]  # of gaps the first: nan is the largest to argmax
+    chosen = [a + int(np.argmax(y[a:b])) for a, b in borders]  # the first gap, if any: argmax treats nan as the maximum
     if not line.peaks:
         chosen += [a + int(np.argmin(y[a:b])) for a, b in borders]
     at = np.unique(chosen)
@@ -504,13 +504,13 @@ def _ticks(low: float, high: float, n: int) -> list[float]:
 
 
 def _days(low: float, high: float) -> list[float]:
-    """Return up to six days at equal distances, whole ones."""
+    """Return up to six equally spaced whole days."""
     first, last = ceil(low), floor(high)
     return [float(day) for day in range(first, last + 1, max(ceil((last - first) / 5), 1))]
 
 
 def _decades(low: float, high: float, n_max: float = 8) -> list[float]:
-    """Return round numbers of a logarithmic axis: powers of ten, and two between each as far as there is room."""
+    """Return ticks of a logarithmic axis: powers of ten, and two between each if there is room."""
     steps = [m * 10.0**k for k in range(floor(log10(low)), ceil(log10(high)) + 1) for m in (1, 2, 5)]
     inside = [step for step in steps if low * (1 - 1e-9) <= step <= high * (1 + 1e-9)]
     if len(inside) <= n_max:
@@ -537,18 +537,18 @@ def _svg(width: float, height: float, parts: Sequence[str], *, ink: str = "") ->
 
 
 # --------------------
-# An indicator over months, load or speed with its limits: a fleet's report holds many.
+# An indicator over months, load or speed with its limits: a fleet's report has many.
 # --------------------
 
 
 N_SHOWN = 1500
-"""Recordings that are drawn over time, the latest: more than there are columns."""
+"""Number of latest recordings drawn over time: more than there are columns."""
 
 
 def trend_panel(trend: Trend | OperatingTrend) -> tuple[LinePanel, list[tuple[float, float]]]:
-    """Return an indicator in the band of its limits, over dates, load or speed, and its points beyond them.
+    """Return a panel of an indicator with its limits, over dates, load or speed, and the points that exceed them.
 
-    On a logarithmic axis where all values are above zero: a rise is then as high wherever it begins.
+    The axis is logarithmic if all values are positive, so that equal ratios look equal.
 
     Parameters
     ----------

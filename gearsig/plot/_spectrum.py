@@ -1,4 +1,4 @@
-"""Signals, speed and modes over time; spectra over frequency, order or quefrency."""
+"""Signals, speed and modes over time, and spectra over frequency, order or quefrency."""
 
 from __future__ import annotations
 
@@ -42,28 +42,28 @@ def spectrum_figure(
     ----------
     spectrum : Spectrum
     cursors : sequence of Cursor
-        In the spectrum's axis, see `order_cursors`.
+        On the spectrum's axis; see `order_cursors`.
     scale : str
         "log", "decibel" (re one unit) or "linear".
     floor : array, (n_lines,), or None
-        Drawn grey below the spectrum, in its unit.
+        Drawn in grey below the spectrum, in its unit.
     limits : (float, float) or None
         Of the axis; None: all of it.
     marked : sequence of float
-        Positions of findings, drawn in the colour of faults.
+        Positions of findings, drawn in the fault colour.
     title : str
         Empty: the spectrum's source.
 
     Returns
     -------
     Figure
-        Where there are more lines than pixels, the line joins the peaks, and a pale band reaches down to the lowest
-        value in each pixel.
+        If there are more lines than pixels, the curve joins the peaks, and a pale band reaches down to the minimum in
+        each pixel.
 
     Raises
     ------
     InputError
-        If the floor's length is not the spectrum's, or the limits are not ascending.
+        If the floor's length differs from the spectrum's, or the limits do not ascend.
     """
     one_of(scale, "scale", get_args(Scale))
     if floor is not None and len(floor) != len(spectrum.values):
@@ -92,8 +92,8 @@ def _draw_lines(
 ) -> None:
     start, stop = spectrum.index_of(limits[0]), spectrum.index_of(limits[1]) + 1
     x, y = spectrum.positions[start:stop], spectrum.values[start:stop]
-    # The zero line is an offset of the sensor, or the mean of an envelope, not vibration; with the window's leakage
-    # around it, it must not squeeze the rest on the axis.
+    # The line at zero is the sensor's offset, or the mean of an envelope, not vibration; together with its leakage it
+    # must not compress the rest of the axis.
     n_zero = 1 + int(2 * spectrum.noise_bandwidth / spectrum.resolution) if spectrum.resolution > 0 else 1
     shown = y[n_zero:] if start == 0 and len(y) > 2 * n_zero else y
     logarithmic = scale == "log" and bool(np.any(shown > 0))
@@ -132,14 +132,14 @@ def _draw_lines(
 
 
 def displayed_values(values: FloatArray, scaling: Scaling, scale: Scale, unit: str) -> FloatArray:
-    """Return what a scale draws of values: decibels, what has a logarithm, or the values themselves."""
+    """Return values as a scale draws them: in decibels, limited to positive ones, or unchanged."""
     if scale == "decibel":
         return decibels(values, scaling, unit)
     return above_zero(values) if scale == "log" else values
 
 
 def value_limits(values: FloatArray, scale: Scale) -> tuple[float, float]:
-    """Return limits that show the peaks and the floor, without the bottomless notches between the lines."""
+    """Return limits that show the peaks and the floor, but not the deep notches between the lines."""
     high = float(values.max())
     if scale == "linear":
         low = min(float(values.min()), 0.0)
@@ -160,7 +160,7 @@ def _value_label(spectrum: Spectrum, scale: Scale) -> str:
 def time_figure(
     recording: Recording, channels: Sequence[str] = (), *, limits_s: tuple[float, float] | None = None
 ) -> Figure:
-    """Draw channels one below the other over a common time axis, extremes kept.
+    """Draw channels in rows over a common time axis; thinning keeps extremes.
 
     Parameters
     ----------
@@ -200,11 +200,11 @@ METHODS = {
     "tachless": "found in the vibration, no tachometer",
 }
 MIN_SPEED_SPAN = 0.002
-"""The speed axis spans at least this share of the mean: rounding at constant speed must not look like a fluctuation."""
+"""Minimum span of the speed axis relative to the mean: rounding at constant speed must not look like fluctuation."""
 
 
 def speed_panel(shaft_angle: ShaftAngle) -> LinePanel:
-    """Return the speed of a shaft over time, as a panel.
+    """Return the panel of a shaft's speed over time.
 
     Parameters
     ----------
@@ -219,7 +219,7 @@ def speed_panel(shaft_angle: ShaftAngle) -> LinePanel:
 
 
 def speed_figure(shaft_angle: ShaftAngle) -> Figure:
-    """Draw the speed of a shaft over time, with how it was found.
+    """Draw the speed of a shaft over time, and say how it was found.
 
     Parameters
     ----------
@@ -240,14 +240,14 @@ def speed_figure(shaft_angle: ShaftAngle) -> Figure:
 
 
 # --------------------
-# Modes of a signal: waveform and spectrum of each, by rising centre, the residual last.
+# Modes of a signal: waveform and spectrum of each, in order of centre frequency, then the residual.
 # --------------------
 
 
 def modes_figure(
     modes: Modes, *, limits: tuple[float, float] | None = None, spectrum_limits: tuple[float, float] | None = None
 ) -> Figure:
-    """Draw each mode's waveform and its amplitude spectrum in one row, the residual in the last.
+    """Draw each mode's waveform and amplitude spectrum in one row, and the residual in the last.
 
     Parameters
     ----------
@@ -261,13 +261,13 @@ def modes_figure(
     Returns
     -------
     Figure
-        All spectra share one logarithmic axis, so that the modes' sizes compare; waveforms have an axis each. A line in
-        each spectrum marks the centre, a band its root mean square width to both sides.
+        All spectra share one logarithmic axis for comparison; each waveform has a separate axis. In each spectrum, a
+        line marks the centre and a band the RMS width on each side.
 
     Raises
     ------
     InputError
-        On too many modes, or limits that do not ascend or hold fewer than two samples.
+        If there are too many modes, or the limits do not ascend or contain fewer than two samples.
     """
     if modes.n_modes > 12:
         raise InputError(f"there are {modes.n_modes} modes", allowed="up to 12 in a figure")
@@ -277,7 +277,7 @@ def modes_figure(
     lines = _limits_within(spectrum_limits, rate / 2, 2.0 * spectra[0].resolution, "spectrum_limits")
     within = slice(max(0, int(np.floor(shown[0] * rate))), int(np.ceil(shown[1] * rate)) + 1)
     highest = max(float(above_zero(s.values[1:]).max()) for s in spectra)
-    lowest = 1e-5 * highest  # of the axis that all spectra share
+    lowest = 1e-5 * highest  # lower limit of the axis that all spectra share
     rows = [*modes.by_centre(), modes.n_modes]
     figure, panels = style.panels(
         (0.82,) * len(rows), (0.55, 0.45), top_in=0.45, row_gap_in=0.33, column_gap_in=0.75, share_x=True
@@ -319,12 +319,12 @@ def _mode_title(modes: Modes, k: int) -> str:
 
 
 def _digits(value: float, n: int) -> str:
-    """Write `n` significant digits without an exponent."""
+    """Format a number with `n` significant digits and no exponent."""
     return np.format_float_positional(value, precision=n, unique=False, fractional=False, trim="-")
 
 
 def _limits_within(limits: tuple[float, float] | None, high: float, min_span: float, name: str) -> tuple[float, float]:
-    """Return limits within the axis, wide enough for two points."""
+    """Return limits within the axis, at least wide enough for two points."""
     if limits is None:
         return 0.0, high
     cut = max(0.0, float(limits[0])), min(high, float(limits[1]))

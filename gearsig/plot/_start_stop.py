@@ -1,4 +1,4 @@
-"""Figures of start–stop motion: speed and impacts, phase plane of the teeth, torque over twist, force between them."""
+"""Figures of start–stop motion: speed and impacts, phase plane of the teeth, torque over twist, tooth forces."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ MODELS = {
     motions.HUNT_CROSSLEY: (style.BEARING, ":"),
     motions.KELVIN_VOIGT: (style.MESH, "-."),
 }
-"""Colour and line of each model: the source's figures have solid, dashed and dotted lines."""
+"""Colour and line style of each model: the source's figures have solid, dashed and dotted lines."""
 
 Drawn = Sequence[tuple[motions.StartStop, str]]
 """Motions with their colours."""
 
 
 def start_stop_figure(examined: motions.StartStop, *, title: str = "") -> Figure:
-    """Draw the driver's speed with rests shaded and impacts marked; below, the phase plane and torque over twist.
+    """Draw the driver's speed with rests shaded and impacts marked, and below it the phase plane and torque over twist.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def start_stop_figure(examined: motions.StartStop, *, title: str = "") -> Figure
         lost, work = examined.loop.loss_per_cycle_j, examined.loop.work_per_cycle_j
         uncertain = examined.loop.loss_uncertainty_j
         loss = f"{lost:.3g}" if lost > uncertain else f"at most {max(abs(lost), uncertain):.2g}"
-        style.note(loop, f"{loss} of {work:.3g} J lost a cycle")
+        style.note(loop, f"{loss} of {work:.3g} J lost per cycle")
     return figure
 
 
@@ -75,13 +75,13 @@ def start_stop_pair_figure(
     curves_um: tuple[FloatArray, FloatArray] | None = None,
     title: str = "",
 ) -> Figure:
-    """Draw speeds, phase planes, loops of torque over twist, profile over the mesh cycle, and teeth one by one.
+    """Draw speeds, phase planes, torque–twist loops, the profile over the mesh cycle, and individual teeth.
 
     Parameters
     ----------
     healthy, faulty : StartStop
     curves_um : (array, array) or None
-        Compression on the drive flank over equal parts of the mesh cycle, in µm, healthy and faulty.
+        Compression on the drive flank in µm over equal parts of the mesh cycle, healthy and faulty.
     title : str
     """
     figure, (over, plane, loop, profile, teeth) = _panels_below_a_wide_one((2.3, 2.3, 2.3))
@@ -92,15 +92,15 @@ def start_stop_pair_figure(
     style.label_axes(profile, "part of the mesh cycle", "compression (µm)", "drive flank over the mesh cycle")
     if curves_um is None:
         profile.set_yticks([])
-        style.write(profile, 0.5, 0.5, "no starts and stops to tell it from")
+        style.write(profile, 0.5, 0.5, "no starts and stops to estimate it from")
     for curve, (_, colour) in zip(curves_um or (), drawn, strict=False):
         place = (np.arange(len(curve)) + 0.5) / len(curve)
         profile.plot(place, curve, color=colour, linewidth=1.2, marker=".", markersize=4)
         profile.set_xlim(0.0, 1.0)
-    style.label_axes(teeth, "tooth of the driver", "yields more by (µm)", "teeth one by one")
+    style.label_axes(teeth, "tooth of the driver", "extra deflection (µm)", "individual teeth")
     for (examined, colour), shift in zip(drawn, (-0.2, 0.2), strict=True):
         if examined.teeth is None:
-            style.write(teeth, 0.5, 0.5, "teeth cannot be told one by one")
+            style.write(teeth, 0.5, 0.5, "individual teeth cannot be distinguished")
             break
         extra = examined.teeth.extra_um
         teeth.bar(np.arange(1, len(extra) + 1) + shift, np.nan_to_num(extra), width=0.4, color=colour)
@@ -112,7 +112,7 @@ def start_stop_pair_figure(
 
 
 def _panels_below_a_wide_one(heights_in: Sequence[float], *, right_in: float = 0.2) -> tuple[Figure, list[Axes]]:
-    """Return two columns of panels, of which the first row is one panel."""
+    """Return two columns of panels whose first row is a single panel."""
     figure, axes = style.panels(heights_in, (1.0, 1.0), right_in=right_in, top_in=0.75, row_gap_in=0.95)
     axes.pop(1).remove()
     place = axes[0].get_subplotspec()
@@ -140,7 +140,7 @@ def _draw_impact_speeds(figure: Figure, over: Axes, impacts: Sequence[motions.Im
     axes.set_ylim(0.0, 1.6 * max(i.speed_mps for i in impacts))
     axes.tick_params(colors=style.QUIET, labelcolor=style.INK, labelsize=style.SMALL_PT)
     axes.spines["top"].set_visible(False)
-    style.label_axes(axes, "", "speed of impact (m/s)")
+    style.label_axes(axes, "", "impact speed (m/s)")
     style.no_offset(axes)
     _legend(figure, axes.get_legend_handles_labels()[0])
 
@@ -161,12 +161,12 @@ def _draw_planes(axes: Axes, drawn: Drawn) -> None:
     style.label_axes(axes, "compression (µm)", "its rate (mm/s)", "phase plane of the teeth")
     for examined, colour in drawn:
         if examined.portrait is None:
-            style.write(axes, 0.5, 0.5, "the middle of the play is not known")
+            style.write(axes, 0.5, 0.5, "the middle of the backlash is not known")
             return
         _draw_path(axes, examined.portrait.points * (MICRO, MILLI), colour)
     plays = [f"{examined.backlash.backlash_um:.4g}" for examined, _ in drawn if examined.backlash is not None]
     if len(plays) == len(drawn):
-        style.note(axes, f"play {' and '.join(plays)} µm")
+        style.note(axes, f"backlash {' and '.join(plays)} µm")
 
 
 def _draw_loops(axes: Axes, drawn: Drawn) -> None:
@@ -179,14 +179,14 @@ def _draw_loops(axes: Axes, drawn: Drawn) -> None:
 
 
 def _draw_path(axes: Axes, points: FloatArray, colour: str) -> None:
-    """Draw the last points: a longer path is a blot."""
+    """Draw the last points; a longer path would overlap too much."""
     axes.plot(*points[-40_000:].T, color=colour, linewidth=0.5, alpha=0.65)
 
 
 def motion_profile_figure(examined: motions.StartStop, *, title: str = "") -> Figure:
-    """Draw the driver's speed, the torque where it was measured, and the compression with the play.
+    """Draw the driver's speed, the torque if it was measured, and the compression with the backlash.
 
-    Behind all of them the phases are shaded: run-up, running, run-down, rest.
+    The phases are shaded behind them: run-up, running, run-down, rest.
 
     Parameters
     ----------
@@ -224,7 +224,7 @@ def motion_profile_figure(examined: motions.StartStop, *, title: str = "") -> Fi
 def impacts_figure(
     impacts: Sequence[motions.Impact], n_teeth: int, *, restitution: float | None = None, title: str = ""
 ) -> Figure:
-    """Draw energy over time above; below, energy over the driver's tooth, and restitution over speed of approach.
+    """Draw impact energy over time and over the driver's tooth, and restitution over approach speed.
 
     Parameters
     ----------
@@ -232,7 +232,7 @@ def impacts_figure(
     n_teeth : int
         Of the driver.
     restitution : float or None
-        The rig's, as a line to compare with.
+        The rig's, drawn as a line for comparison.
     title : str
 
     Raises
@@ -242,7 +242,7 @@ def impacts_figure(
 
     Notes
     -----
-    Where an inertia is not known, speed stands for energy.
+    If an inertia is not known, speed is drawn instead of energy.
     """
     if not impacts:
         raise InputError("there are no impacts to draw", allowed="at least one")
@@ -271,8 +271,8 @@ def impacts_figure(
     bounce.set_xlim(left=0.0)
     quantity = "energy (J)" if has_energy else "speed (m/s)"
     style.label_axes(over_time, "time (s)", quantity)
-    style.label_axes(by_tooth, "tooth of the driver", quantity, "which teeth meet")
-    style.label_axes(bounce, "speed of approach (m/s)", "speed after over before", "restitution")
+    style.label_axes(by_tooth, "tooth of the driver", quantity, "teeth in contact")
+    style.label_axes(bounce, "approach speed (m/s)", "speed after / before", "restitution")
     if restitution is not None:
         bounce.axhline(restitution, color=style.FLOOR, linewidth=0.9, linestyle="--")
         style.note(bounce, f"dashed: the rig's, {restitution:g}")
@@ -281,7 +281,7 @@ def impacts_figure(
 
 
 def force_figure(estimate: motions.ForceEstimate, reference: str = "", *, title: str = "") -> Figure:
-    """Draw forces above and their errors below; beside them the strongest blow on the back flank at a larger scale.
+    """Draw forces above and their errors below, and beside them the strongest impact on the back flank, enlarged.
 
     Parameters
     ----------
@@ -293,7 +293,7 @@ def force_figure(estimate: motions.ForceEstimate, reference: str = "", *, title:
     Raises
     ------
     InputError
-        If nothing was measured to compare with.
+        If there is no measured reference.
     """
     if not estimate.references_n:
         raise InputError("there is no reference force", remedy="draw a recording with a torque channel")
@@ -303,7 +303,7 @@ def force_figure(estimate: motions.ForceEstimate, reference: str = "", *, title:
     figure, axes = style.panels(
         (2.15, 2.15), (1.25, 1.0), top_in=0.75, row_gap_in=0.4, column_gap_in=0.75, share_x=True
     )
-    # Beside the whole record, 120 ms around the lowest force.
+    # Beside the whole record: 120 ms around the minimum force.
     start = max(float(time[0]), float(time[int(np.argmin(measured))]) - 0.03)
     blow = (start, min(float(time[-1]), start + 0.12))
     lines = []
@@ -330,7 +330,7 @@ def force_figure(estimate: motions.ForceEstimate, reference: str = "", *, title:
 
 
 def noise_figure(study: motions.NoiseStudy, *, title: str = "") -> Figure:
-    """Draw the models' errors over the noise that was added to the compression."""
+    """Draw the models' errors over the noise added to the compression."""
     figure, (axes,) = style.panels((2.3,))
     lines = []
     for model, rms in study.rms_n.items():
@@ -343,7 +343,7 @@ def noise_figure(study: motions.NoiseStudy, *, title: str = "") -> Figure:
     axes.set_xticks(study.levels_um, [f"{level:g}" for level in study.levels_um])
     if study.crossover_um is not None:
         axes.axvline(study.crossover_um, color=style.FLOOR, linewidth=0.9)
-        style.note(axes, f"grey line: no longer nearer from {study.crossover_um:.3g} µm on")
+        style.note(axes, f"grey line: no longer closer from {study.crossover_um:.3g} µm")
     style.label_axes(axes, "noise added to the compression (µm rms)", f"rms error against {study.reference} (kN)")
     style.head(figure, title or "error over noise", lines)
     return figure

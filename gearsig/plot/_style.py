@@ -1,7 +1,7 @@
-"""One look for all figures: sizes, fonts, and colours that always mean the same.
+"""The common style of all figures: sizes, fonts, and colours with fixed meanings.
 
-Everything is set on the figure itself. Matplotlib's global settings and `pyplot` are never touched, so that figures can
-be made in several threads at once and are freed when the last reference goes.
+Everything is set on the figure itself. Matplotlib's global settings and `pyplot` are never touched, so that several
+threads can draw figures at the same time, and figures are freed with their last reference.
 """
 
 from __future__ import annotations
@@ -31,18 +31,18 @@ if TYPE_CHECKING:
 
 
 Scale = Literal["log", "decibel", "linear"]
-"""How values are drawn: on a logarithmic axis, in decibels on a linear one, or as they are."""
+"""How values are drawn: on a logarithmic axis, in decibels on a linear axis, or unchanged."""
 
 
 SOUND_REFERENCE_PA = 20e-6
-"""Of sound pressure in air (ISO 1683)."""
+"""Reference sound pressure in air (ISO 1683)."""
 
 
 def decibels(values: FloatArray, scaling: Scaling, unit: str = "") -> FloatArray:
     """Return values in dB re one unit, or re 20 µPa of sound: 20 lg of amplitudes, 10 lg of powers.
 
-    Levels of sound are those of root mean squares, as ISO 80000-8 has them: of peaks, 3 dB less.
-    Zeros are drawn 200 dB (amplitudes) or 100 dB (powers) below the largest value.
+    Sound levels refer to RMS values, as in ISO 80000-8: peak amplitudes are reduced by 3 dB.
+    Zeros are drawn 200 dB (amplitudes) or 100 dB (powers) below the maximum.
     """
     factor = 10.0 if scaling in ("power", "power density") else 20.0
     result: FloatArray = factor * np.log10(above_zero(values))
@@ -52,7 +52,7 @@ def decibels(values: FloatArray, scaling: Scaling, unit: str = "") -> FloatArray
 
 
 def level_name(scaling: str, unit: str) -> str:
-    """Return what levels in dB are of: the scaling, or the sound pressure level.
+    """Return the quantity of levels in dB: the scaling, or the sound pressure level.
 
     Examples
     --------
@@ -63,7 +63,7 @@ def level_name(scaling: str, unit: str) -> str:
 
 
 def decibel_text(unit: str) -> str:
-    """Return what levels in dB refer to.
+    """Return the unit of levels in dB with its reference.
 
     Examples
     --------
@@ -71,7 +71,7 @@ def decibel_text(unit: str) -> str:
     ('dB re 1 m/s²', 'dB re 20 µPa', 'dB re (20 µPa)²/Hz', 'dB re 1')
     """
     if is_sound_pressure(unit):
-        reference = "20 µPa" if unit == "Pa" else "(20 µPa)"  # of amplitudes; of powers, squared
+        reference = "20 µPa" if unit == "Pa" else "(20 µPa)"  # for amplitudes; squared for powers
         return f"dB re {unit_text(unit.replace('Pa', reference))}"
     return f"dB re 1 {unit_text(unit)}".rstrip()
 
@@ -82,28 +82,28 @@ def is_sound_pressure(unit: str) -> bool:
 
 
 def above_zero(values: FloatArray) -> FloatArray:
-    """Return values lifted to a tiny share of the largest one, so that they have a logarithm."""
+    """Return values raised to at least a tiny share of the maximum, so that they have a logarithm."""
     largest = float(np.max(values, initial=0.0))
     lowest = 1e-10 * largest if largest > 0 else 1e-10
     return np.maximum(np.asarray(values, dtype=np.float64), max(lowest, float(np.finfo(np.float64).tiny)))
 
 
 def with_unit(name: str, unit: str) -> str:
-    """Write a quantity with its unit in brackets, or alone where the unit is not known."""
+    """Return a quantity with its unit in brackets, or alone if the unit is not known."""
     return f"{name} ({unit_text(unit)})" if unit else name
 
 
 def plain(text: str, n_max: int = 60) -> str:
-    """Return one line that the figures' font can draw, cut in its middle to `n_max` characters.
+    """Return one line that the figures' font can draw, cut in the middle to `n_max` characters.
 
-    Names come from files: signs the font lacks become "?".
+    Names come from files: characters that the font lacks become "?".
     """
     drawable = _drawable_code_points()
     return "".join(c if ord(c) in drawable else "?" for c in cut(text, n_max))
 
 
 def cut(text: str, n_max: int = 60) -> str:
-    """Return a text from a file on one line, control characters as spaces, cut in its middle to `n_max` characters."""
+    """Return a text from a file on one line, without control characters, cut in the middle to `n_max` characters."""
     line = " ".join("".join(c if c.isprintable() else " " for c in text).split())
     if len(line) <= n_max:
         return line
@@ -118,10 +118,10 @@ def _drawable_code_points() -> frozenset[int]:
     return frozenset(get_font(findfont(FontProperties(family=["DejaVu Sans"]))).get_charmap())
 
 
-# The colours of Okabe and Ito (Color Universal Design, 2008), which stay apart for colour-blind readers.
+# The colours of Okabe and Ito (Color Universal Design, 2008), which colour-blind readers can distinguish.
 MEASURED = "#0072B2"
 FAULT = "#D55E00"
-SIMULATED = "#C98A00"  # their orange, darkened: beside the blue of what was measured
+SIMULATED = "#C98A00"  # their orange, darkened, to go with the blue of measured data
 FLOOR = "#7A7A7A"
 MESH = "#00795A"  # their bluish green, darkened for thin lines and small print
 SHAFT = "#9A6A00"  # their orange, darkened likewise
@@ -134,24 +134,24 @@ CURSOR_COLOURS = {"mesh": MESH, "sideband": MESH, "shaft": SHAFT, "bearing": BEA
 """Colour of each kind of order line."""
 
 MICRO, MILLI, KILO = 1e6, 1e3, 1e-3
-"""Factors from SI units to µm, mm (also ms, mrad) and kN that axes count in."""
+"""Factors from SI units to the axis units µm, mm (also ms, mrad) and kN."""
 
 DOTS_PER_INCH = 100
 WIDTH_IN = 9.0
 TEXT_PT = 9.5
-SMALL_PT = 9.0  # 7 pt where a picture of this width is printed on A4
+SMALL_PT = 9.0  # 7 pt when a figure of this width is printed on A4
 LINE_PT = 0.9
 
 
 def new_figure(height_in: float, width_in: float = WIDTH_IN) -> Figure:
-    """Return an empty figure, 900 pixels wide unless told."""
+    """Return an empty figure, by default 900 pixels wide."""
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width_in, height_in), dpi=DOTS_PER_INCH, facecolor="white")
 
 
 def _apply_common_look(axes: Axes) -> None:
-    """Give axes the common look: quiet ticks and rules, no box."""
+    """Apply the common style to axes: pale ticks and rules, no box."""
     axes.set_facecolor("none")
     axes.spines[["top", "right"]].set_visible(False)
     axes.spines[["left", "bottom"]].set(color=QUIET, linewidth=0.8)
@@ -181,14 +181,14 @@ def panels(
     heights_in : sequence of float
         Of the rows, from the top.
     widths : sequence of float
-        Of the columns, relative to each other: together they fill the figure.
+        Of the columns, relative to each other; together they fill the figure.
     left_in, right_in, bottom_in, top_in : float
-        Margins, for labels, the title and the row of names. Room for a title alone: 0.42.
+        Margins for labels, title and legend row; a title alone needs 0.42.
     row_gap_in, column_gap_in : float
     width_in : float
         Of the figure.
     share_x : bool
-        Whether panels below each other have one axis, with numbers under the last row only.
+        Whether panels of a column share the x axis, with numbers under the last row only.
 
     Returns
     -------
@@ -233,7 +233,7 @@ def size_in(axes: Axes) -> tuple[float, float]:
 
 
 def colours() -> Colormap:
-    """Return a map from white over blue to nearly black: even steps of lightness, the same for every reader."""
+    """Return a colour map from white through blue to nearly black, with even steps of lightness for all readers."""
     from matplotlib.colors import LinearSegmentedColormap
 
     return LinearSegmentedColormap.from_list(
@@ -242,31 +242,31 @@ def colours() -> Colormap:
 
 
 def font_folder() -> Path:
-    """Return the folder of the figures' fonts, which come with matplotlib."""
+    """Return the folder of the figures' fonts, which are part of matplotlib."""
     from matplotlib import get_data_path
 
     return Path(get_data_path()) / "fonts" / "ttf"
 
 
 def level_colours(*, dark: bool = False) -> NDArray[np.uint8]:
-    """Return 256 colours of levels as (256, 3) bytes, from the paper's colour up; on dark paper light is high.
+    """Return 256 colours for levels as (256, 3) bytes, starting from the background; high is light on dark.
 
     Parameters
     ----------
     dark : bool
-        Whether the paper is dark.
+        Whether the background is dark.
     """
     scale = (255 * colours()(np.linspace(0, 1, 256))[:, :3]).round().astype(np.uint8)
     return scale[::-1] if dark else scale
 
 
 def colour_bar(axes: Axes, drawn: ScalarMappable, label: str = "", *, gap_in: float = 0.15, **looks: Any) -> Axes:
-    """Draw the colours' scale right of a panel, as tall as it is; further `looks` are those of `Figure.colorbar`."""
+    """Draw a colour bar to the right of a panel, of equal height; `looks` are passed to `Figure.colorbar`."""
     figure = axes.get_figure(root=True)
     assert figure is not None  # noqa: S101 - every panel belongs to one
     width, place = figure.get_size_inches()[0], axes.get_position()
     right_of_it = (place.x1 + gap_in / width, place.y0, 0.12 / width, place.height)
-    bar_axes = figure.add_axes(right_of_it, label="<colorbar>")  # as matplotlib calls those that it makes itself
+    bar_axes = figure.add_axes(right_of_it, label="<colorbar>")  # matplotlib's own label for colour bars
     figure.colorbar(drawn, cax=bar_axes, **looks).outline.set_visible(False)
     bar_axes.tick_params(colors=QUIET, labelcolor=INK, labelsize=SMALL_PT)
     bar_axes.set_ylabel(plain(label), color=INK, fontsize=TEXT_PT, parse_math=False)
@@ -284,12 +284,12 @@ def put_text(
     n_max: int = 90,
     **looks: Any,
 ) -> None:
-    """Write small quiet text; names from files are never read as markup. Further `looks` are those of `Axes.text`."""
+    """Write small pale text; names from files are never read as markup. `looks` are passed to `Axes.text`."""
     target.text(x, y, plain(text, n_max), color=colour, fontsize=fontsize, parse_math=False, **looks)
 
 
 def polar_panel(figure: Figure) -> PolarAxes:
-    """Add bare polar axes: zero at the top, angle growing clockwise."""
+    """Add bare polar axes with zero at the top and clockwise angle."""
     from matplotlib.projections.polar import PolarAxes
 
     axes = figure.add_axes((0.02, 0.02, 0.96, 0.96), projection="polar")
@@ -310,7 +310,7 @@ def label_axes(axes: Axes, x: str = "", y: str = "", title: str = "") -> None:
 
 
 def no_offset(*panels: Axes) -> None:
-    """Write the labels of linear axes in full: "1999.8", not "-0.2 + 2e3"; "8e−05", not "8" and a factor elsewhere."""
+    """Write tick labels of linear axes in full: "1999.8", not "-0.2 + 2e3"; "8e−05", not "8" and a factor elsewhere."""
     from matplotlib.ticker import FuncFormatter, ScalarFormatter
 
     for axis in (axis for axes in panels for axis in (axes.xaxis, axes.yaxis)):
@@ -319,7 +319,7 @@ def no_offset(*panels: Axes) -> None:
 
 
 def number_decades(axis: Axis, n_digits: int = 6) -> None:
-    """Label 1, 2 and 5 of each decade of a logarithmic axis in full, whole powers of ten included."""
+    """Label 1, 2 and 5 of each decade of a logarithmic axis in full."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
@@ -328,36 +328,36 @@ def number_decades(axis: Axis, n_digits: int = 6) -> None:
 
 
 def note(axes: Axes, text: str) -> None:
-    """Write a quiet remark into the upper right corner, above the panel."""
+    """Write a pale note into the upper right corner, above the panel."""
     above = 1.0 + 0.06 / size_in(axes)[1]
     put_text(axes, 1.0, above, text, transform=axes.transAxes, ha="right", va="bottom")
 
 
 # --------------------
-# Several curves in one figure: checked against their axis, coloured by their order, named above the panel.
+# Several curves in one figure: checked against their axis, coloured in order, named above the panel.
 # --------------------
 
 
 MAX_CURVES = 8
 NAMES_AT_IN = 0.42
-"""Middle of the row of names below the figure's top, under a title."""
+"""Distance in inches from the figure's top to the middle of the legend row, under a title."""
 N_POINTS = 4000
-"""Points of a thinned line: more than twice the pixel columns of a figure."""
+"""Number of points of a thinned line: more than twice the pixel columns of a figure."""
 
 
 CYCLES = "mesh cycles (tooth passages)"
-"""Label of an axis over the mesh."""
+"""Label of an axis of mesh cycles."""
 
 
 def padded(values: FloatArray) -> tuple[float, float]:
-    """Return limits of an axis that leave a little room around values."""
+    """Return axis limits that leave a little room around values."""
     low, high = float(values.min()), float(values.max())
     margin = 0.06 * (high - low) or 1.0
     return low - margin, high + margin
 
 
 def series_colours(n: int) -> tuple[str, ...]:
-    """Return `n` colours from dark blue to orange: lightness grows with the order, so that all readers see it.
+    """Return `n` colours from dark blue to orange, with lightness increasing so that all readers see the order.
 
     Source of the scale: S. van der Walt, N. Smith, *plasma* (Matplotlib, 2015), without its pale end.
     """
@@ -379,19 +379,19 @@ def checked_axis(values: FloatArray, name: str) -> FloatArray:
 
 
 def checked_curves(curves: Mapping[str, FloatArray], n: int, name: str, *, gaps: bool = False) -> dict[str, FloatArray]:
-    """Return curves of `n` points each; with `gaps`, NaN leaves a piece out.
+    """Return curves of `n` points each; with `gaps`, NaN interrupts a curve.
 
     Raises
     ------
     InputError
-        If there is none, there are more than a figure can tell apart, or a length is wrong.
+        If there is none, there are more than a reader can distinguish, or a length is wrong.
     """
     check_number(len(curves), f"{name} holds {len(curves)} curves")
     return {label: checked_values(values, n, f"{name}[{label!r}]", gaps=gaps) for label, values in curves.items()}
 
 
 def check_number(n: int, problem: str, n_max: int = MAX_CURVES) -> None:
-    """Refuse none, or more than a figure can tell apart."""
+    """Refuse no curves, or more than a reader can distinguish."""
     if not 1 <= n <= n_max:
         raise InputError(problem, allowed=f"1 to {n_max}")
 
@@ -411,7 +411,7 @@ def coloured(curves: Mapping[str, FloatArray]) -> Iterator[tuple[str, FloatArray
 
 
 def plot_curves(axes: Axes, x: FloatArray, curves: Mapping[str, FloatArray], width: float = 1.5) -> list[Line2D]:
-    """Draw curves over the whole axis, the first on top where they coincide; return the lines for the legend."""
+    """Draw curves over the whole axis, the first on top where they coincide; return lines for the legend."""
     lines = [
         axes.plot(x, values, color=colour, linewidth=width, label=name, zorder=3 - 0.01 * i)[0]
         for i, (name, values, colour) in enumerate(coloured(curves))
@@ -421,7 +421,7 @@ def plot_curves(axes: Axes, x: FloatArray, curves: Mapping[str, FloatArray], wid
 
 
 def head(figure: Figure, title: str, lines: Sequence[Line2D] = (), heading: str = "") -> None:
-    """Write the title and, below it, the row of names."""
+    """Write the title and, below it, the legend row."""
     if title:
         width, height = figure.get_size_inches()
         looks: dict[str, Any] = {"colour": INK, "fontsize": TEXT_PT, "fontweight": "bold"}
@@ -433,13 +433,13 @@ def head(figure: Figure, title: str, lines: Sequence[Line2D] = (), heading: str 
 def legend_row(
     figure: Figure, lines: Sequence[Line2D], *, left_in: float = 0.85, top_in: float = NAMES_AT_IN, heading: str = ""
 ) -> None:
-    """Name curves in one row whose middle is `top_in` below the figure's top: it never covers data.
+    """Draw a legend in one row whose middle is `top_in` below the figure's top, so that it never covers data.
 
     Parameters
     ----------
     figure : Figure
     lines : sequence of Line2D
-        Their labels are the names.
+        Their labels are shown.
     left_in, top_in : float
     heading : str
         Written before the names, e.g. "crack depth".
@@ -468,18 +468,18 @@ def legend_row(
 
 
 def upper_right(figure: Figure, right_in: float = 0.2) -> tuple[float, float]:
-    """Return the corner of a figure within its margins, as shares of its size."""
+    """Return the upper right corner of a figure within its margins, as fractions of its size."""
     width, height = figure.get_size_inches()
     return 1.0 - right_in / float(width), 1.0 - 0.08 / float(height)
 
 
 def shade(axes: Axes, limits: tuple[float, float], colour: str = FLOOR, alpha: float = 0.14) -> None:
-    """Shade a segment of the axis behind the data."""
+    """Shade a range of the axis behind the data."""
     axes.axvspan(*limits, facecolor=colour, alpha=alpha, linewidth=0, zorder=0.5)
 
 
 def write(axes: Axes, x: float, y: float, text: str, *, colour: str = QUIET, ha: str = "center") -> None:
-    """Write into the panel: `x` in data, `y` as a share of its height (above one: above the panel)."""
+    """Write into a panel: `x` in data coordinates, `y` as a fraction of its height (above 1: above the panel)."""
     put_text(
         axes,
         x,
@@ -503,19 +503,19 @@ def checked_limits(limits: tuple[float, float], name: str) -> tuple[float, float
 
 
 def thin(x: FloatArray, y: FloatArray, n_points: int = N_POINTS) -> tuple[FloatArray, FloatArray]:
-    """Return the line with at most `n_points` points, the smallest and largest value of every segment among them.
+    """Return a line thinned to at most `n_points` points, including the minimum and maximum of each segment.
 
     Parameters
     ----------
     x, y : array, (n,)
-        A line; finite. Shorter ones come back unchanged.
+        A line; finite. Shorter ones are returned unchanged.
     n_points : int
         At least 4.
 
     Returns
     -------
     x, y : array
-        Points of the line in their order, first and last included: nothing is averaged or made up.
+        Points of the line in order, including the first and last; nothing is averaged or interpolated.
 
     Raises
     ------
@@ -524,7 +524,7 @@ def thin(x: FloatArray, y: FloatArray, n_points: int = N_POINTS) -> tuple[FloatA
 
     Notes
     -----
-    For display only: a thinned line has no sampling rate, and its spectrum means nothing.
+    For display only: a thinned line has no sampling rate, and its spectrum is meaningless.
 
     Examples
     --------
@@ -544,7 +544,7 @@ def thin(x: FloatArray, y: FloatArray, n_points: int = N_POINTS) -> tuple[FloatA
 
 
 def envelope(x: FloatArray, y: FloatArray, n_columns: int = N_POINTS // 4) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the smallest and largest value of `y` in at most `n_columns` columns of equal numbers of points.
+    """Return the minimum and maximum of `y` in at most `n_columns` columns of equal numbers of points.
 
     Parameters
     ----------
@@ -555,9 +555,9 @@ def envelope(x: FloatArray, y: FloatArray, n_columns: int = N_POINTS // 4) -> tu
     Returns
     -------
     x : array
-        Where the largest value of each column lies: a peak keeps its position.
+        Position of each column's maximum, so that a peak keeps its position.
     low, high : array
-        Short lines come back unchanged, low and high being `y`.
+        Short lines are returned unchanged, with `low` and `high` equal to `y`.
 
     Raises
     ------
@@ -579,7 +579,7 @@ def envelope(x: FloatArray, y: FloatArray, n_columns: int = N_POINTS // 4) -> tu
 
 def _extremes(y: FloatArray, n_buckets: int) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
     """Return the indices of both extremes of each bucket and of both ends, ascending."""
-    length = -(-len(y) // n_buckets)  # rounded up, so that there are never more than n_buckets
+    length = -(-len(y) // n_buckets)  # rounded up, for at most n_buckets buckets
     n_full = len(y) // length
     table = y[: n_full * length].reshape(n_full, length)
     starts = np.arange(n_full) * length

@@ -1,8 +1,8 @@
 """Results as text, JSON, CSV, self-contained HTML and PDF.
 
-By subject: `analysis_text`, `analysis_to_json`, `page_html` and `page_pdf` (one recording), `write_folder` and
-`write_index` (many), `comparison_text` and `comparison_page`, `gap_text`, `gap_to_json` and `write_gap_page`,
-`write_fleet_page`. `read_gap_json` reads gap.json, which gap.schema.json describes.
+By subject: `analysis_text`, `analysis_to_json`, `page_html` and `page_pdf` for one recording, `write_folder` and
+`write_index` for many, `comparison_text` and `comparison_page`, `gap_text`, `gap_to_json` and `write_gap_page`,
+`write_fleet_page`. `read_gap_json` reads gap.json, whose schema is gap.schema.json.
 """
 
 from gearsig.report._comparison import (

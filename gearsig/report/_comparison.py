@@ -41,24 +41,24 @@ from gearsig.report._json import Layout, document, plain
 from gearsig.report._sections import Rows
 
 # --------------------
-# The pictures of a comparison, and what to look at in each.
+# The pictures of a comparison, with hints on what to look for.
 # --------------------
 
 
 WITHOUT_MESH = 50.0
-"""Highest order drawn, in mesh orders, and where there is no mesh."""
+"""Maximum order drawn, in mesh orders, and without a mesh."""
 MAX_CURSORS = 10
 
 LOOK_AT_ORDERS = (
-    "Below: how far each line of the simulation is off. Shaded: twice its repeatability. A triangle marks a line that "
-    "one of the two does not show: there the difference is at least so large."
+    "Below: the difference of each line of the simulation. Shaded: twice its repeatability. A triangle marks a line "
+    "that only one of the two shows: its difference is at least that large."
 )
-LOOK_AT_TEETH = "At the bottom the level tooth by tooth: pale bars are within the records' own scatter."
+LOOK_AT_TEETH = "At the bottom, the level of each tooth: pale bars are within the records' own scatter."
 LOOK_AT_BANDS = (
-    "FRAC: how alike the lines in a band are, whatever their gain; 1 is the same shape. A dash is what the complex "
-    "one gives by chance, because one line outweighs all others; the dotted line what unrelated magnitudes give."
+    "FRAC: agreement of the lines in a band, regardless of gain; 1 is the same shape. A dash is the complex FRAC by "
+    "chance, because one line outweighs all others; the dotted line is the FRAC of unrelated magnitudes."
 )
-LOOK_AT_OCTAVES = "Everything in each band, noise included. At another speed, other orders fall into a band."
+LOOK_AT_OCTAVES = "The whole signal in each band, including noise. At a different speed, other orders fall into a band."
 
 
 def channel_pictures(comparison: Comparison, channel: ChannelComparison) -> Iterator[Picture]:
@@ -94,7 +94,7 @@ def band_figures(comparison: Comparison, channel: ChannelComparison) -> Iterator
     """Yield the bands over order, and the third octaves."""
     from gearsig.plot import band_levels_figure
 
-    del comparison  # a maker of figures is given it, and this one needs none of it
+    del comparison  # part of the common signature, not needed here
     figure = band_levels_figure(channel.order_bands, channel.unit, title=f"Bands over order, {channel.name}")
     shows = f"Levels of bands over order of {channel.name}, recorded and simulated, and their agreement."
     yield CaptionedFigure(figure, LOOK_AT_BANDS, shows)
@@ -109,7 +109,7 @@ FIGURES: dict[str, Callable[[Comparison, ChannelComparison], Iterator[CaptionedF
     "Angle": angle_figures,
     "Bands": band_figures,
 }
-"""Makers of a channel's figures, by what they are over."""
+"""Functions that draw a channel's figures, by title."""
 
 
 def _average(comparison: Comparison, channel: ChannelComparison, shaft: ShaftComparison) -> CaptionedFigure:
@@ -124,26 +124,26 @@ def _average(comparison: Comparison, channel: ChannelComparison, shaft: ShaftCom
         n_teeth=shaft.n_teeth,
         title=f"Synchronous averages of {name}, {channel.name}: correlation {correlation}",
     )
-    look = f"One mean revolution of {name}, aligned; below it a piece of it enlarged.{_teeth_text(comparison, shaft)}"
+    look = f"One mean revolution of {name}, aligned; below it, a part enlarged.{_teeth_text(comparison, shaft)}"
     shows = f"Synchronous averages of {name}, recorded and simulated, over one revolution."
     return CaptionedFigure(figure, look, shows)
 
 
 def _teeth_text(comparison: Comparison, shaft: ShaftComparison) -> str:
-    """Say what the panel of teeth shows, and when it shows nothing."""
+    """Say what the panel of teeth shows, and when it is not meaningful."""
     if not shaft.tooth_levels:
         return ""
     return f" {LOOK_AT_TEETH}{tooth_warning_text(comparison, shaft.shaft)}"
 
 
 def tooth_warning_text(comparison: Comparison, shaft: str) -> str:
-    """Say where teeth of both records may not be the same at an angle; empty where they are."""
+    """Warn if teeth at the same angle may differ between the records; empty otherwise."""
     is_doubted = any(alignment.is_doubted for alignment in comparison.alignments if alignment.shaft == shaft)
-    return " Which tooth of the simulation is which of the recording cannot be told here." if is_doubted else ""
+    return " The teeth of simulation and recording cannot be matched here." if is_doubted else ""
 
 
 def mesh_cursors(comparison: Comparison) -> tuple[Cursor, ...]:
-    """Return the mesh harmonics; numbered alone where there is one pair."""
+    """Return the mesh harmonics, with the pair's number if there are several pairs."""
     single_pair = len(comparison.mesh_orders) == 1
     return tuple(
         Cursor(k * mesh, "mesh", f"{k}× mesh" if single_pair else f"{k}× mesh {i}", k)
@@ -153,7 +153,7 @@ def mesh_cursors(comparison: Comparison) -> tuple[Cursor, ...]:
 
 
 def shown_orders(comparison: Comparison) -> float:
-    """Return the order up to which spectra are drawn."""
+    """Return the maximum order drawn in spectra."""
     meshes = [mesh for mesh in comparison.mesh_orders if mesh <= comparison.highest_order]
     return min(comparison.highest_order, 5.6 * max(meshes) if meshes else WITHOUT_MESH)
 
@@ -197,7 +197,7 @@ def comparison_text(comparison: Comparison) -> str:
 
 
 def alignment_texts(comparison: Comparison) -> list[str]:
-    """Return one text per shaft on how the records were aligned."""
+    """Return how the records were aligned, one text per shaft."""
     texts = []
     for alignment in comparison.alignments:
         name = f"shaft {alignment.shaft}: " if alignment.shaft else ""
@@ -273,7 +273,7 @@ def _level_row(label: str, level: LevelPair, note: str = "") -> str:
 
 
 def _level_texts(level: LevelPair) -> tuple[str, str, str, str]:
-    """Return recorded, simulated, difference and scatter, all in as many decimals."""
+    """Return recorded, simulated, difference and scatter, with equal numbers of decimals."""
     scatter = BEYOND * level.repeatability_db
     n = decimals_for(scatter)
     recorded, simulated = (with_minus(f"{round(x, n) + 0.0:.{n}f}") for x in (level.recorded_db, level.simulated_db))
@@ -283,13 +283,13 @@ def _level_texts(level: LevelPair) -> tuple[str, str, str, str]:
 def comparison_page(comparison: Comparison, *, command: str = "") -> str:
     """Return the page of a comparison: verdict, what was compared, and each channel with figures and tables.
 
-    It is one file without scripts that loads nothing.
+    It is one file without scripts or external resources.
 
     Parameters
     ----------
     comparison : Comparison
     command : str
-        The command that makes it again.
+        The command that reproduces it.
     """
     return render(
         "compare.html.j2",
@@ -307,7 +307,7 @@ def comparison_page(comparison: Comparison, *, command: str = "") -> str:
 
 
 def _section(comparison: Comparison, channel: ChannelComparison, i: int) -> dict[str, object]:
-    """Return one channel as the page shows it."""
+    """Return the template values of one channel."""
     main = [line for line in (*channel.lines, *channel.other_lines) if line.kind != "sideband" and line.is_seen]
     sidebands = [line for line in channel.lines if line.kind == "sideband" and line.is_seen]
     sidebands.sort(key=lambda line: -abs(line.level.difference_db))
@@ -315,7 +315,7 @@ def _section(comparison: Comparison, channel: ChannelComparison, i: int) -> dict
         "title": channel.name,
         "unit": f"dB re 1 {unit_text(channel.unit)}, rms" if channel.unit else "dB, unit not known",
         "figures": channel_rows(channel),
-        # Pictures of four channels: a page of more is too large to send.
+        # Pictures of four channels at most: a larger page is too large to send.
         "pictures": tuple(channel_pictures(comparison, channel)) if i < 4 else (),
         "main": [_line_row(line) for line in main],
         "sidebands": [_line_row(line) for line in sidebands[:40]],
@@ -323,8 +323,8 @@ def _section(comparison: Comparison, channel: ChannelComparison, i: int) -> dict
 
 
 def channel_rows(channel: ChannelComparison) -> Rows:
-    """Return the agreement figures of a channel as name and text."""
-    rows = [("overall level, simulated less recorded", _difference(channel.overall))]
+    """Return the agreement figures of a channel as (name, text) rows."""
+    rows = [("overall level, simulated minus recorded", _difference(channel.overall))]
     for shaft in channel.shafts:
         name = f" of {shaft.shaft}" if shaft.shaft else ""
         frac = (
@@ -338,7 +338,7 @@ def channel_rows(channel: ChannelComparison) -> Rows:
     locked = channel.locked
     rows.append(
         (
-            "energy that repeats with the shafts' turns",
+            "energy that repeats with the shafts",
             f"recording {_percent(locked.recorded)}, simulation {_percent(locked.simulated)}",
         )
     )
@@ -346,14 +346,14 @@ def channel_rows(channel: ChannelComparison) -> Rows:
 
 
 def _possible(shaft: ShaftComparison) -> str:
-    """Return the correlation that two such averages of one motion reach, or that it means nothing."""
+    """Return the correlation of two such averages of one motion, or say that it is not meaningful."""
     if shaft.best_correlation < MIN_REPEATED:
-        return "says nothing, as one record's halves do not repeat"
+        return "not meaningful, as the halves of one record do not repeat"
     return f"two such averages reach {shaft.best_correlation:.3f}"
 
 
 def _line_row(line: LineLevel) -> dict[str, object]:
-    """Return a level as the page shows it."""
+    """Return the template values of a level."""
     texts = dict(zip(("recorded", "simulated", "difference", "scatter"), _level_texts(line.level), strict=True))
     about = {"label": line.label, "order": readable(line.order, 6), "note": missing_line_text(line)}
     return {**about, **texts, "is_beyond": line.level.is_beyond}
@@ -393,16 +393,15 @@ def _percent(figure: RepeatableValue) -> str:
     return f"{plus_minus(100 * figure.value, 100 * BEYOND * figure.repeatability)} %"
 
 
-# A comparison as JSON, in a schema that stays.
+# A comparison as JSON, in a stable schema.
 #
-# The object has these members; names end in their unit, numbers carry nine significant digits, and what is not known or
-# not defined is null. Members may be added within a version, never renamed or removed. Levels are in dB re one unit,
-# rms; every ``difference_db`` is simulated less recorded; every ``repeatability`` is a standard error from the halves
-# of the records.
+# The object has these members; names end in their unit, numbers have nine significant digits, and unknown or undefined
+# values are null. Members may be added within a version, never renamed or removed. Levels are in dB re one unit, rms;
+# each ``difference_db`` is simulated minus recorded; each ``repeatability`` is a standard error from the halves of the
+# records.
 #
 # - ``schema``: "gearsig.comparison", ``schema_version``: 1, ``gearsig_version``
-# - ``verdict``: what differs most, per channel; ``findings``: more of them; ``notes``: what to know before believing
-#   a figure
+# - ``verdict``: the largest differences per channel; ``findings``: further ones; ``notes``: limitations of the figures
 # - ``simulated``, ``recorded``: ``source``, ``sha256``, ``duration_s``, ``sampling_rate_hz``, ``mean_speed_rpm``,
 #   ``speed_range_rpm``, ``n_revolutions``, ``speed_method``, ``notes``
 # - ``machine``, ``reference_shaft``, ``mesh_orders``, ``highest_order``
@@ -427,5 +426,5 @@ LAYOUTS = {
 
 
 def comparison_to_json(comparison: Comparison) -> str:
-    """Return a comparison as JSON text; waveforms and spectra are left out."""
+    """Return a comparison as JSON text, without waveforms and spectra."""
     return document("gearsig.comparison", plain(comparison, layouts=LAYOUTS))

@@ -1,4 +1,4 @@
-"""Report files: their names, what is checked before they are written, how HTML and PDF are made; pages of sections."""
+"""Report files: names, checks before writing, rendering of HTML and PDF; pages made of sections."""
 
 from __future__ import annotations
 
@@ -28,21 +28,21 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
 
-LONGEST_NAME = 50  # a letter may take four bytes, and file systems stop at 255
+LONGEST_NAME = 50  # a character may take four bytes, and file systems allow 255
 _RESERVED = {"index", "con", "prn", "aux", "nul"} | {f"{port}{i}" for port in ("com", "lpt") for i in range(1, 10)}
 
 
 _MARK = re.compile(rb'<meta name="gearsig-recording" content="(\w+)">')
 _HEAD_BYTES = 1024
-"""Of a page, where its mark stands."""
+"""Bytes at the start of a page that contain its mark."""
 
 
 def page_names(sources: Iterable[str | Path], folder: Path | None = None) -> tuple[str, ...]:
-    """Return a safe and unique file name, without ending, for each source, in their order.
+    """Return a safe and unique file name, without extension, for each source, in order.
 
-    Letters, digits, "-", "_" and "." stay; what else may steer a path or a link becomes "-". Two sources that would
-    share a name, also when only case tells them apart, get a number. In a folder that holds pages, a recording keeps
-    the name of its own, which bears its `recording_mark`, and gets none that another page has.
+    Letters, digits, "-", "_" and "." are kept; characters that could affect a path or a link become "-". Sources whose
+    names would be equal, even apart from case, get a number. In a folder that already has pages, a recording keeps the
+    name of its own page, which has its `recording_mark`, and gets no name of another page.
 
     Examples
     --------
@@ -58,30 +58,30 @@ def page_names(sources: Iterable[str | Path], folder: Path | None = None) -> tup
 
 
 def recording_mark(source: str | Path) -> str:
-    """Return what tells a recording's page from those of others of its name: a hash of its whole path."""
+    """Return a hash of a recording's full path, to distinguish its page from those of others with its name."""
     return hashlib.sha256(str(Path(source).absolute()).encode("utf-8", "surrogatepass")).hexdigest()[:16]
 
 
 def check_writable(folder: Path, option: str = "-o") -> None:
-    """Check, before long work, that files can be written into a folder, which need not exist yet.
+    """Check before long work that files can be written to a folder, which need not exist yet.
 
     Parameters
     ----------
     folder : Path
     option : str
-        By which it was given.
+        The option that gave it, for the error.
 
     Raises
     ------
     InputError
-        If it is a file or cannot be written.
+        If it is a file or not writable.
     """
     probe = f".{secrets.token_hex(4)}"
     try:
         if folder.exists() and not folder.is_dir():
             raise InputError("is a file", where=str(folder), remedy=f"choose a folder with {option}")
         existing = next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
-        (existing / probe).mkdir()  # permissions alone do not tell: there are folders that nothing can be made in
+        (existing / probe).mkdir()  # permissions alone do not show whether anything can be created
         (existing / probe).rmdir()
     except OSError as error:
         raise _unwritable(folder, error, option) from None
@@ -101,7 +101,7 @@ def _safe(source: str) -> str:
 
 
 def _unique(name: str, taken: set[str], present: Mapping[str, tuple[str, str]], mark: str) -> str:
-    """Return the first free name, or that of the page of this mark; the names `taken` are lower case and grow."""
+    """Return the first free name, or that of the page with this mark; adds it in lower case to `taken`."""
     with_matching_channel_names = re.compile(rf"{re.escape(name)}(-\d+)?", re.IGNORECASE)
     pages = [page for page, of in present.values() if of == mark and with_matching_channel_names.fullmatch(page)]
     choice = next((page for page in pages if page.lower() not in taken), name)
@@ -114,7 +114,7 @@ def _unique(name: str, taken: set[str], present: Mapping[str, tuple[str, str]], 
 
 
 def _mark_of(page: Path) -> str:
-    """Return the mark that a page bears; empty where it has none, as pages of other makers."""
+    """Return the mark of a page; empty if it has none, as pages from other programs."""
     try:
         with page.open("rb") as file:
             match = _MARK.search(file.read(_HEAD_BYTES))
@@ -124,7 +124,7 @@ def _mark_of(page: Path) -> str:
 
 
 def render(template: str, **values: Any) -> str:
-    """Return the page that a template makes of `values`."""
+    """Render a template with `values` and return the page."""
     return _environment().get_template(template).render(**values)
 
 
@@ -147,20 +147,20 @@ def _environment() -> Environment:
 
 def write_folder(
     folder: str | Path,
-    figures: Mapping[str, Any] | None = None,  # the drawing library's type is known in gearsig.plot alone
+    figures: Mapping[str, Any] | None = None,  # only gearsig.plot knows the drawing library's type
     texts: Mapping[str, str] | None = None,
     *,
     dpi: float | Literal["figure"] = 160,
 ) -> tuple[Path, ...]:
-    """Write figures and texts by their names into a folder, which is made, each whole or not at all; return the paths.
+    """Write figures and texts by name to a folder, which is created if missing, each atomically; return the paths.
 
     Parameters
     ----------
     folder : str or Path
     figures, texts : mapping, optional
-        Name with ending, such as "map.png" or "map.svg" → figure; likewise for texts.
+        Name with extension, such as "map.png" or "map.svg" → figure; likewise for texts.
     dpi : float or "figure"
-        Dots per inch of the figures; "figure": each its own.
+        Dots per inch of the figures; "figure": that of each figure.
 
     Raises
     ------
@@ -176,12 +176,12 @@ def write_folder(
 
 
 def date_text(date: datetime | None = None) -> str:
-    """Return when a page was made, as pages say it; None: now."""
+    """Return the date of a page as text; None: now."""
     return (date or datetime.now().astimezone()).strftime("%Y-%m-%d %H:%M %Z").strip()
 
 
 # --------------------
-# PDF, set by typst: a program in a wheel, which loads nothing from the network.
+# PDF, typeset by typst: a program in a wheel, which loads nothing from the network.
 # --------------------
 
 
@@ -189,7 +189,7 @@ SVG = '<svg xmlns="http://www.w3.org/2000/svg"'
 
 
 def write_pdf(path: str | Path, content: bytes) -> Path:
-    """Write a PDF beside its place and move it there when it is complete.
+    """Write a PDF atomically: it appears only when it is complete.
 
     Raises
     ------
@@ -200,7 +200,7 @@ def write_pdf(path: str | Path, content: bytes) -> Path:
 
 
 def check_pdf() -> None:
-    """Check, before long work, that PDFs can be made.
+    """Check before long work that PDFs can be made.
 
     Raises
     ------
@@ -214,9 +214,9 @@ def check_pdf() -> None:
 
 
 def compiled(template: str, values: Mapping[str, Any]) -> bytes:
-    """Return the PDF that a template makes of the values that the HTML page is made of.
+    """Render a template to PDF from the same values as the HTML page.
 
-    Pictures come as files; fonts are matplotlib's, so that every machine sets it alike.
+    Pictures are passed as files. Fonts are matplotlib's, so that the result is the same on all machines.
     """
     check_pdf()
     import typst
@@ -240,7 +240,7 @@ def compiled(template: str, values: Mapping[str, Any]) -> bytes:
 
 
 def _put_picture(picture: Picture, pictures: dict[str, bytes]) -> dict[str, object]:
-    """Add a picture to the files, and return what the template says of it."""
+    """Add a picture to the files, and return its template values."""
     if picture.svg:
         name = f"picture{len(pictures)}.svg"
         pictures[name] = picture.svg.replace("<svg", SVG, 1).replace("system-ui, ", "").encode()
@@ -267,10 +267,10 @@ class Section:
     title, note : str
     header : tuple of str
     rows : tuple of tuple of str
-        The first cell of a row names it.
+        The first cell of a row is its heading.
     pictures : tuple of Picture
     is_prose : bool
-        Whether the cells are sentences, which wrap in columns of one width; else numbers, which do not.
+        Whether the cells are sentences, which wrap in columns of equal width, or numbers, which do not wrap.
     """
 
     title: str
@@ -284,7 +284,7 @@ class Section:
 def benchmark_html(
     title: str, summary: str, sections: Sequence[Section], provenance: Sequence[tuple[str, str]], date: datetime
 ) -> str:
-    """Return the page, one file without scripts that loads nothing."""
+    """Return the page as one file without scripts or external resources."""
     return render(
         "benchmark.html.j2",
         title=title,

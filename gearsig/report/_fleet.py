@@ -1,4 +1,4 @@
-"""The page that says what changed in a fleet since last time."""
+"""The page of what changed in a fleet since last time."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MAX_ROWS, MAX_POINTS, MAX_PICTURES = 60, 200, 8
 
 
 def _page_values(fleet: Fleet, since: datetime | None) -> dict[str, Any]:
-    """Return what the page shows, by the names of its template."""
+    """Return the values of the page's template."""
     changes = fleet_changes(fleet, since)
     status = changes.status.head(MAX_POINTS).to_dict("records")
     n_points = len(changes.status)
@@ -51,14 +51,14 @@ def _page_values(fleet: Fleet, since: datetime | None) -> dict[str, Any]:
 
 
 def write_fleet_page(fleet: Fleet, path: str | Path, since: datetime | None = None, *, pdf: bool = False) -> Path:
-    """Write the page that says what changed in a fleet, and beside it the same as PDF where that is asked for.
+    """Write the page of what changed in a fleet and, if requested, the same as PDF beside it.
 
     Parameters
     ----------
     fleet : Fleet
     path : str or Path
     since : datetime or None
-        In UTC; None: since ever.
+        In UTC; None: since the beginning.
     pdf : bool
 
     Raises
@@ -89,7 +89,7 @@ def _summary(changes: FleetChanges) -> str:
 
 
 def _series(of: Mapping[Any, Any]) -> dict[str, str]:
-    """Return machine, name and place of a series."""
+    """Return machine, name and location of a series."""
     return {
         "machine": " · ".join(filter(None, (of["machine"], of["point"]))),
         "name": of["name"],
@@ -122,7 +122,7 @@ def _shift(row: Mapping[Any, Any]) -> dict[str, str]:
 
 
 def _pictures(fleet: Fleet, raised: Sequence[AlarmChange]) -> list[tuple[str, Picture]]:
-    """Return the trends of the largest alarms that stand, one of each measuring point first."""
+    """Return the trends of the largest active alarms, starting with one for each measuring point."""
     chosen: dict[tuple[str, str], AlarmChange] = {}
     for change in raised:
         chosen.setdefault((change.machine, change.point), change)
@@ -137,7 +137,7 @@ def _pictures(fleet: Fleet, raised: Sequence[AlarmChange]) -> list[tuple[str, Pi
                 place=change.place,
                 computed_on=change.computed_on,
             )
-        except InputError:  # a file was set aside meanwhile
+        except InputError:  # a file was removed in the meantime
             continue
         heading = " · ".join(part for part in (change.machine, change.point) if part)
         result.append((heading, _picture(trends[0])))

@@ -42,9 +42,9 @@ from gearsig.report._files import render
 from gearsig.report._sections import Rows, made_rows
 
 N_DETAILED = 3
-"""Causes whose evidence is shown."""
+"""Number of causes whose evidence is shown."""
 MIN_SHOWN = 0.01
-"""Below this a group is left out, and a share is said to be below one percent."""
+"""Groups below this are left out, and shares below it are written as "< 1 %"."""
 OUTCOME_CLASSES = {
     "no gap": "no-fault",
     "effect": "fault",
@@ -55,7 +55,7 @@ OUTCOME_CLASSES = {
 
 
 class PlaceRow(NamedTuple):
-    """A place of the gap as the page shows it."""
+    """A place of the gap, as shown on the page."""
 
     title: str
     where: tuple[str, ...]
@@ -68,7 +68,7 @@ class PlaceRow(NamedTuple):
 
 
 class EvidenceRow(NamedTuple):
-    """A predicted change beside the observed one, in dB; the stance in words, its sign, and the class of its look."""
+    """A predicted and an observed change in dB; the stance in words, its sign, and its CSS class."""
 
     feature: str
     predicted: str
@@ -80,7 +80,7 @@ class EvidenceRow(NamedTuple):
 
 
 class CauseRow(NamedTuple):
-    """A cause as the page shows it; statements and evidence of the first ones only."""
+    """A cause, as shown on the page; only the first ones have statements and evidence."""
 
     name: str
     title: str
@@ -94,47 +94,47 @@ class CauseRow(NamedTuple):
 
 
 def verdict_rows(report: GapReport) -> Rows:
-    """Return the four lines, the word before the colon apart."""
+    """Return the four lines of the verdict as (word before the colon, text)."""
     lines = [line.partition(": ") for line in report.verdict]
     return tuple((word, text[:1].upper() + text[1:]) for word, _, text in lines)
 
 
 def size_text(report: GapReport) -> str:
-    """Return the size of the whole gap against both floors; empty where nothing was simulated."""
+    """Return the size of the whole gap in units of both floors; empty if nothing was simulated."""
     if not report.is_simulated:
         return ""
     return f"{interval_text(report.size)} structural floors, {readable(report.repeatability, 2)} repeatability floors"
 
 
 def floors_text(report: GapReport, *, of_pictures: bool = True) -> str:
-    """Say what the recordings are compared with, and what the two floors are; empty where nothing was simulated.
+    """Say what the recordings are compared with, and what the two floors are; empty if nothing was simulated.
 
-    With `of_pictures` also which pictures of the page show what beside the recording.
+    With `of_pictures`, also say which pictures show the reference and which the simulation.
     """
     if not report.is_simulated:
         return ""
-    structural, beside = "what healthy machines differ by from that", ""
+    structural, beside = "how much healthy machines differ from that", ""
     alone = [condition.name for condition in report.conditions if not condition.reference]
     if report.references:
         known = f"Compared with the same machine when it was healthy ({', '.join(report.references)}). "
         if 0 < len(alone) < len(report.conditions):
-            known += f"Without a reference at its point, with what the simulation lets expect: {', '.join(alone)}. "
-        structural = "what healthy machines change by from one recording to another"
+            known += f"Without a reference at its operating point, with the simulated prediction: {', '.join(alone)}. "
+        structural = "how much healthy machines change from one recording to another"
         if of_pictures:
             beside = (
                 " The first pictures show the recording beside the reference, the further ones beside the simulation."
             )
     else:
-        known = "Compared with what the simulation of the healthy machine lets expect, as far as it is credible. "
+        known = "Compared with what the simulation of the healthy machine predicts, as far as it is credible. "
     return (
-        f"{known}A structural floor is {structural}; they exceed 1 once in twenty. A repeatability floor is what this "
-        f"machine differs by from itself, from one segment to the next. A place is measured on its own features alone, "
-        f"and so may be many floors where the gap over all features is few.{beside}"
+        f"{known}A structural floor is {structural}; one in twenty exceeds 1. A repeatability floor is how much this "
+        f"machine differs from itself, from one segment to the next. A place is measured on its own features only, so "
+        f"it may reach many floors although the gap over all features is only a few.{beside}"
     )
 
 
 def place_rows(report: GapReport) -> tuple[PlaceRow, ...]:
-    """Return the places in their order."""
+    """Return the places in order."""
     return tuple(map(_place_row, report.places))
 
 
@@ -171,23 +171,23 @@ def _place_row(place: GapPlace) -> PlaceRow:
 
 
 def cause_rows(report: GapReport) -> tuple[CauseRow, ...]:
-    """Return the causes that have a chance, likeliest first; the first effects with what speaks for and against."""
+    """Return the causes above 1 %, likeliest first; the first effects with evidence for and against."""
     detailed = detailed_causes(report)
     shown = [cause for cause in report.causes if not cause.probability < MIN_SHOWN or cause in detailed]
     return tuple(_cause_row(cause, detailed=cause in detailed) for cause in shown)
 
 
 def others_text(report: GapReport) -> str:
-    """Name the causes that are not among `cause_rows`; empty where there are none."""
+    """Name the causes that are not among `cause_rows`; empty if there are none."""
     shown = {row.name for row in cause_rows(report)}
     titles = [cause.title for cause in report.causes if cause.name not in shown]
     return f"Below 1 % each: {', '.join(titles)}." if titles else ""
 
 
 def detailed_causes(report: GapReport) -> tuple[GapCause, ...]:
-    """Return the effects whose evidence is shown: the likeliest three, where there is a gap at all.
+    """Return the effects whose evidence is shown: the likeliest three, if there is a gap.
 
-    Without a simulation, the causes of which there is something to say, unknown among them.
+    Without a simulation, all causes with statements or evidence, including the unknown.
     """
     if not report.is_simulated:
         return tuple(cause for cause in report.causes if cause.notes)
@@ -211,7 +211,7 @@ def _cause_row(cause: GapCause, *, detailed: bool) -> CauseRow:
 
 
 def severity_text(cause: GapCause) -> str:
-    """Return the fitted severity with its interval; empty where nothing was fitted."""
+    """Return the fitted severity with its interval; empty if none was fitted."""
     return "" if cause.severity is None else interval_text(cause.severity, severity_unit(cause.unit))
 
 
@@ -224,22 +224,22 @@ def _statements(shrinkage: Shrinkage | None) -> tuple[str, ...]:
     shrink, wrong = shrinkage.shrink, shrinkage.placebo
     taken, low, high = (percent(x) for x in (shrink.value, shrink.low, shrink.high))
     checked = f"checked on {shrinkage.held_out}"
-    placebo = f"takes away at most {percent(wrong)}" if wrong >= MIN_SHOWN else "takes away nothing"
+    placebo = f"removes at most {percent(wrong)}" if wrong >= MIN_SHOWN else "removes nothing"
     if not shrinkage.n_placebos:
         placebo = "could not be tried, as the machine has no other place for it that would look different"
     elsewhere: tuple[str, ...] = ()
     if shrinkage.elsewhere is not None:
         part = _taken(shrinkage.elsewhere)
-        elsewhere = (f"At an operating condition of which only its level was fitted it takes away {part}.",)
+        elsewhere = (f"At an operating condition of which only its level was fitted it removes {part}.",)
     of_all: tuple[str, ...] = ()
     if shrinkage.of_all is not None:
         part = _taken(shrinkage.of_all)
-        of_all = (f"Of what exceeds the floor on the features of all effects tried, it takes away {part}.",)
+        of_all = (f"Of what exceeds the floor on the features of all effects tried, it removes {part}.",)
     return (
         f"Gap on the features that it changes: {before} structural floors without it, {after} with it.",
-        f"It takes away nothing: with it the gap grows, {checked}."
+        f"It removes nothing: with it the gap grows, {checked}."
         if shrink.value < 0.0
-        else f"It takes away {taken} ({low} to {high}) of what exceeds the floor, {checked}.",
+        else f"It removes {taken} ({low} to {high}) of what exceeds the floor, {checked}.",
         *elsewhere,
         *of_all,
         f"In a wrong place (placebo) it {placebo}.",
@@ -259,13 +259,13 @@ def _evidence_row(evidence: Evidence) -> EvidenceRow:
 
 
 def group_texts(report: GapReport) -> tuple[str, ...]:
-    """Return the groups that have a chance, likeliest first."""
+    """Return the groups above 1 %, likeliest first."""
     ranked = sorted(report.groups.items(), key=lambda item: -item[1] if isfinite(item[1]) else 0.0)
     return tuple(f"{group} {odds_text(p)}" for group, p in ranked if p >= MIN_SHOWN)
 
 
 def inseparable_text(report: GapReport) -> str:
-    """Say which causes cannot be told apart; empty where there are none."""
+    """Say which causes cannot be distinguished; empty if there are none."""
     if report.inseparable is None:
         return ""
     titles = {cause.name: f"{cause.title} ({odds_text(cause.probability)})" for cause in report.causes}
@@ -274,7 +274,7 @@ def inseparable_text(report: GapReport) -> str:
 
 
 def step_rows(report: GapReport) -> tuple[tuple[str, str, str, str], ...]:
-    """Return the steps of the waterfall: what is left, its interval, and how much less than before the step."""
+    """Return the steps of the waterfall: residual gap, its interval, and the reduction by the step."""
     before = (None, *(step.remaining for step in report.steps))
     return tuple(
         (
@@ -288,7 +288,7 @@ def step_rows(report: GapReport) -> tuple[tuple[str, str, str, str], ...]:
 
 
 def next_rows(report: GapReport) -> tuple[tuple[str, str, str, str], ...]:
-    """Return operating point and further sensor, the pair that they separate, its distance there and now."""
+    """Return operating point and any further sensor, the pair of causes it separates, their distance then and now."""
     titles = {cause.name: cause.title for cause in report.causes}
     return tuple(
         (
@@ -302,7 +302,7 @@ def next_rows(report: GapReport) -> tuple[tuple[str, str, str, str], ...]:
 
 
 def condition_rows(report: GapReport) -> tuple[tuple[str, ...], ...]:
-    """Return name, speed, torque, revolutions, length and sampling rate of each recording."""
+    """Return name, speed, torque, revolutions, duration and sampling rate of each recording."""
     return tuple(
         (
             condition.name,
@@ -317,7 +317,7 @@ def condition_rows(report: GapReport) -> tuple[tuple[str, ...], ...]:
 
 
 def fact_rows(report: GapReport, command: str, date: datetime | None = None) -> Rows:
-    """Return what the diagnosis rests on, and how to repeat it."""
+    """Return the basis of the diagnosis, and how to repeat it."""
     rows = (
         ("rig", report.rig),
         ("simulator", report.simulator or "none: nothing was simulated"),
@@ -329,7 +329,7 @@ def fact_rows(report: GapReport, command: str, date: datetime | None = None) -> 
 
 
 def references_text(report: GapReport) -> str:
-    """Return the names of the references, or what is compared with instead."""
+    """Return the names of the references, or the baseline used instead."""
     instead = "none: compared with the simulation itself" if report.is_simulated else "none"
     return ", ".join(report.references) or instead
 
@@ -349,26 +349,26 @@ QUESTIONS: tuple[Question, ...] = ("where", "which", "how far")
 
 @dataclass(frozen=True)
 class GapFigure:
-    """A figure and its words.
+    """A figure with its texts.
 
     Parameters
     ----------
     question : str
-        "where", "which" or "how far": under which heading it stands.
+        "where", "which" or "how far": the section it belongs to.
     figure : Figure
-        Of `gearsig.plot`.
+        From `gearsig.plot`.
     look : str
-        What to look at.
+        What to look for.
     shows : str
-        What it shows, for those who do not see it.
+        Text alternative for readers who cannot see it.
     of : str
-        Name of the cause that it belongs to; empty: to none.
+        Name of the cause that it belongs to; empty: none.
     is_small : bool
-        Whether it stands beside others.
+        Whether it is placed beside others.
     vector : bool
-        Whether it has few lines.
+        Whether to draw it as vectors, as it has few lines.
     data : RowPanel or AngleCurves or None
-        The numbers of bars and rings, for who draws them to be read off.
+        The numbers of bars and rings, for interactive drawing.
     """
 
     question: Question
@@ -383,7 +383,7 @@ class GapFigure:
 
 @dataclass(frozen=True)
 class GapGallery:
-    """The pictures of one question: one per line, side by side, and by the cause that they belong to."""
+    """The pictures of one question: full width, side by side, and by cause."""
 
     wide: tuple[plot.Picture, ...]
     small: tuple[plot.Picture, ...]
@@ -391,7 +391,7 @@ class GapGallery:
 
 
 def gap_galleries(report: GapReport) -> dict[str, GapGallery]:
-    """Return the pictures of a page by question; half of them are drawn by a process of `one_pool`, if there is one."""
+    """Return the pictures of a page by question; a process of `one_pool`, if there is one, draws half of them."""
     first_half = begin(_embedded, report, _against_reference)
     later = [pair for draw in (_spectra, *_FEW_LINES) for pair in _embedded(report, draw)]
     drawn = [*first_half(), *later]
@@ -408,7 +408,7 @@ def gap_galleries(report: GapReport) -> dict[str, GapGallery]:
 def _embedded(
     report: GapReport, draw: Callable[[GapReport], Iterator[GapFigure]]
 ) -> list[tuple[GapFigure, plot.Picture]]:
-    """Return some figures as pictures; the figures themselves, which cannot be sent, are dropped."""
+    """Return some figures as pictures, without the figure objects, which cannot be sent."""
     return [
         (replace(figure, figure=None), plot.embed(figure.figure, figure.look, figure.shows, vector=figure.vector))
         for figure in draw(report)
@@ -416,15 +416,15 @@ def _embedded(
 
 
 def gap_figures(report: GapReport, *, curves: bool = True) -> Iterator[GapFigure]:
-    """Draw every figure that the report has finite numbers for, in the order of the page.
+    """Draw each figure for which the report has finite numbers, in the order of the page.
 
-    Shares of places and probabilities of causes are no figures: page and dashboard write them as lists with bars.
+    Shares of places and probabilities of causes are not figures: page and dashboard show them as lists with bars.
 
     Parameters
     ----------
     report : GapReport
     curves : bool
-        Spectra and averages as well.
+        Whether to include spectra and averages.
     """
     if curves:
         yield from _against_reference(report)
@@ -434,7 +434,7 @@ def gap_figures(report: GapReport, *, curves: bool = True) -> Iterator[GapFigure
 
 
 def _against_reference(report: GapReport) -> Iterator[GapFigure]:
-    """Draw what was scored where there is a reference: what has changed since."""
+    """Draw what was scored if there is a reference: the changes since then."""
     for curves in report.spectra:
         if not len(curves.orders) or not len(curves.reference) or not is_finite(curves):
             continue
@@ -447,8 +447,8 @@ def _against_reference(report: GapReport) -> Iterator[GapFigure]:
                 marked=report.is_beyond,
                 title=f"{curves.label}: recording against reference",
             ),
-            "Above, lines in the grey repeatability floor say nothing. Below, what has changed since the reference, "
-            f"line by line. {_beyond_text(report, view)}",
+            "Above, lines in the grey repeatability floor are not significant. Below, the change of each line since "
+            f"the reference. {_beyond_text(report, view)}",
             f"Order spectrum, {curves.label}: recording, healthy reference, and their difference in dB.",
         )
     for average in report.averages:
@@ -457,8 +457,8 @@ def _against_reference(report: GapReport) -> Iterator[GapFigure]:
                 "where",
                 plot.gap_averages_figure(average, mark=_mark(report, average)),
                 f"One mean revolution of shaft {average.shaft} without what all teeth have in common, on the sensor "
-                "where most has changed. What one tooth does otherwise stands at its angle; noise and other speeds "
-                "leave a little everywhere.",
+                "with the largest change. A tooth that differs shows at its angle; noise and other speeds leave a "
+                "little everywhere.",
                 f"Synchronous average of shaft {average.shaft} without mesh harmonics: recording, healthy reference, "
                 "and their difference.",
             )
@@ -474,11 +474,12 @@ def _spectra(report: GapReport) -> Iterator[GapFigure]:
         scored = not len(curves.reference)
         title = curves.label if scored else f"{curves.label}: recording against simulation"
         beyond = _beyond_text(report, curves) if scored else NOT_SCORED
-        dots = " Green dots: what is left with the likeliest effect." if len(curves.after) else ""
+        dots = " Green dots: the residual gap with the likeliest effect." if len(curves.after) else ""
         yield GapFigure(
             "where",
             plot.gap_orders_figure(curves, marked=scored and report.is_beyond, title=title),
-            f"Above, lines in the grey repeatability floor say nothing. Below, the gap line by line. {beyond}{dots}",
+            f"Above, lines in the grey repeatability floor are not significant. Below, the gap of each line. {beyond}"
+            f"{dots}",
             f"Order spectrum, {curves.label}: measured, simulated, and their difference in dB.",
         )
 
@@ -487,7 +488,7 @@ NOT_SCORED = "No line is marked: with a reference, only what has changed since i
 
 
 def _beyond_text(report: GapReport, curves: SpectrumCurves) -> str:
-    """Say what orange means, and how many lines exceed their floors; or why none is marked."""
+    """Say what orange means and how many lines exceed their floors, or why none is marked."""
     n, n_all = lines_beyond(curves)
     known, many = len(curves.structural_db) > 0, f"{n} of {n_all} lines"
     if not report.is_beyond:
@@ -497,7 +498,7 @@ def _beyond_text(report: GapReport, curves: SpectrumCurves) -> str:
         )
         return f"The whole gap is within one structural floor, so that no line is marked.{alone if known else ''}"
     if not known:
-        return "Orange: above the repeatability floor; how far healthy machines differ is not known line by line."
+        return "Orange: above the repeatability floor; how far healthy machines differ is not known for single lines."
     return (
         f"Orange: {many}, which exceed the structural floor (grey band). Single lines scatter more than the features "
         "that are scored: some exceed it on healthy machines, too."
@@ -505,19 +506,19 @@ def _beyond_text(report: GapReport, curves: SpectrumCurves) -> str:
 
 
 def _lines(report: GapReport, curves: SpectrumCurves) -> GapFigure:
-    """Draw an envelope spectrum that there is no simulation beside."""
+    """Draw an envelope spectrum without a simulation."""
     families = [place.orders[0] for place in report.places if place.kind is PlaceKind.ENVELOPE and place.orders]
     marks = "Triangles: multiples of the order that was found. " if families else ""
     return GapFigure(
         "where",
         plot.gap_lines_figure(curves, families[0] if families else None),
-        f"{marks}Lines in the grey noise floor say nothing; nothing was simulated beside it.",
-        f"Spectrum, {curves.label}: measured, and the noise floor.",
+        f"{marks}Lines in the grey noise floor are not significant; there is no simulation to compare with.",
+        f"Spectrum, {curves.label}: measured, with the noise floor.",
     )
 
 
 def _teeth(report: GapReport) -> Iterator[GapFigure]:
-    """Draw the rings of the shafts that a place names, and of all where none names any."""
+    """Draw the rings of the shafts that places name, or of all shafts if none is named."""
     named = {place.shaft for place in report.places if place.shaft}
     for curves in report.angles:
         if not len(curves.angle_deg) or not is_finite(curves) or (named and curves.shaft not in named):
@@ -528,7 +529,7 @@ def _teeth(report: GapReport) -> Iterator[GapFigure]:
         yield GapFigure(
             "where",
             plot.gap_teeth_figure(curves, mark=_mark(report, curves)),
-            f"Shaft {curves.shaft}, tooth by tooth: healthy teeth draw a ring, a damaged one stands out.{numbers}",
+            f"Shaft {curves.shaft}, tooth by tooth: healthy teeth form a ring, a damaged one stands out.{numbers}",
             f"Energy around one revolution of shaft {curves.shaft}, measured and simulated.",
             is_small=True,
             data=curves,
@@ -536,7 +537,7 @@ def _teeth(report: GapReport) -> Iterator[GapFigure]:
 
 
 def _mark(report: GapReport, curves: AngleCurves | AverageCurves) -> plot.AngleMark | None:
-    """Return the tooth that the gap names on this shaft."""
+    """Return the tooth on this shaft to which the gap points."""
     for place in report.places:
         if place.kind is PlaceKind.TOOTH and place.shaft == curves.shaft and place.angle_deg is not None:
             label = (
@@ -556,8 +557,8 @@ def _evidence(report: GapReport) -> Iterator[GapFigure]:
             yield GapFigure(
                 "which",
                 plot.rows_figure(panel),
-                "Where a bar ends at its diamond, the effect explains sign and size; “further” marks one that went the "
-                "predicted way, but beyond. Grey: what a healthy machine may change by.",
+                "Where a bar ends at its diamond, the effect explains sign and size; “further” marks one in the "
+                "predicted direction, but larger. Grey: how much a healthy machine may change.",
                 f"Predicted and observed changes of the features of {cause.title}.",
                 of=cause.name,
                 vector=True,
@@ -573,42 +574,42 @@ def _waterfall(report: GapReport) -> Iterator[GapFigure]:
         yield GapFigure(
             "how far",
             plot.rows_figure(panel),
-            "What each effect takes away. Within the shaded structural floor there is nothing left to explain.",
-            "The gap before, what each added effect takes away, and what is left.",
+            "The reduction by each effect. Within the shaded structural floor there is nothing left to explain.",
+            "The gap before, its reduction by each added effect, and the residual.",
             vector=True,
             data=panel,
         )
 
 
 _FEW_LINES = (_teeth, _evidence, _waterfall)
-"""What draws rings and bars, in the order of the page."""
+"""Functions that draw rings and bars, in the order of the page."""
 
 
 def is_finite(value: Any) -> bool:
-    """Whether all numbers in a dataclass, however deep, are finite."""
+    """Whether all numbers in a dataclass, including nested ones, are finite."""
     if is_dataclass(value):
         return all(is_finite(getattr(value, field.name)) for field in fields(value))
     return not isinstance(value, (float, np.ndarray)) or bool(np.isfinite(value).all())
 
 
 CHECK_FIRST = "Check first"
-"""Before each of the warnings."""
+"""Heading of each warning."""
 
 
 def gap_text(report: GapReport) -> str:
-    """Return the verdict in four lines, what must be checked first, what a second operating condition would give."""
+    """Return the four lines of the verdict, warnings to check first, and the use of a second operating condition."""
     advice = condition_advice(report)
     warnings = (f"{CHECK_FIRST}: {warning}" for warning in report.warnings)
     return "\n".join([*report.verdict, *warnings, *([advice] if advice else [])])
 
 
 def condition_advice(report: GapReport) -> str:
-    """Say what a second operating condition would give; empty where there are several, or none would tell more."""
+    """Say what a second operating condition would give; empty if there are several, or none would help."""
     if not report.is_simulated or n_conditions(report) > 1:
         return ""
     start = "One operating condition: "
     if report.outcome is GapOutcome.NO_GAP:
-        return start + "whether the machine also agrees at another speed or load was not looked at."
+        return start + "agreement at another speed or load was not checked."
     held_out = next((c.shrinkage.held_out for c in report.causes if c.shrinkage), "other revolutions")
     where = held_out if "starts" in held_out else "other revolutions of the same recordings"
     checked = f"the result could be checked on {where} only. "
@@ -621,7 +622,7 @@ def condition_advice(report: GapReport) -> str:
 
 
 def n_conditions(report: GapReport) -> int:
-    """Count operating conditions: recordings at nearly the same speed and torque are one."""
+    """Count operating conditions; recordings at nearly the same speed and torque count as one."""
     distinct: list[OperatingCondition] = []
     for facts in report.conditions:
         if not any(same_condition(facts.point, point) for point in distinct):
@@ -632,15 +633,15 @@ def n_conditions(report: GapReport) -> int:
 def write_gap_page(report: GapReport, path: str | Path, *, command: str = "") -> Path:
     """Write the page of a gap diagnosis.
 
-    The page is one file without scripts; it loads nothing, from nowhere. It appears only when it is complete.
+    The page is one file without scripts or external resources. It appears only when it is complete.
 
     Parameters
     ----------
     report : GapReport
     path : str or Path
-        Folders on the way are made.
+        Missing folders are created.
     command : str
-        The command that makes the page again.
+        The command that reproduces the page.
 
     Returns
     -------
@@ -651,7 +652,7 @@ def write_gap_page(report: GapReport, path: str | Path, *, command: str = "") ->
 
 
 def gap_page_html(report: GapReport, *, command: str = "", date: datetime | None = None) -> str:
-    """Return the page that `write_gap_page` writes."""
+    """Return the HTML of the page that `write_gap_page` writes."""
     return render(
         "gap.html.j2",
         report=report,

@@ -1,4 +1,4 @@
-"""The page that compares recordings: the worst first, with links to their pages."""
+"""The page that compares recordings, worst first, with links to their pages."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from gearsig.severity import CrackEstimate
 
 @dataclass(frozen=True)
 class Entry:
-    """A recording that was analysed.
+    """An analysed recording.
 
     Parameters
     ----------
@@ -38,16 +38,16 @@ class Entry:
     outcome : Outcome
     verdict : str
     conclusion : str
-        The verdict without what has changed and without its outcome, which stands beside it: what the index shows.
+        The verdict for the index, without changes and without the outcome, which is shown beside it.
     confidence : float or None
-        Of the fault or suspicion in the verdict; None without one.
+        Of the fault or suspicion in the verdict; None if there is none.
     sure_of : str
-        What that confidence is of where it need not be a fault: "impacts" whose cause is not known, "a change".
+        What the confidence refers to if that need not be a fault: "impacts" of unknown cause, "a change".
     ratio_db : float or None
-        Of that finding over its floor.
+        Ratio of that finding to its floor.
     indicators : tuple of Indicator
     crack_mm : float or None
-        Depth of the crack, where the verdict is about one.
+        Depth of the crack, if the verdict is about one.
     is_reference : bool
         Whether the other recordings were compared with this one.
     machine : str
@@ -69,7 +69,7 @@ class Entry:
 
     @property
     def date(self) -> datetime | None:
-        """As the name states it: when a file was written last says little of when it was recorded."""
+        """Date in the name; the file's modification time says little about when it was recorded."""
         return date_in_name(self.name)
 
 
@@ -82,7 +82,7 @@ class Failure:
 
 
 def entry_of(analysis: Analysis, name: str, page: str) -> Entry:
-    """Sum up an analysis for the index page."""
+    """Summarise an analysis for the index page."""
     top = analysis.top_claim
     crack_mm, crack = None, analysis.crack
     if isinstance(crack, CrackEstimate) and not crack.likelier_other and top is not None:
@@ -104,7 +104,7 @@ def entry_of(analysis: Analysis, name: str, page: str) -> Entry:
 
 
 def without_outcome(text: str, outcome: Outcome) -> str:
-    """Return a verdict without the outcome that it begins with.
+    """Return a verdict without its leading outcome.
 
     Examples
     --------
@@ -117,7 +117,7 @@ def without_outcome(text: str, outcome: Outcome) -> str:
 
 
 def by_severity(entry: Entry) -> tuple[int, float, float, float, str]:
-    """Key that sorts the most important first: outcome, then depth of a crack, then confidence, then strength."""
+    """Sort key, most important first: outcome, then crack depth, then confidence, then strength."""
     place = list(Outcome).index(entry.outcome)
     return place, -(entry.crack_mm or 0.0), -(entry.confidence or 0.0), -(entry.ratio_db or 0.0), entry.name
 
@@ -133,7 +133,7 @@ KEY_INDICATORS = (
     "rms",
     "crest factor",
 )
-"""Indicators the index compares, where they were computed: tooth-local first, then impulsive, modulation, level."""
+"""Indicators that the index compares, if computed: tooth-local ones first, then impulsive, modulation, level."""
 
 
 OUTCOME_WORDS = {
@@ -145,9 +145,9 @@ OUTCOME_WORDS = {
 
 
 def index_of(ordered: Sequence[Entry], failures: Sequence[Failure] = ()) -> dict[str, Any]:
-    """Return what the index says, in HTML as in PDF: entries, worst first, with their key indicators compared.
+    """Return the content of the index for HTML and PDF: entries, worst first, with their key indicators compared.
 
-    Each row has its place in each of the orders that the table can be sorted by.
+    Each row has its position in each sort order of the table.
     """
     present = {i.name for entry in ordered for i in entry.indicators if isfinite(i.value)}
     names = [name for name in KEY_INDICATORS if name in present][:3]
@@ -165,7 +165,7 @@ def index_of(ordered: Sequence[Entry], failures: Sequence[Failure] = ()) -> dict
         orders[name] = _places([(-_largest(entry, name), i) for i, entry in enumerate(ordered)])
     rows = [
         {
-            "entry": replace(entry, indicators=(), ratio_db=None),  # what is shown of these are texts
+            "entry": replace(entry, indicators=(), ratio_db=None),  # these are shown as texts
             "css_class": css_class(entry.outcome),
             "href": quote(entry.page),
             "date": moment_text(entry.date) if entry.date is not None else "",
@@ -192,7 +192,7 @@ def index_of(ordered: Sequence[Entry], failures: Sequence[Failure] = ()) -> dict
 
 
 def _places(keys: Sequence[Any]) -> list[int]:
-    """Return the place of each key when they are sorted."""
+    """Return the position of each key in sorted order."""
     result = [0] * len(keys)
     for place, number in enumerate(sorted(range(len(keys)), key=keys.__getitem__)):
         result[number] = place
@@ -213,24 +213,24 @@ def write_index(
     n_missing: int = 0,
     pdf: bool = False,
 ) -> Path:
-    """Write the index page: recordings in one table that sorts and filters, and the files that failed.
+    """Write the index page: recordings in one table that can be sorted and filtered, and the files that failed.
 
-    It holds no scripts: sorting and filtering are done by style alone. Beside it stand `batch.csv` and `batch.json`
-    with one row for each recording.
+    It has no scripts: CSS alone sorts and filters. `batch.csv` and `batch.json`, with one row for each recording, are
+    written beside it.
 
     Parameters
     ----------
     entries : sequence of Entry
     path : str or Path
-        The pages of the entries are looked for beside it.
+        Path of the index; the pages of the entries are expected beside it.
     failures : sequence of Failure
         Listed with their reasons.
     command : str
-        The command that makes the report again.
+        The command that reproduces the report.
     n_missing : int
-        Recordings that are still to be analysed: the page says so, and stands alone.
+        Recordings still to be analysed; if there are any, the page says so and is written without CSV and JSON.
     pdf : bool
-        Write the index as PDF as well.
+        Also write the index as PDF.
 
     Returns
     -------
@@ -248,11 +248,11 @@ def write_index(
 
 
 def write_batch(ordered: Sequence[Entry], folder: Path, *, failures: Sequence[Failure] = ()) -> None:
-    """Write `batch.csv` and `batch.json`: one row for each recording, worst first; a failed one has a reason.
+    """Write `batch.csv` and `batch.json` with one row for each recording, worst first; failed ones have a reason.
 
     Indicators are named with their unit: "rms (m/s²)".
     """
-    # Channels may count in units of their own: the largest value of each unit is a column.
+    # Channels may have different units: there is a column for the maximum in each unit.
     columns_of = {(i.name, i.unit): with_unit(i.name, i.unit) for entry in ordered for i in entry.indicators}
     records: list[dict[str, Any]] = []
     for entry in ordered:
@@ -284,16 +284,16 @@ def write_batch(ordered: Sequence[Entry], folder: Path, *, failures: Sequence[Fa
 
 
 LEGEND = (
-    "Sure: at most, that the finding is right; of impacts or a change, that they are there: their cause is not known "
-    "and need not be a fault. Size: how far the finding is over its floor, in dB, or the depth of a crack, in mm. "
-    "Indicators: the largest value over channels and gears."
+    "Sure: maximum confidence that the finding is right; for impacts or a change, that they exist: their cause is not "
+    "known and need not be a fault. Size: how far the finding is above its floor, in dB, or the depth of a crack, in "
+    "mm. Indicators: the maximum over channels and gears."
 )
 
 
 def _column(entries: Sequence[Entry], name: str) -> tuple[str, list[dict[str, Any]]]:
-    """Return an indicator's heading, and its largest value in each recording with its length as a bar.
+    """Return an indicator's heading, and its maximum in each recording with the length of a bar.
 
-    Bars begin at zero: they stand where the column has one unit and no negative value.
+    Bars start at zero; there are none if the column has several units or negative values.
     """
     known = [[i for i in entry.indicators if i.name == name and isfinite(i.value)] for entry in entries]
     units = {i.unit for items in known for i in items}
@@ -315,7 +315,7 @@ def _column(entries: Sequence[Entry], name: str) -> tuple[str, list[dict[str, An
 
 
 def _size_text(entry: Entry) -> str:
-    """Return the depth of a crack, or how far a finding is over its floor."""
+    """Return the depth of a crack, or how far a finding is above its floor."""
     if entry.crack_mm is not None:
         return f"{entry.crack_mm:.1f} mm"
     return f"{readable(entry.ratio_db, 3)} dB" if entry.ratio_db is not None else "–"

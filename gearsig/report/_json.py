@@ -1,7 +1,7 @@
-"""Results as JSON: the codec between dataclasses and JSON, analyses and gap reports in schemas that stay.
+"""Results as JSON: the codec between dataclasses and JSON, and stable schemas for analyses and gap reports.
 
-Names end in their unit, or a value stands beside its "unit". Numbers carry nine significant digits; nan and infinity,
-which JSON does not know, are null and read as nan. Within a version members may be added, never renamed or removed.
+Names end in their unit, or a value is accompanied by its "unit". Numbers have nine significant digits; nan and
+infinity, which JSON lacks, are null and read as nan. Within a version members may be added, never renamed or removed.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from gearsig.recording import Recording
 from gearsig.severity import CrackEstimate, NoCrackSeen
 
 # --------------------
-# The codec: members by field names or a layout's, values by type hints.
+# The codec: members named by fields or a layout, values typed by hints.
 # --------------------
 
 
@@ -50,20 +50,20 @@ Json = dict[str, Any]
 
 @dataclass(frozen=True)
 class Layout:
-    """How a dataclass stands in a file where its members are not just its fields.
+    """How a dataclass is written to a file if its members differ from its fields.
 
     Parameters
     ----------
     names : mapping
-        Field → member, where they differ.
+        Field → member, if they differ.
     inline : tuple of str
-        Fields that are dataclasses whose members stand among the others.
+        Fields that are dataclasses whose members are merged with the others.
     null_if_empty : tuple of str
-        Fields with texts or arrays that are written as null where they are empty.
+        Fields with texts or arrays that are written as null if they are empty.
     left_out : tuple of str
-        Fields that are not written; such a file is not read again.
+        Fields that are not written; such a file cannot be read back.
     properties : tuple of str
-        Properties that are written after the fields, for other programs.
+        Properties written after the fields, for other programs.
     """
 
     names: Mapping[str, str] = field(default_factory=dict)
@@ -78,17 +78,17 @@ _AS_FIELDS = Layout()
 
 
 def head(schema: str, version: int = 1) -> Json:
-    """Return the members that a file begins with: what it is, in which version, made by which gearsig."""
+    """Return the first members of a file: its schema, schema version and the version of gearsig."""
     return {"schema": schema, "schema_version": version, "gearsig_version": __version__}
 
 
 def document(schema: str, content: Json) -> str:
-    """Return a file's text: its head, and its content."""
+    """Return the text of a file with its head and content."""
     return json.dumps(head(schema) | plain(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def members(value: object, *names: str) -> Json:
-    """Return attributes and properties of a value by name, in this order, each as `plain` writes it.
+    """Return attributes and properties of a value by name, in the given order, each converted by `plain`.
 
     Examples
     --------
@@ -99,15 +99,15 @@ def members(value: object, *names: str) -> Json:
 
 
 def plain(value: Any, *, arrays: bool = True, layouts: Layouts | None = None) -> Any:  # noqa: PLR0911  one line per kind
-    """Return a value as JSON knows it: dictionaries, lists, texts, numbers of nine digits and null.
+    """Convert a value to JSON types: dictionaries, lists, texts, numbers of nine digits and null.
 
     Parameters
     ----------
     value : object
     arrays : bool
-        Whether arrays come as lists; otherwise as ``{"shape": […]}``.
+        Whether arrays become lists; otherwise ``{"shape": […]}``.
     layouts : mapping, optional
-        Dataclass → `Layout`; the others are written as their fields.
+        Dataclass → `Layout`; other dataclasses are written by their fields.
     """
 
     def written(part: Any) -> Any:
@@ -140,24 +140,23 @@ def plain(value: Any, *, arrays: bool = True, layouts: Layouts | None = None) ->
 
 
 def from_plain(hint: Any, value: Any, where: str, layouts: Layouts | None = None) -> Any:  # noqa: PLR0911  one line per kind
-    """Return what `plain` wrote: a value of type `hint`.
+    """Restore a value of type `hint` from what `plain` returned.
 
     Parameters
     ----------
     hint : type
         A dataclass, enumeration, `Path`, text, number, array, tuple or mapping of these, or a union with None.
     value : object
-        As `json.loads` returns it; members that the dataclass does not know are passed over, so that later versions
-        may add some.
+        As `json.loads` returns it; unknown members are ignored, so that later versions may add some.
     where : str
         Path of the value, for errors.
     layouts : mapping, optional
-        As they were written with.
+        Those it was written with.
 
     Raises
     ------
     InputError
-        If a value is of another type, or a member is missing whose field has no default.
+        If a value has another type, or a member without default is missing.
     """
     origin, arguments = get_origin(hint), get_args(hint)
     if origin in (Union, UnionType):
@@ -228,7 +227,7 @@ _JSON_NAMES = {dict: "object", list: "array", str: "string", bool: "boolean", in
 
 
 def _typed(value: Any, kind: type, where: str, or_null: str = "") -> Any:
-    if type(value) is not kind:  # not isinstance: True is no integer
+    if type(value) is not kind:  # not isinstance: True is not an integer
         _fail(f"{where} is {shortened(value)}, not {_JSON_NAMES[kind]}{or_null}")
     return value
 
@@ -249,16 +248,16 @@ def analysis_to_dict(analysis: Analysis, *, arrays: bool = False) -> Json:
     ----------
     analysis : Analysis
     arrays : bool
-        Whether spectra, maps and averages come with their numbers; a long recording then makes a large object.
+        Whether to include the values of spectra, maps and averages, which are large for a long recording.
 
     Returns
     -------
     dict
-        `json.dumps(..., allow_nan=False)` takes it.
+        Accepted by `json.dumps(..., allow_nan=False)`.
 
     Notes
     -----
-    What is not known or not defined is null. The members:
+    Unknown or undefined values are null. The members:
 
     - ``schema``: "gearsig.analysis", ``schema_version``: 1, ``gearsig_version``
     - ``outcome``: "fault", "suspicion", "cannot tell" or "no fault"
@@ -269,20 +268,19 @@ def analysis_to_dict(analysis: Analysis, *, arrays: bool = False) -> Json:
     - ``speed``: ``known``; if true ``shaft``, ``method``, ``mean_rpm``, ``lowest_rpm``, ``highest_rpm``,
       ``relative_uncertainty``, ``quality``, ``n_revolutions``, ``notes``; if false ``question``, ``reason``, ``remedy``
     - ``indicators``: each with ``name``, ``value``, ``unit``, ``channel``, ``computed_on``, ``shaft``, ``gear``,
-      ``band``, ``note``; ``reference_value`` and ``change_db``, null where there is no reference or it lacks the
-      indicator
+      ``band``, ``note``; ``reference_value`` and ``change_db``, null if there is no reference or it lacks the indicator
     - ``recording``: ``source``, ``sha256``, ``reader``, ``history``, ``warnings``, ``sampling_rate_hz``, ``n_samples``,
       ``duration_s``, ``channels``, ``speed_source``
     - ``rig``: what is known of the machine, or null
-    - ``channels``: per analysed channel the description of its spectra and averages; arrays as their
-      ``{"shape": […]}``, or as lists where they were asked for; ``order_levels`` always with their
-      numbers, and ``largest``, ``largest_at_rpm``, ``largest_at_hz``
-    - ``settings``: the parameters that were in force
-    - ``crack``: null where nobody asked and none is clear; else ``answer`` ("crack", "none seen", "cannot tell") with
+    - ``channels``: for each analysed channel, the description of its spectra and averages; arrays as
+      ``{"shape": […]}``, or as lists if requested; ``order_levels`` always with their
+      values, and ``largest``, ``largest_at_rpm``, ``largest_at_hz``
+    - ``settings``: the parameters in effect
+    - ``crack``: null if not requested and none is clear; else ``answer`` ("crack", "none seen", "cannot tell") with
       ``text``, ``shaft``, ``gear``, ``tooth``, ``angle_deg``, ``depth_mm``, ``interval_mm`` and the like; with
       ``below_mm``; or with ``reason`` and ``remedy``
-    - ``reference``: null, or ``source``, ``sha256``, ``outcome``, ``verdict`` of the recording that was compared with
-    - ``level_changes``: against it, levels of lines, sidebands, bearing parts and noise by channel: ``label``,
+    - ``reference``: null, or ``source``, ``sha256``, ``outcome``, ``verdict`` of the reference recording
+    - ``level_changes``: changes since the reference of lines, sidebands, bearing parts and noise by channel: ``label``,
       ``kind``, ``where``, ``harmonic``, ``unit``, ``level_db`` and ``reference_db`` (rms, dB re one unit),
       ``change_db``, ``repeatability_db`` (half against half), ``p_value``, ``is_change``, ``stands_out``; empty
       without a reference
@@ -304,7 +302,7 @@ def analysis_to_dict(analysis: Analysis, *, arrays: bool = False) -> Json:
 
 
 def analysis_to_json(analysis: Analysis, *, arrays: bool = False) -> str:
-    """Return an analysis as JSON text, see `analysis_to_dict`."""
+    """Return an analysis as JSON text; see `analysis_to_dict`."""
     indent = None if arrays else 2
     return json.dumps(analysis_to_dict(analysis, arrays=arrays), indent=indent, ensure_ascii=False, allow_nan=False)
 
@@ -358,7 +356,7 @@ def _crack(answer: CrackEstimate | NoCrackSeen | CannotTell | None) -> Json | No
     if isinstance(answer, CannotTell):
         return {"answer": "cannot tell", **plain(answer, arrays=False)}
     kind, content = "crack" if isinstance(answer, CrackEstimate) else "none seen", plain(answer, arrays=False)
-    content.pop("searched", None)  # of the figure
+    content.pop("searched", None)  # only for the figure
     return {"answer": kind, "text": answer.text, **content}
 
 
@@ -380,7 +378,7 @@ def _channel(channel: ChannelAnalysis, *, arrays: bool) -> Json:
 
 
 def long_analysis_to_json(analysis: LongAnalysis) -> str:
-    """Return a long analysis as JSON text; each part as `analysis_to_dict` gives it."""
+    """Return a long analysis as JSON text, with each part as in `analysis_to_dict`."""
     levels = ("channel_names", "units", "time_s", "rms", "peak", "crest_factor", "kurtosis")
     parts = [
         {"start_s": p.start_s, "end_s": p.end_s, "reason": p.reason, "analysis": analysis_to_dict(p.analysis)}
@@ -397,7 +395,7 @@ def long_analysis_to_json(analysis: LongAnalysis) -> str:
 
 
 # --------------------
-# A gap report; `gap.schema.json`, beside this file, describes every member.
+# A gap report; `gap.schema.json`, beside this file, describes all members.
 # --------------------
 
 
@@ -422,7 +420,7 @@ GAP_LAYOUTS = {
     AngleCurves: Layout({"unit": "of", "teeth": "n_teeth"}, null_if_empty=("after",)),
     AverageCurves: Layout({"teeth": "n_teeth"}),
 }
-"""Where members are called otherwise than the fields, or are null."""
+"""Dataclasses whose members differ in name from their fields, or may be null."""
 
 
 def gap_to_dict(report: GapReport) -> Json:
@@ -435,7 +433,7 @@ def gap_to_dict(report: GapReport) -> Json:
     Returns
     -------
     dict
-        `json.dumps(..., allow_nan=False)` takes it, and `gap.schema.json` holds for it.
+        Accepted by `json.dumps(..., allow_nan=False)`; conforms to `gap.schema.json`.
     """
     result = head(GAP_SCHEMA, GAP_VERSION) | {
         "outcome": report.outcome.value,
@@ -448,7 +446,7 @@ def gap_to_dict(report: GapReport) -> Json:
 
 
 def _state_units(result: Json) -> None:
-    """Put the unit beside each value, which in the report stands elsewhere or is always the same."""
+    """Add a unit to each value, as units are elsewhere in the report or fixed."""
     for interval in (result["size"], *(step["remaining"] for step in result["steps"])):
         interval["unit"] = FLOORS
     for curves in result["angles"]:
@@ -463,7 +461,7 @@ def _state_units(result: Json) -> None:
 
 
 def gap_to_json(report: GapReport) -> str:
-    """Return a gap report as JSON text, see `gap_to_dict`."""
+    """Return a gap report as JSON text; see `gap_to_dict`."""
     return json.dumps(gap_to_dict(report), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
@@ -473,13 +471,13 @@ def write_gap_json(report: GapReport, path: str | Path) -> Path:
 
 
 def gap_schema() -> Json:
-    """Return the JSON Schema (2020-12) that holds for every report of this version."""
+    """Return the JSON Schema (2020-12) for reports of this version."""
     schema: Json = json.loads(Path(__file__).with_name("gap.schema.json").read_text(encoding="utf-8"))
     return schema
 
 
 OLD_NAMES = {"doubts": "warnings", "foretold": "predicted", "notices": "notes", "remarks": "notes", "left": "remaining"}
-"""Member of version 1 or 2 → what it is called now."""
+"""Member of version 1 or 2 → its present name."""
 
 
 def _renamed(members: Json) -> Json:
@@ -487,7 +485,7 @@ def _renamed(members: Json) -> Json:
 
 
 def read_gap_json(path: str | Path) -> GapReport:
-    """Read a report that `write_gap_json` wrote.
+    """Read a report written by `write_gap_json`.
 
     Parameters
     ----------
@@ -496,19 +494,19 @@ def read_gap_json(path: str | Path) -> GapReport:
     Returns
     -------
     GapReport
-        With nine significant digits; what was null is nan.
+        With nine significant digits; null becomes nan.
 
     Raises
     ------
     InputError
-        If the file cannot be read, or is no gap report of this version or an earlier one.
+        If the file cannot be read, or is not a gap report of this or an earlier version.
     """
     where = Path(path).name
     try:
         content = json.loads(Path(path).read_text(encoding="utf-8"), object_hook=_renamed)
     except OSError as error:
         raise InputError(f"cannot be read ({error.strerror})", where=str(path), remedy="check the path") from None
-    except (ValueError, RecursionError):  # some text, or brackets without end
+    except (ValueError, RecursionError):  # other text, or endless nesting
         raise InputError("is not JSON", where=where, remedy="`gearsig gap` writes gap.json") from None
     stated = (content.get("schema"), content.get("schema_version")) if isinstance(content, dict) else (None, None)
     if stated not in [(GAP_SCHEMA, version) for version in range(1, GAP_VERSION + 1)]:
@@ -520,19 +518,19 @@ def read_gap_json(path: str | Path) -> GapReport:
 
 
 def gap_from_dict(content: Json) -> GapReport:
-    """Return the report that `gap_to_dict` made `content` of.
+    """Restore a report from the dictionary that `gap_to_dict` returned.
 
     Raises
     ------
     InputError
-        If a member is missing or of another type.
+        If a member is missing or has another type.
     """
     report: GapReport = from_plain(GapReport, content, "report", GAP_LAYOUTS)
     return replace(report, causes=tuple(map(_unbounded, report.causes)))
 
 
 def _unbounded(cause: GapCause) -> GapCause:
-    """JSON knows no infinity: nothing bounds a severity that has no upper end."""
+    """Restore the infinite upper limit of a severity, which JSON cannot represent."""
     if cause.severity is None or not isnan(cause.severity.high):
         return cause
     return replace(cause, severity=replace(cause.severity, high=inf))

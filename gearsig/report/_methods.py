@@ -1,4 +1,4 @@
-"""Answers of methods as files, and in reports: which methods a recording calls for, and their figures."""
+"""Answers of methods as files and in reports: which methods suit a recording, and their figures."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from gearsig.report._json import plain
 
 
 def write_answer(answer: MethodAnswer, folder: str | Path) -> tuple[Path, ...]:
-    """Write figure (PNG and SVG), table (CSV), arrays (HDF5) and numbers (JSON), each whole or not at all.
+    """Write figure (PNG and SVG), table (CSV), arrays (HDF5) and numbers (JSON), each atomically.
 
     Parameters
     ----------
     answer : MethodAnswer
     folder : path
-        Made where it is missing.
+        Created if missing.
 
     Returns
     -------
@@ -52,7 +52,7 @@ def _write_arrays(answer: MethodAnswer, file: IO[bytes]) -> None:
 
     groups = {"table": answer.table, "matrices": answer.matrices, "axes": answer.axes}
     groups |= {f"tables/{what}": table for what, table in answer.tables.items()}
-    content = BytesIO()  # HDF5 ends in more ways than one where a disk is full
+    content = BytesIO()  # HDF5 fails in several ways when the disk is full
     with h5py.File(content, "w") as arrays:
         arrays.attrs["method"], arrays.attrs["channel"] = answer.method, answer.channel
         for group, columns in groups.items():
@@ -64,11 +64,11 @@ def _write_arrays(answer: MethodAnswer, file: IO[bytes]) -> None:
 
 
 N_NAMED_COLUMNS = 40
-"""Of a method's table, which JSON names: maps have one for each line."""
+"""Maximum number of a table's columns that JSON names: maps have one column for each line."""
 
 
 def answer_json(answer: MethodAnswer) -> str:
-    """Return what a method found as JSON, without its arrays; short tables are in it."""
+    """Return the answer of a method as JSON, with short tables but without arrays."""
     about: dict[str, Any] = {"method": answer.method, "channel": answer.channel, "shows": answer.caption}
     about |= answer.numbers
     if answer.warnings:
@@ -83,11 +83,11 @@ def answer_json(answer: MethodAnswer) -> str:
 
 
 _REVOLUTIONS_SHOWN = 12.0
-"""Of a map on a page: single impacts of a damaged tooth must show."""
+"""Length of a map on a page, short enough to show single impacts of a damaged tooth."""
 
 
 def named_method(text: str) -> tuple[str, dict[str, Any]]:
-    """Return method and options of "order-map", "time-frequency+squeezed-cwt" or "modes+squeezed-cwt"."""
+    """Return method and options from "order-map", "time-frequency+squeezed-cwt" or "modes+squeezed-cwt"."""
     name, plus, transform = text.partition("+")
     if name not in METHODS:
         hint = closest_match_hint(name, list(METHODS))
@@ -95,18 +95,18 @@ def named_method(text: str) -> tuple[str, dict[str, Any]]:
     takes = {option.name for option in METHODS[name].options}
     option = "then" if "then" in takes else "transform"
     if plus and option not in takes:
-        raise InputError(f"{name} goes on to no transform", remedy="modes+squeezed-cwt does")
+        raise InputError(f"{name} cannot be followed by a transform", remedy="modes+squeezed-cwt can")
     return name, {option: one_of(transform, "transform", TRANSFORMS)} if plus else {}
 
 
 def fitting_methods(
     recording: Recording, angle: ShaftAngle | None, *, suspects_crack: bool = False, suspects_bearing: bool = False
 ) -> tuple[str, ...]:
-    """Return the methods that a recording calls for, besides those that every page has.
+    """Return the methods that suit a recording, in addition to those on each page.
 
-    A run-up or coast-down: the frequency map, beside the order map and the levels over speed that such a page has. A
-    suspected crack or other damage of a tooth: the squeezed transform of its most impulsive mode. Else a suspected
-    bearing: the kurtogram. A simulated motion at a steady speed: its Poincaré section in the phase plane.
+    For a run-up or coast-down: the frequency map, beside the page's order map and levels over speed. For a suspected
+    crack or other tooth damage: the squeezed transform of the most impulsive mode. Else for a suspected bearing: the
+    kurtogram. For a simulated motion at steady speed: its Poincaré section in the phase plane.
     """
     names: list[str] = []
     sweeps = angle is not None and not angle.is_steady(0.1)
@@ -124,9 +124,9 @@ def fitting_methods(
 def method_pictures(
     names: Sequence[str], prepared: PreparedRecording, channel: str = ""
 ) -> tuple[tuple[Picture, ...], tuple[str, ...]]:
-    """Return the pictures of several methods of one channel, and why others have none.
+    """Return the pictures of several methods for one channel, and why others have none.
 
-    Maps over time show the first twelve revolutions, or what is there.
+    Maps over time show the first twelve revolutions, or all of a shorter recording.
     """
     pictures: list[Picture] = []
     reasons: list[str] = []

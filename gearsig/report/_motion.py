@@ -1,11 +1,11 @@
 """Forces from motion as text, as a table of samples, and as JSON.
 
-The JSON object has these members; names end in their unit, numbers carry nine significant digits, and what is not known
-is null. Members may be added within a version, never renamed or removed.
+The JSON object has these members; names end in their unit, numbers have nine significant digits, and unknown values are
+null. Members may be added within a version, never renamed or removed.
 
 - ``schema``: "gearsig.force", ``schema_version``: 1, ``gearsig_version``, ``source``
 - ``duration_s``, ``sampling_rate_hz``, ``n_samples``
-- ``methods``: where each motion came from; ``notes``
+- ``methods``: origin of each motion quantity; ``notes``
 - ``datum``: ``compression_um``, ``uncertainty_um``, ``method``
 - ``models``: each with ``name``, ``description``, ``largest_n``, ``lowest_n``
 - ``errors``: each with ``model``, ``reference``, ``rms_n``, ``relative_rms``, ``bias_n``, ``largest_n``,
@@ -38,7 +38,7 @@ WIDTH = 100
 
 
 def force_text(estimate: ForceEstimate, noise: NoiseStudy | None = None) -> str:
-    """Return where the motion came from, the models, their errors and the study of noise, in plain text."""
+    """Return the origin of the motion, the models, their errors and the noise study in plain text."""
     motion, datum = estimate.motion, estimate.datum
     zero = f"{1e6 * datum.compression_m:.4g} µm"
     spread = "" if datum.uncertainty_m != datum.uncertainty_m else f" ± {1e6 * datum.uncertainty_m:.2g}"
@@ -48,7 +48,7 @@ def force_text(estimate: ForceEstimate, noise: NoiseStudy | None = None) -> str:
         "",
         "Motion",
         *(f"  {role:<20} {text}" for role, text in motion.methods.items()),
-        f"  {'middle of the play':<20} at {zero}{spread} of the compression: {datum.method}",
+        f"  {'middle of backlash':<20} at {zero}{spread} of the compression: {datum.method}",
         *(paragraph(f"Note: {note}") for note in motion.notes),
         "",
         "Models",
@@ -65,26 +65,26 @@ def force_text(estimate: ForceEstimate, noise: NoiseStudy | None = None) -> str:
             for e in estimate.errors
         ]
     else:
-        lines.append("Nothing was measured to compare with: neither torque nor force.")
+        lines.append("There is no measured reference: neither torque nor force.")
     if noise is None:
         return "\n".join(lines)
     lines += ["", f"{'noise added (µm rms)':<24}" + "".join(f"{level:>9g}" for level in noise.levels_um)]
     lines += [f"{model:<24}" + "".join(f"{value:>9.0f}" for value in rms) for model, rms in noise.rms_n.items()]
     lines += [f"(rms error in N against {noise.reference})", fill(noise.text, WIDTH)]
-    # Noise of the angle is what the study adds; what the acceleration's does follows from the inertia.
+    # The study adds noise to the angle; the effect of noise on the acceleration follows from the inertia.
     limit = acceleration_limit_rad_s2(noise, motion)
     if limit is not None:
         each = motion.contact.driver_inertia_kg_m2 / motion.path.base_radii_m[0]
         text = (
-            f"Noise on the driver's acceleration adds J1/r_b1 = {each:.3g} N per rad/s²: the piecewise model is nearer "
-            f"up to {limit:.0f} rad/s² rms. Noise on the speeds moves the damping alone."
+            f"Noise on the driver's acceleration adds J1/r_b1 = {each:.3g} N per rad/s²: the piecewise model is closer "
+            f"up to {limit:.0f} rad/s² rms. Noise on the speeds affects only the damping."
         )
         lines.append(fill(text, WIDTH))
     return "\n".join(lines)
 
 
 def force_json(estimate: ForceEstimate, noise: NoiseStudy | None = None) -> str:
-    """Return an estimate as JSON, see the module's description; the samples are in the table."""
+    """Return an estimate as JSON (members: see the module); the samples are in the table."""
     motion, datum = estimate.motion, estimate.datum
     n = len(motion.driver_angle_rad)
     content = {
@@ -115,8 +115,8 @@ def force_csv(estimate: ForceEstimate) -> str:
 
 # Fitted parameters as text and as JSON.
 #
-# The JSON object has these members; names end in their unit, numbers carry nine significant digits, and what is not
-# known is null. Members may be added within a version, never renamed or removed.
+# The JSON object has these members; names end in their unit, numbers have nine significant digits, and unknown values
+# are null. Members may be added within a version, never renamed or removed.
 #
 # - ``schema``: "gearsig.identify", ``schema_version``: 1, ``gearsig_version``, ``source``
 # - ``parameters``: each with ``name``, ``unit``, ``value``, ``low``, ``high`` (95 %), ``is_determined``, ``why_not``,
@@ -125,27 +125,25 @@ def force_csv(estimate: ForceEstimate) -> str:
 
 
 def identify_text(identification: Identification) -> str:
-    """Return the parameters with their intervals, and what cannot be told, in plain text."""
+    """Return the parameters with their intervals, and those not determined, in plain text."""
     lines = [f"{identification.source or 'recording'}: parameters with 95 % intervals", ""]
     lines += [f"{name} equation: {text}" for name, text in identification.equations.items()]
     lines += ["", f"{'parameter':<26} {'value':>11} {'from':>11} {'to':>11} {'rig':>11}  unit"]
     lines += [_row(p) for p in identification.parameters if p.is_determined]
     untold = [p for p in identification.parameters if not p.is_determined]
     if untold:
-        lines += ["", "Cannot be told from this record"]
+        lines += ["", "Not determined by this record"]
         lines += [fill(f"{p.name}: {p.why_not}", WIDTH, initial_indent="  ", subsequent_indent="    ") for p in untold]
     alike = [
-        f"{p.name} moves with {p.correlated_with}"
-        for p in identification.parameters
-        if p.is_determined and p.correlated_with
+        f"{p.name} with {p.correlated_with}" for p in identification.parameters if p.is_determined and p.correlated_with
     ]
     if alike:
-        lines += ["", fill(f"Told together rather than each by itself: {'; '.join(alike)}.", WIDTH)]
+        lines += ["", fill(f"Determined together rather than separately: {'; '.join(alike)}.", WIDTH)]
     return "\n".join(lines)
 
 
 def identify_json(identification: Identification) -> str:
-    """Return the same as JSON, see the module's description."""
+    """Return the same as JSON; the comment above lists its members."""
     parameters = [
         members(p, "name", "unit", "value")
         | {"low": p.interval[0], "high": p.interval[1]}
@@ -169,8 +167,8 @@ def _row(p: FittedParameter) -> str:
 
 # Start–stop motion as text and as JSON.
 #
-# The JSON object has these members; names end in their unit, numbers carry nine significant digits, and what is not
-# known is null. Members may be added within a version, never renamed or removed.
+# The JSON object has these members; names end in their unit, numbers have nine significant digits, and unknown values
+# are null. Members may be added within a version, never renamed or removed.
 #
 # - ``schema``: "gearsig.start_stop", ``schema_version``: 1, ``gearsig_version``, ``source``
 # - ``stretches``: each with ``direction`` (1, −1, 0 at rest), ``start_s``, ``end_s``, ``turned_rad``, ``top_speed_rpm``
@@ -180,14 +178,14 @@ def _row(p: FittedParameter) -> str:
 #   ``speed_mps``, ``energy_j``, ``restitution``, ``lost_j``, ``peak_force_n``, ``note`` (why it has no restitution)
 # - ``indicators``: each with ``name``, ``value``, ``unit``, ``computed_on``
 # - ``teeth``: per tooth of the driver ``passes_forwards``, ``passes_backwards``, ``rms_forwards``, ``rms_backwards`` of
-#   ``signal`` in ``unit``; null where there was nothing to average
+#   ``signal`` in ``unit``; null if there was nothing to average
 # - ``compliance``: null, or per tooth of the driver ``extra_um``, ``uncertainty_um``, ``n_samples``;
 #   ``deflection_um`` and ``weak_teeth``
-# - ``orders``: of the same signal, forwards: ``order`` and ``amplitude`` (peak) as lists; null where no segment holds a
+# - ``orders``: of the same signal, forwards: ``order`` and ``amplitude`` (peak) as lists; null if no segment holds a
 #   revolution
-# - ``refusals``: what could not be told; ``notes``: what was told in part
+# - ``refusals``: results that the record does not allow; ``notes``: limitations of the others
 MAX_ROWS = 12
-"""Of segments and impacts on a terminal; the JSON has all."""
+"""Maximum number of segments and of impacts in the text; the JSON has all."""
 
 
 def start_stop_text(examined: StartStop) -> str:
@@ -206,7 +204,7 @@ def start_stop_text(examined: StartStop) -> str:
         lines += ["", fill(text, WIDTH)]
     if examined.teeth is not None:
         weak = ", ".join(map(str, examined.teeth.weak_teeth))
-        lines.append(f"Teeth of the driver that yield more than the others: {weak or 'none'}.")
+        lines.append(f"Teeth of the driver that deflect more than the others: {weak or 'none'}.")
     if impacts:
         lines += ["", f"{len(impacts)} impacts, the hardest:"]
         lines += ["   time s  flank  tooth    speed m/s   energy J  restitution   force N"]
@@ -232,7 +230,7 @@ def start_stop_json(
     unit: str = "",
     orders: Spectrum | None = None,
 ) -> str:
-    """Return the same as JSON, see the module's description."""
+    """Return the same as JSON; the comment above lists its members."""
     levels = ("passes_forwards", "passes_backwards", "rms_forwards", "rms_backwards")
     play = ("backlash_um", "uncertainty_um", "stiffness_n_per_m_lambda", "n_drive", "n_back", "scatter_um", "method")
     content = {

@@ -37,24 +37,24 @@ from gearsig.severity import CrackEstimate
 from gearsig.spectra import LARGEST_SLIP, Spectrum
 
 CLAIMED = (Kind.FAULT, Kind.SUSPICION, Kind.DATA_PROBLEM)
-"""Kinds of findings that are read first; the others are a click away."""
+"""Kinds of findings that are shown first; the others are folded."""
 
 
 def speed_is_constant(analysis: Analysis) -> bool:
-    """Whether the speed is known and changes so little that its lines stay sharp over frequency."""
+    """Whether the speed is known and so constant that its lines are sharp over frequency."""
     angle = analysis.shaft_angle
     return isinstance(angle, ShaftAngle) and angle.mean_speed_rpm != 0 and angle.is_steady()
 
 
 def line_cursors(analysis: Analysis, spectrum: Spectrum | OrderMap, *, n_sidebands: int = 2) -> tuple[Cursor, ...]:
-    """Return the lines that the rig implies on a spectrum's axis; without a rig the shaft's first three."""
+    """Return the lines that the rig implies on a spectrum's axis; without a rig, the shaft's first three."""
     if not isinstance(analysis.shaft_angle, ShaftAngle) or spectrum.axis == "quefrency":
         return ()
     return plot.rig_cursors(analysis.rig, analysis.shaft_angle, spectrum, n_sidebands=n_sidebands)
 
 
 def bearing_cursors(analysis: Analysis, spectrum: Spectrum) -> tuple[Cursor, ...]:
-    """Return shaft lines, three harmonics of each bearing line, and of each modulation that no known part explains."""
+    """Return shaft lines, and three harmonics of each bearing line and of each unexplained modulation."""
     cursors = list(line_cursors(analysis, spectrum, n_sidebands=0))
     for finding in analysis.findings:
         position = _position(analysis, spectrum, finding.where) if is_of_envelope(finding.where) else None
@@ -64,14 +64,14 @@ def bearing_cursors(analysis: Analysis, spectrum: Spectrum) -> tuple[Cursor, ...
 
 
 def is_of_envelope(where: Where) -> bool:
-    """Whether a place is a modulation in a band's envelope: a bearing's, or impacts that no described part explains."""
+    """Whether a place is a modulation of a band's envelope: by a bearing, or by impacts of unknown origin."""
     return bool(where.bearing) or (where.band_hz is not None and (where.order or where.frequency_hz) is not None)
 
 
 def highest_order_of_interest(analysis: Analysis, spectrum: Spectrum | OrderMap) -> float:
-    """Return where a spectrum may end: past the third harmonic of the fastest mesh.
+    """Return the upper limit for a spectrum: just past the third harmonic of the fastest mesh.
 
-    Where none is known, an order spectrum may end at 50, one over frequency at its own end.
+    Without a known mesh, it is 50 for an order spectrum and the end of a spectrum over frequency.
     """
     return plot.upper_axis_limit(spectrum, line_cursors(analysis, spectrum))
 
@@ -95,10 +95,10 @@ def mesh_windows(analysis: Analysis, spectrum: Spectrum) -> list[tuple[str, floa
 def marked_positions(
     analysis: Analysis, spectrum: Spectrum, channel: str, *, of_bearings: bool = False
 ) -> tuple[float, ...]:
-    """Return where faults and suspicions of a channel lie on a spectrum's axis, faults first.
+    """Return the positions of a channel's faults and suspicions on a spectrum's axis, faults first.
 
-    Impacts of bearings and others live in the envelope spectrum, all other findings in the spectrum itself. What has
-    changed at a part's kinematic order is marked at the order that a finding measured for it, if one did.
+    Impacts, by bearings or otherwise, are in the envelope spectrum, all other findings in the spectrum itself. A change
+    at a part's kinematic order is marked at the order measured by a finding, if there is one.
     """
     positions: list[float] = []
     for finding in sorted(analysis.findings, key=_faults_first):
@@ -116,12 +116,12 @@ def marked_positions(
 
 
 def is_of_sidebands(where: Where) -> bool:
-    """Whether the order of a place is the distance of sidebands from a mesh: that of one gear's shaft."""
+    """Whether the order of a place is a sideband spacing around a mesh, that is the order of a gear's shaft."""
     return "/" in where.gear and where.order is not None
 
 
 def sidebands_of(analysis: Analysis, spectrum: Spectrum, where: Where) -> tuple[float, ...]:
-    """Return the first sidebands at the mesh harmonic where they are largest; none where the mesh is not in reach."""
+    """Return the first sidebands at the mesh harmonic with the largest ones; none if the mesh is out of range."""
     distance, scale = _position(analysis, spectrum, where), _per_order(analysis, spectrum)
     pair = (
         next((p for p in analysis.rig.pairs if p.name == where.gear.rpartition("/")[0]), None) if analysis.rig else None
@@ -137,7 +137,7 @@ def sidebands_of(analysis: Analysis, spectrum: Spectrum, where: Where) -> tuple[
 
 
 def _faults_first(finding: Finding) -> tuple[bool, bool]:
-    """Key that puts what has changed behind what explains it."""
+    """Sort key that puts changes after the findings that explain them."""
     return finding.kind is not Kind.FAULT, finding.code == CHANGED
 
 
@@ -157,7 +157,7 @@ def _position(analysis: Analysis, spectrum: Spectrum, where: Where) -> float | N
 
 
 def _per_order(analysis: Analysis, spectrum: Spectrum | OrderMap) -> float | None:
-    """Return units of the spectrum's axis per order of the shaft that orders are counted on; None: no lines there."""
+    """Return units of the spectrum's axis per order of the reference shaft; None if orders have no lines there."""
     angle = analysis.shaft_angle
     if not isinstance(angle, ShaftAngle) or spectrum.axis == "quefrency":
         return None
@@ -170,19 +170,19 @@ def _reference(analysis: Analysis) -> str:
 
 @dataclass(frozen=True)
 class VerdictPicture:
-    """What the picture beside the verdict shows.
+    """Content of the picture beside the verdict.
 
     Parameters
     ----------
     about : str
-        "tooth": the mean revolution of a gear; "bearing": the envelope spectrum, with the impacts of a bearing,
-        described or not; "resonance": levels over speed; "motion": starts and stops; "lines": the order spectrum, or
-        the spectrum where the speed is not known.
+        "tooth": the mean revolution of a gear; "bearing": the envelope spectrum with the impacts of a bearing, known to
+        the rig or not; "resonance": levels over speed; "motion": starts and stops; "lines": the order spectrum, or the
+        spectrum if the speed is not known.
     channel : ChannelAnalysis
     shaft : str
         Of a tooth.
     finding : Finding or None
-        That it shows.
+        The finding shown.
     """
 
     about: Literal["tooth", "bearing", "resonance", "motion", "lines"]
@@ -192,14 +192,14 @@ class VerdictPicture:
 
     @property
     def average(self) -> SynchronousAverage:
-        """Of a tooth: the mean revolution in which a single tooth stands out most."""
+        """For a tooth: the mean revolution in which a single tooth stands out most."""
         told = ("change", "residual", "difference", "average")
         kinds = [kind for kind in told if (self.shaft, kind) in self.channel.averages]
         return self.channel.averages[self.shaft, kinds[0]]
 
 
 def verdict_picture(analysis: Analysis) -> VerdictPicture | None:
-    """Return what shows the most important finding best; None where no channel could be analysed."""
+    """Return the picture that best shows the most important finding; None if no channel could be analysed."""
     channels = {channel.channel: channel for channel in analysis.channels}
     if not channels:
         return None
@@ -214,13 +214,13 @@ def verdict_picture(analysis: Analysis) -> VerdictPicture | None:
             return VerdictPicture("tooth", _changed_most(analysis.channels, shaft) or channel, shaft, finding)
         if (about := _shown_by(finding, channel)) is not None:
             return VerdictPicture(about, channel, "", finding)
-    # that of what stands beside it in words
+    # the finding of the text beside it
     named = [name for f in analysis.findings if f.kind is not Kind.INFORMATION for name in f.where.channels]
     return VerdictPicture("lines", channels[next((name for name in named if name in channels), next(iter(channels)))])
 
 
 def _changed_most(channels: Sequence[ChannelAnalysis], shaft: str) -> ChannelAnalysis | None:
-    """Return the channel whose average of a shaft changed most since the reference; None where none is compared."""
+    """Return the channel whose average of a shaft changed most since the reference; None without a comparison."""
     kept = [channel for channel in channels if (shaft, "change") in channel.averages]
 
     def share(channel: ChannelAnalysis) -> float:
@@ -231,7 +231,7 @@ def _changed_most(channels: Sequence[ChannelAnalysis], shaft: str) -> ChannelAna
 
 
 def _shown_by(finding: Finding, channel: ChannelAnalysis) -> Literal["bearing", "resonance", "lines"] | None:
-    """Return which of a channel's spectra and levels shows a finding; None where it has no place in any."""
+    """Return which of a channel's spectra and levels shows a finding; None if none does."""
     where = finding.where
     if is_of_envelope(where) and channel.envelope_spectrum is not None:
         return "bearing"
@@ -241,7 +241,7 @@ def _shown_by(finding: Finding, channel: ChannelAnalysis) -> Literal["bearing", 
 
 
 def crack_picture(analysis: Analysis) -> Picture | None:
-    """Return the picture of a crack that was seen; None without one, or where no channel is an acceleration."""
+    """Return the picture of a detected crack; None if there is none, or no channel is an acceleration."""
     crack = analysis.crack
     if not isinstance(crack, CrackEstimate) or analysis.rig is None:
         return None
@@ -252,23 +252,23 @@ def crack_picture(analysis: Analysis) -> Picture | None:
         return None
     name, average, change = channel.channel, channel.averages[kind], channel.averages.get((crack.shaft, "change"))
     factor = float(si_factor("acceleration", average.unit) or 1.0)
-    # A tooth enters half a pitch before the middle of its own; the blow stands in the middle of the figure.
+    # A tooth enters half a pitch before its own middle; the impact is in the middle of the figure.
     entry = (crack.angle_deg / 360.0 - 0.5 / teeth) % 1.0
     turned = round((entry - 0.5) * len(average.values))
     angle = (np.arange(len(average.values)) + turned) * 360.0 / len(average.values)
     now = np.roll(factor * average.values, -turned)
     lines = [ChartLine(angle, now, "now")]
     if change is not None:
-        # The change is without mesh lines: beside it the reference's teeth stand in the mesh as it is now.
+        # The change has no mesh lines, so the reference's teeth are shown with the present mesh.
         since = np.roll(factor * change.values, -turned)
         lines = [ChartLine(angle, now - since, "reference", QUIET), *lines, ChartLine(angle, since, "change", FAULT)]
-    reach = min(0.5, 8.0 / teeth)  # of a revolution: the blow and a few healthy teeth on either side
+    reach = min(0.5, 8.0 / teeth)  # of a revolution: the impact and a few healthy teeth on each side
     reference = " beside the reference" if change is not None else ""
     caption = (
-        "A crack changes the few mesh cycles after its tooth enters, and nothing else; a change all round is another "
-        "load, speed or sensor."
+        "A crack changes only the few mesh cycles after its tooth enters; a change all around means a different load, "
+        "speed or sensor."
         if change is not None
-        else "A crack swings the few mesh cycles after its tooth enters out of the pattern of the others."
+        else "A crack makes the few mesh cycles after its tooth enters deviate from the pattern of the others."
     )
     panel = LinePanel(
         lines,
@@ -286,27 +286,27 @@ def crack_picture(analysis: Analysis) -> Picture | None:
 
 
 def start_stop_figures(examined: StartStop) -> Iterator[CaptionedFigure]:
-    """Draw the figures; what the record does not show has none."""
+    """Draw the figures for which the record has results."""
     from gearsig.motion import FROM_TORQUE, HUNT_CROSSLEY, PIECEWISE, estimate_forces
 
     motion, impacts = examined.motion, examined.impacts
     yield CaptionedFigure(
         plot.motion_profile_figure(examined, title="Speed, torque and compression in their phases"),
-        "Look when the compression changes sides: between the dashed lines the flanks do not touch, beyond them they "
-        "carry. A run-down that grows shorter tells of friction.",
+        "Look at when the compression changes sides: between the dashed lines the flanks do not touch, beyond them "
+        "they carry load. A run-down that gets shorter indicates friction.",
         f"Driver's speed, torque and compression over {motion.time_s[-1]:.4g} s, phases shaded.",
     )
     yield CaptionedFigure(
         plot.start_stop_figure(examined, title="Speed with the impacts"),
-        "The walls of the phase plane stand a backlash apart. Torque over twist at the driver: the flat middle is the "
-        "play, the slopes are the teeth's stiffness, the area is what is lost.",
+        "The walls of the phase plane are a backlash apart. Torque over twist at the driver: the flat middle is the "
+        "backlash, the slopes are the teeth's stiffness, the area is the energy lost.",
         "Speed with impacts, phase plane of the teeth, torque over twist.",
     )
     if impacts:
         yield CaptionedFigure(
             plot.impacts_figure(impacts, motion.path.teeth[0], restitution=motion.contact.restitution),
-            "Look whether the same teeth meet each time the machine starts or stops: they wear first. Energies are on "
-            "a logarithmic scale; a restitution is missing where the flanks stayed together.",
+            "Look for teeth that meet each time the machine starts or stops: they wear first. Energies are on a "
+            "logarithmic scale; a restitution is missing if the flanks stayed in contact.",
             f"{len(impacts)} impacts: energy over time and tooth, restitution over speed.",
         )
     if motion.torque_nm is None:
@@ -318,24 +318,24 @@ def start_stop_figures(examined: StartStop) -> Iterator[CaptionedFigure]:
     shares = [100.0 * estimate.error(model, FROM_TORQUE).relative_rms for model in (PIECEWISE, HUNT_CROSSLEY)]
     yield CaptionedFigure(
         plot.force_figure(estimate, title="Force from the motion, beside the torque's"),
-        f"The piecewise model, which knows both flanks and one or two pairs, is {shares[0]:.3g} % rms off torque over "
-        f"base radius; Hunt–Crossley, one pair on one flank, {shares[1]:.3g} %. Where the first is far off, the rig's "
-        "[contact] table does not fit, or the encoders are too coarse (gearsig force --noise).",
-        "Force by two models beside torque over base radius, and their errors; beside it the hardest blow backwards.",
+        f"The piecewise model, with both flanks and one or two pairs, differs by {shares[0]:.3g} % rms from torque "
+        f"over base radius; Hunt–Crossley, one pair on one flank, by {shares[1]:.3g} %. If the former is large, the "
+        "rig's [contact] table does not fit, or the encoders are too coarse (gearsig force --noise).",
+        "Force by two models and torque over base radius, and their errors; beside them the hardest backward impact.",
     )
 
 
 @dataclass(frozen=True)
 class PictureGroup:
-    """Pictures that belong together.
+    """A group of pictures.
 
     Parameters
     ----------
     title : str
     wide, small : tuple of Picture
-        One per line, or side by side.
+        At full width, or side by side.
     is_folded : bool
-        Whether the page shows them only when asked: channels that no finding names look like the others.
+        Whether the page folds them, as channels that no finding names look like the others.
     """
 
     title: str
@@ -346,24 +346,24 @@ class PictureGroup:
 
 @dataclass(frozen=True)
 class Gallery:
-    """All pictures of a page, and a note on those left out."""
+    """All pictures of a page, and a note on channels left out."""
 
     groups: tuple[PictureGroup, ...]
     left_out: str = ""
 
 
 N_DETAILED, N_CHANNELS = 2, 8
-"""Channels with all their figures, and with a figure at all: a page is read in a minute."""
+"""Maximum number of channels with all figures, and with any figure: a page should take a minute to read."""
 
 
 def gallery(analysis: Analysis, methods: Sequence[str] | None = None) -> Gallery:
-    """Make the pictures of a page: the recording, then each channel, those with findings first and in most detail.
+    """Draw the pictures of a page: the recording, then each channel, those with findings first and in most detail.
 
     Parameters
     ----------
     analysis : Analysis
     methods : sequence of str or None
-        Further methods, as `named_method` reads them; None: those that the recording calls for.
+        Further methods, as `named_method` reads them; None: those that suit the recording.
     """
     groups = []
     if analysis.motion is not None:
@@ -374,7 +374,7 @@ def gallery(analysis: Analysis, methods: Sequence[str] | None = None) -> Gallery
     claims = [f for f in analysis.findings if f.is_claim]
     channels = {channel.channel: channel for channel in analysis.channels}
     named = dict.fromkeys(name for f in claims for name in f.where.channels if name in channels)
-    detailed = list(named)[:N_DETAILED] or list(channels)[:1]  # the first one where no finding names any
+    detailed = list(named)[:N_DETAILED] or list(channels)[:1]  # the first channel if no finding names any
     ordered = sorted(channels, key=lambda channel: channel not in detailed)
     groups += [_channel_group(analysis, channels[name], detailed=name in detailed) for name in ordered[:N_CHANNELS]]
     further, reasons = _further_methods(analysis, claims, methods)
@@ -393,7 +393,7 @@ def gallery(analysis: Analysis, methods: Sequence[str] | None = None) -> Gallery
 def _further_methods(
     analysis: Analysis, claims: Sequence[Finding], methods: Sequence[str] | None
 ) -> tuple[tuple[Picture, ...], tuple[str, ...]]:
-    """Return the pictures of further methods, of the channel that a tooth's or race's finding names, and refusals."""
+    """Return the pictures of further methods for the channel named by a tooth's or race's finding, and refusals."""
     teeth = [finding for finding in claims if finding.where.tooth is not None or finding.where.angle_deg is not None]
     bearings = [finding for finding in claims if is_of_envelope(finding.where)]
     channel = next((name for finding in (*teeth, *bearings) for name in finding.where.channels), "")
@@ -402,7 +402,7 @@ def _further_methods(
     chosen = fitting_methods(analysis.recording, angle, **suspects) if methods is None else methods
     recording = analysis.recording if analysis.rig is None else analysis.recording.with_rig(analysis.rig)
     pictures, reasons = method_pictures(chosen, with_known_angle(recording, analysis.shaft_angle), channel)
-    if methods is None:  # nobody asked for what cannot be had
+    if methods is None:  # not requested, so do not report refusals
         reasons = ()
     return pictures, reasons
 
@@ -422,7 +422,7 @@ def _recording_pictures(analysis: Analysis) -> Iterator[Picture]:
             x_limits=(0.0, max(recording.duration_s, 1.0 / recording.sampling_rate_hz)),
         )
         last = name == names[-1]
-        caption = f"Steps and clipped tops are the recording's; spikes may be impacts.{more}" if last else ""
+        caption = f"Steps and clipped peaks are faults of the recording; spikes may be impacts.{more}" if last else ""
         yield Picture.of_svg(
             plot.svg_panel(panel, height=100),
             caption,
@@ -433,7 +433,7 @@ def _recording_pictures(analysis: Analysis) -> Iterator[Picture]:
     if isinstance(angle, ShaftAngle):
         low, high = angle.speed_range_rpm
         svg = plot.svg_panel(plot.speed_panel(angle), height=70)
-        caption = "Look whether the speed held still: where it changes, only orders keep their lines sharp."
+        caption = "Check whether the speed was constant: if it changes, lines are sharp over orders only."
         yield Picture.of_svg(svg, caption, f"Speed over time, {low:.6g} to {high:.6g} rpm.", "Speed")
 
 
@@ -447,7 +447,7 @@ def _channel_group(analysis: Analysis, channel: ChannelAnalysis, *, detailed: bo
 
 
 def _detailed_pictures(analysis: Analysis, channel: ChannelAnalysis) -> Iterator[Picture]:
-    """Yield the surroundings of each mesh, envelope, levels over speed, map, and the spectrum over frequency."""
+    """Yield close views of each mesh, the envelope, levels over speed, the map, and the spectrum over frequency."""
     if channel.order_spectrum is not None:
         yield from _meshes(analysis, channel, channel.order_spectrum)
     if channel.envelope_spectrum is not None:
@@ -456,7 +456,7 @@ def _detailed_pictures(analysis: Analysis, channel: ChannelAnalysis) -> Iterator
         yield _order_levels(analysis, channel)
     if channel.order_map is not None:
         yield _map(analysis, channel, channel.order_map)
-    if channel.order_spectrum is not None:  # else it is shown already
+    if channel.order_spectrum is not None:  # otherwise it is already shown
         yield _frequency_picture(analysis, channel)
 
 
@@ -469,7 +469,7 @@ def spectrum_svg(
     linear: bool = False,
     height: int = 170,
 ) -> str:
-    """Return a spectrum as SVG: what lies at zero, an offset or a drift, does not squeeze the rest."""
+    """Return a spectrum as SVG; an offset or drift near zero does not compress the rest of the axis."""
     start = 3 if limits[0] <= spectrum.positions[0] and len(spectrum.values) > 9 else 0
     values = spectrum.values[start:]
     points = [(p, spectrum.largest_near(p, 2.0 * spectrum.resolution)[1]) for p in marked]
@@ -485,18 +485,16 @@ def spectrum_svg(
 
 
 def _spectrum(analysis: Analysis, channel: ChannelAnalysis) -> Picture:
-    """Return the order spectrum where the speed is known, else the spectrum over frequency."""
+    """Return the order spectrum if the speed is known, else the spectrum over frequency."""
     spectrum = channel.order_spectrum
     if spectrum is None:
         return _frequency_picture(analysis, channel)
     highest = highest_order_of_interest(analysis, spectrum)
     cursors = line_cursors(analysis, spectrum, n_sidebands=0)
     marked = marked_positions(analysis, spectrum, channel.channel)
-    look = "Look which orders stand out: what keeps its order turns with the shaft."
+    look = "Look which orders stand out: lines at a fixed order turn with the shaft."
     if any(cursor.kind == "mesh" for cursor in cursors):
-        look = (
-            "Look whether mesh harmonics stand alone or carry sidebands, and whether a tall line lies off every mark."
-        )
+        look = "Check whether mesh harmonics have sidebands, and whether any tall line is away from all marks."
     return Picture.of_svg(
         spectrum_svg(spectrum, cursors, (0.0, highest), marked),
         f"{look}{circle_legend(marked)}",
@@ -511,7 +509,7 @@ def _meshes(analysis: Analysis, channel: ChannelAnalysis, spectrum: Spectrum) ->
         marked = marked_positions(analysis, spectrum, channel.channel)
         yield Picture.of_svg(
             spectrum_svg(spectrum, cursors, (low, high), marked, height=130),
-            "Look at the spacing of the sidebands: it names the shaft that modulates the mesh, hence the gear."
+            "Look at the spacing of the sidebands: it identifies the shaft that modulates the mesh, hence the gear."
             f"{circle_legend([order for order in marked if low <= order <= high])}",
             f"Order spectrum of {channel.channel} from order {low:.4g} to {high:.4g}, around the mesh of {pair}.",
             f"Order spectrum of {channel.channel} around the mesh of {pair}",
@@ -520,7 +518,7 @@ def _meshes(analysis: Analysis, channel: ChannelAnalysis, spectrum: Spectrum) ->
 
 def _frequency_picture(analysis: Analysis, channel: ChannelAnalysis) -> Picture:
     cursors: tuple[Cursor, ...] = ()
-    smeared = " The speed changes, so lines that follow it are smeared here."
+    smeared = " The speed changes, so lines that follow it are smeared."
     if speed_is_constant(analysis):
         smeared = ""
         cursors = tuple(c for c in line_cursors(analysis, channel.spectrum) if c.kind == "mesh")
@@ -554,18 +552,18 @@ def envelope_picture(analysis: Analysis, channel: ChannelAnalysis, spectrum: Spe
 
 
 def circle_legend(marked: Sequence[float]) -> str:
-    """Say what circles are, where there are any."""
-    return " Circled: what a finding names." if len(marked) else ""
+    """Explain circles, if there are any."""
+    return " Circled: positions named by findings." if len(marked) else ""
 
 
 def level_panel(analysis: Analysis, channel: ChannelAnalysis) -> tuple[LinePanel, list[tuple[float, float]]]:
-    """Return levels of orders over speed, and where each crosses a resonance that is named; there must be levels."""
+    """Return levels of orders over speed, and where they cross a named resonance; requires order levels."""
     levels = channel.order_levels
     low, high = float(levels[0].speed_rpm[0]), float(levels[0].speed_rpm[-1])
     colours = plot.series_colours(len(levels))
     lines = [ChartLine(x.speed_rpm, x.amplitude, x.name, colour) for x, colour in zip(levels, colours, strict=True)]
     unit = plot.with_unit("amplitude", levels[0].unit)
-    # what lies three and a half decades below the largest level is noise
+    # anything three and a half decades below the maximum is noise
     top = max(float(x.amplitude.max()) for x in levels) or 1.0
     floor = max(min(float(x.amplitude.min()) for x in levels), top * 10.0**-3.5)
     panel = LinePanel(lines, "speed (rpm)", unit, (floor / 1.3, 1.3 * top), logarithmic=True, x_limits=(low, high))
@@ -583,7 +581,7 @@ def _order_levels(analysis: Analysis, channel: ChannelAnalysis) -> Picture:
     panel, marked = level_panel(analysis, channel)
     return Picture.of_svg(
         plot.svg_panel(panel, marked=marked),
-        "A peak is a speed at which that order excites something; orders that peak at one frequency show a resonance. "
+        "At a peak, that order excites something; orders that peak at one frequency show a resonance. "
         f"{'Circled: where an order crosses a resonance that a finding names. ' if marked else ''}"
         f"Largest: {'; '.join(largest)}.",
         f"Amplitudes of {len(levels)} orders of {channel.channel} over speed.",
@@ -605,17 +603,17 @@ def _map(analysis: Analysis, channel: ChannelAnalysis, order_map: OrderMap) -> P
     )
     return Picture.of_svg(
         plot.svg_panel(panel),
-        "Upright lines turn with the shaft; bent bands are resonances that stay at their frequency.",
+        "Vertical lines turn with the shaft; curved bands are resonances of fixed frequency.",
         f"Levels of {channel.channel} over {order_map.axis} and time.",
         f"{order_map.axis.capitalize()} map of {channel.channel}",
     )
 
 
 def zero_text(analysis: Analysis, shaft: str) -> str:
-    """Say where on a shaft angle 0 of its average is."""
+    """Say where angle 0 of a shaft's average is."""
     if analysis.has_mark(shaft):
         return "Angles run clockwise from the mark on the shaft, at the top."
-    return "The shaft has no mark: 0°, at the top, is where the recording begins, and is elsewhere in another."
+    return "The shaft has no mark: 0°, at the top, is where this recording begins, and differs in others."
 
 
 def ring_picture(analysis: Analysis, picture: VerdictPicture) -> Picture:
@@ -624,11 +622,11 @@ def ring_picture(analysis: Analysis, picture: VerdictPicture) -> Picture:
     teeth = analysis.teeth_on(shaft)
     marks = plot.marks_of(analysis.findings, shaft, teeth)
     seen = f"; marked: {', '.join(mark.label for mark in marks)}" if marks else ""
-    look = "healthy teeth draw an even ring, a damaged one swings out"
+    look = "healthy teeth form an even ring, a damaged one stands out"
     if average.kind == "change":
-        look = "what differs from the reference at the same teeth; a tooth that has changed swings out of the ring"
+        look = "what differs from the reference at the same teeth; a tooth that has changed stands out of the ring"
     elif not teeth:
-        look = "what leaves the ring comes back at that angle every turn"
+        look = "deviations from the ring repeat at that angle in each revolution"
     return Picture.of_svg(
         plot.svg_ring(average, n_teeth=teeth, marks=marks, numbered=analysis.has_mark(shaft)),
         f"{shaft or 'The shaft'}: {look}. {zero_text(analysis, shaft)}",
@@ -638,7 +636,7 @@ def ring_picture(analysis: Analysis, picture: VerdictPicture) -> Picture:
 
 
 def picture_of_verdict(analysis: Analysis) -> Picture | None:
-    """Return the picture that the verdict rests on; see `verdict_picture`."""
+    """Return the picture beside the verdict; see `verdict_picture`."""
     shown = verdict_picture(analysis)
     if shown is None or shown.about == "motion":
         return None
@@ -662,23 +660,23 @@ def write_page(
 ) -> Path:
     """Write the report of one recording: verdict, findings, machine, figures, indicators, provenance.
 
-    The page is one file without scripts; it loads nothing, from nowhere. It appears only when it is complete.
+    The page is one file without scripts or external resources. It appears only when it is complete.
 
     Parameters
     ----------
     analysis : Analysis
     path : str or Path
-        Folders on the way are made.
+        Missing folders are created.
     command : str
-        The command that makes the page again.
+        The command that reproduces the page.
     index : str
         Address of the index page, relative to this one; empty: no link.
     methods : sequence of str or None
-        Further methods that the page shows; None: those that the recording calls for.
+        Further methods to show; None: those that suit the recording.
     mark : str
-        By which a folder of pages knows whose page it is, see `recording_mark`; empty: none.
+        Identifies the recording of a page in a folder, see `recording_mark`; empty: none.
     pdf : bool
-        Write it as PDF beside it as well.
+        Also write it as PDF beside the page.
 
     Returns
     -------
@@ -692,7 +690,7 @@ def write_page(
 
 
 def page_html(analysis: Analysis, *, command: str = "", index: str = "", date: datetime | None = None) -> str:
-    """Return the page that `write_page` writes, with the further methods that the recording calls for."""
+    """Return the HTML of the page that `write_page` writes, with the further methods that suit the recording."""
     return _html(analysis, page_parts(analysis, command=command, date=date), index=index)
 
 
@@ -711,7 +709,7 @@ def _html(analysis: Analysis, parts: dict[str, Any], *, index: str = "", mark: s
 def page_parts(
     analysis: Analysis, *, command: str, date: datetime | None = None, methods: Sequence[str] | None = None
 ) -> dict[str, Any]:
-    """Return what the page says, in HTML as in PDF."""
+    """Return the content of the page for HTML and PDF."""
     recording = analysis.recording
     ordered = sorted(analysis.findings, key=lambda finding: finding.kind not in CLAIMED)
     cards = list(zip(ordered, finding_cards(ordered), strict=True))
@@ -737,15 +735,15 @@ def page_parts(
 
 
 def page_pdf(analysis: Analysis, *, command: str = "", methods: Sequence[str] | None = None) -> bytes:
-    """Return the page of one recording as PDF, with the same content as `page_html` but the table of indicators.
+    """Return the page of one recording as PDF, with the content of `page_html` except the table of indicators.
 
     Parameters
     ----------
     analysis : Analysis
     command : str
-        The command that makes the page again.
+        The command that reproduces the page.
     methods : sequence of str or None
-        Further methods that the page shows; None: those that the recording calls for.
+        Further methods to show; None: those that suit the recording.
 
     Raises
     ------

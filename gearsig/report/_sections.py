@@ -40,7 +40,7 @@ Rows = tuple[tuple[str, str], ...]
 
 @dataclass(frozen=True)
 class FindingCard:
-    """A finding as the page shows it."""
+    """A finding, as shown on the page."""
 
     kind: str
     css_class: str
@@ -57,7 +57,7 @@ class FindingCard:
 
 
 def finding_card(finding: Finding) -> FindingCard:
-    """Put a finding into words."""
+    """Return a finding as texts."""
     return FindingCard(
         finding.kind.value,
         css_class(finding.kind),
@@ -75,7 +75,7 @@ def finding_card(finding: Finding) -> FindingCard:
 
 
 def finding_cards(findings: Sequence[Finding]) -> tuple[FindingCard, ...]:
-    """Put findings into words; what would make several of them surer is said of the first."""
+    """Return findings as texts; a remedy common to several is given for the first only."""
     stated: set[str] = set()
     cards = []
     for finding in findings:
@@ -86,12 +86,12 @@ def finding_cards(findings: Sequence[Finding]) -> tuple[FindingCard, ...]:
 
 
 def is_confidence_stated(finding: Finding) -> bool:
-    """Whether a finding's confidence is more than that of a plain statement."""
+    """Whether a finding has a confidence, unlike a plain statement."""
     return finding.is_claim or finding.confidence < 1.0
 
 
 def sureness_text(finding: Finding) -> str:
-    """Return how sure a finding is at most, and what that rests on."""
+    """Return the maximum confidence of a finding, and its basis."""
     basis = finding.confidence_basis
     if not basis or basis.startswith("at most") or not is_confidence_stated(finding):
         return basis
@@ -99,17 +99,17 @@ def sureness_text(finding: Finding) -> str:
 
 
 def sure_of(finding: Finding) -> str:
-    """Return what a claim is sure of where that need not be a fault; empty for one that names its cause."""
+    """Return what a claim's confidence refers to if that need not be a fault; empty if it names its cause."""
     return {"non-synchronous-impacts": "impacts", CHANGED: "a change"}.get(finding.code, "")
 
 
 def css_class(kind: Kind | Outcome) -> str:
-    """Return the style class of a kind or an outcome: its value without spaces."""
+    """Return the CSS class of a kind or an outcome: its value with spaces replaced."""
     return str(kind.value).replace(" ", "-")
 
 
 def where_texts(where: Where) -> tuple[str, ...]:
-    """Return the place of a finding, one text per part of it."""
+    """Return the parts of a finding's place, one text each."""
     texts = [
         ("channel " if len(where.channels) == 1 else "channels ") + ", ".join(where.channels) if where.channels else "",
         gear_text(where.gear) if where.gear else named("shaft", where.shaft),
@@ -123,7 +123,7 @@ def where_texts(where: Where) -> tuple[str, ...]:
 
 
 def gear_text(gear: str) -> str:
-    """Name a gear, which is a pair and a shaft, or a pair of gears."""
+    """Return the name of a gear (a pair and a shaft), or of a pair of gears."""
     return named("gear" if "/" in gear else "gear pair", gear)
 
 
@@ -141,7 +141,7 @@ def _order_text(where: Where) -> str:
 
 
 def strength_text(strength: Strength | None) -> str:
-    """Return the size of a finding against its floor, in words; only a channel's unit may not be known."""
+    """Return the size of a finding and its floor as text; only the unit of a channel may be unknown."""
     if strength is None:
         return ""
     unit = f" {unit_text(strength.unit)}" if strength.unit else ""
@@ -152,7 +152,7 @@ def strength_text(strength: Strength | None) -> str:
 
 
 def _floor_percent(strength: Strength | None) -> float | None:
-    """Return where the floor lies on a bar whose full length is the larger of value and floor; None without a bar."""
+    """Return the position of the floor on a bar as long as the larger of value and floor; None without a bar."""
     if strength is None or strength.ratio_db is None or not 0 < strength.floor < strength.value < float("inf"):
         return None
     return round(100 * strength.floor / strength.value, 1)
@@ -160,7 +160,7 @@ def _floor_percent(strength: Strength | None) -> float | None:
 
 @dataclass(frozen=True)
 class ChangeRow:
-    """A level that changed since the reference, as a bar; its channel is named where several have changed."""
+    """A level that changed since the reference, as a bar; the channel is named if several have changed."""
 
     label: str
     change_db: float
@@ -185,7 +185,7 @@ def change_rows(analysis: Analysis) -> tuple[ChangeRow, ...]:
 
 
 def _label_of(change: LevelChange, among: Sequence[LevelChange]) -> str:
-    """Name a level, with its channel where the levels are of several."""
+    """Return the name of a level, with its channel if there are several."""
     several = len({c.where.channels for c in among}) > 1
     return f"{change.label}, {', '.join(change.where.channels)}" if several else change.label
 
@@ -194,13 +194,13 @@ LONGEST_HEADLINE = 120
 
 
 def headline_of(analysis: Analysis, *, with_remedy: bool = False) -> tuple[str, str]:
-    """Return what the verdict comes to, and what else it says; what has changed is left to `change_rows`.
+    """Return the headline of the verdict, and the rest of it, without the changes that `change_rows` lists.
 
     Parameters
     ----------
     analysis : Analysis
     with_remedy : bool
-        Whether to say what would make it surer too, where the first finding's card, which stands below, says it.
+        Whether to include the remedy even if the first finding's card below contains it.
     """
     changed = next((f.title for f in analysis.findings if f.code == CHANGED), "")
     verdict = analysis.verdict.removeprefix(changed).strip() or analysis.verdict
@@ -213,7 +213,7 @@ def headline_of(analysis: Analysis, *, with_remedy: bool = False) -> tuple[str, 
 
 
 def split_verdict(verdict: str) -> tuple[str, str]:
-    """Split a long verdict after its first sentence and how sure it is; a short one stays whole.
+    """Split a long verdict after its first sentence with confidence; a short one is not split.
 
     Examples
     --------
@@ -229,7 +229,7 @@ def split_verdict(verdict: str) -> tuple[str, str]:
 
 
 def speed_rows(angle: ShaftAngle | CannotTell) -> Rows:
-    """Return what is known of the speed, or why it is not."""
+    """Return facts on the speed, or why it is not known."""
     if isinstance(angle, CannotTell):
         rows = [("speed", f"not known: {angle.reason}"), ("what would give it", angle.remedy)]
         return tuple((name, text) for name, text in rows if text)
@@ -251,7 +251,7 @@ def speed_rows(angle: ShaftAngle | CannotTell) -> Rows:
 
 
 def provenance_rows(analysis: Analysis, command: str, date: datetime | None = None) -> Rows:
-    """Return everything needed to make the page again."""
+    """Return all facts needed to reproduce the page."""
     recording = analysis.recording
     origin = recording.provenance
     rows = [
@@ -267,7 +267,7 @@ def provenance_rows(analysis: Analysis, command: str, date: datetime | None = No
 
 
 def made_rows(command: str, date: datetime | None = None) -> Rows:
-    """Return what a page was made with, and when; None: now."""
+    """Return with what versions and when a page was made (None: now)."""
     versions = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy"))
     return (
         ("versions", f"gearsig {__version__}, {versions}, Python {platform.python_version()}"),
@@ -284,7 +284,7 @@ _SETTINGS = {
     "highest_modulation_order": "modulations up to {:.10g} cycles per revolution of the fastest shaft",
     "seed": "seed of the random numbers {:.10g}",
 }
-"""What the settings of an analysis are called; shares are said in percent."""
+"""Names of an analysis's settings; fractions are given in percent."""
 _SHARES = ("false_alarm_probability", "bearing_slip")
 
 
@@ -303,9 +303,9 @@ def setting_text(name: str, value: str | float | int | None) -> str:
 
 
 def reference_text(reference: Analysis | None) -> str:
-    """Return which recording was compared with, and what it gives a suspicion of; empty without one.
+    """Return the name of the reference, and any suspicion in it; empty without one.
 
-    Of a fault of the reference the verdict tells.
+    The verdict reports a fault of the reference.
     """
     if reference is None:
         return ""
@@ -316,7 +316,7 @@ def reference_text(reference: Analysis | None) -> str:
 
 
 def truth_rows(truth: Mapping[str, object] | None) -> Rows:
-    """Return what a simulator put in, for simulated recordings."""
+    """Return the simulator's input, for simulated recordings."""
     return tuple((name, str(value)[:200]) for name, value in (truth or {}).items())
 
 
@@ -327,9 +327,9 @@ Compared = tuple[Indicator, IndicatorChange | None]
 def indicator_tables(
     indicators: Sequence[Indicator], then: Sequence[IndicatorChange | None]
 ) -> list[dict[str, object]]:
-    """Return a table for each gear, bearing and shaft, and for the channels as a whole.
+    """Return a table of indicators for each gear, bearing and shaft, and for the channels as a whole.
 
-    Each row compares the channels, and these with the reference.
+    Each row compares channels with each other and with the reference.
     """
     places: dict[str, list[Compared]] = {}
     for indicator, change in zip(indicators, then, strict=True):
@@ -383,7 +383,7 @@ def _reference_text(change: IndicatorChange | None) -> str:
 
 WIDTH = 100
 _SHORT = (Kind.NOTICE, Kind.INFORMATION)
-"""Kinds that get their evidence only in the report."""
+"""Kinds whose evidence is shown only in the report."""
 
 
 def analysis_text(analysis: Analysis, *, with_indicators: bool = False) -> str:
@@ -417,7 +417,7 @@ def _finding_lines(number: int, finding: Finding, *, says_surer: bool) -> list[s
     if finding.strength is not None:
         lines.append(_paragraph(f"how strong: {strength_text(finding.strength)}"))
     if finding.kind in _SHORT:
-        # How the speed was found, and what was repaired on the way, is worth a line of its own.
+        # The source of the speed, and any repairs, get a separate line.
         return lines + [_paragraph(text) for text in finding.evidence if finding.code == "speed"]
     if finding.confidence_basis:
         lines.append(_paragraph(f"how sure: {sureness_text(finding)}"))
@@ -449,7 +449,7 @@ def _change_text(change: IndicatorChange | None) -> str:
 
 
 def long_analysis_text(analysis: LongAnalysis, *, with_indicators: bool = False) -> str:
-    """Return the verdict, the levels over time, and what each part shows."""
+    """Return the verdict, the levels over time, and the analysis of each part as plain text."""
     overview = analysis.overview
     lines = [analysis.verdict, "", f"{analysis.name}: {analysis.duration_s:.5g} s, in intervals of a second:"]
     for i, (name, unit) in enumerate(zip(overview.channel_names, overview.units, strict=True)):

@@ -1,4 +1,4 @@
-"""Rolling bearings: geometry, the orders that follow from it, and the catalogue by which they are known by name."""
+"""Rolling bearings: geometry, the orders that follow from it, and a catalogue to look them up by name."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from gearsig.checks import check_texts, count, positive, within
 from gearsig.errors import InputError
 
 _MAKERS = re.compile(r"^(?:SKF|FAG|INA|NSK|NTN|SNR|NACHI|KOYO|JTEKT|NKE|TIMKEN|FAFNIR|ZVL|ZKL|C&U|HRB|RHP|FBJ)")
-# Seals, shields, cages, clearance, tolerance and grease: none of them touches the rolling elements.
+# Seals, shields, cages, clearance, tolerance and grease: none affects the geometry of the rolling elements.
 _SUFFIX = re.compile(
     r"(?:[-/]*(?:2?RS(?:R|H|1|2|L|H2)?|2?ZR?|ZZ[12]?|DDU|DD|LL[UBHM]|VV|2?NS[EL]|N|NR|TN9?|TNH?|TVH|MA?|J|"
     r"C[1-5N]|CM|P[2456]3?|W\d+|HT|GJN|JEM))*"
@@ -32,7 +32,7 @@ _OTHER_NAMES = (
 
 @dataclass(frozen=True)
 class CatalogueBearing:
-    """Geometry of a bearing as it is published.
+    """Published geometry of a bearing.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class CatalogueBearing:
     rolling_element_diameter_mm, pitch_diameter_mm : float
     contact_angle_deg : float
     source : str
-        Key of a source in the head of `bearings.csv`.
+        Key of a source listed at the top of `bearings.csv`.
     """
 
     name: str
@@ -54,13 +54,13 @@ class CatalogueBearing:
 
 @cache
 def bearing_catalogue() -> Mapping[str, CatalogueBearing]:
-    """Return the bearings whose geometry is known, by name.
+    """Return the bearings of known geometry, by name.
 
     Deep groove ball bearings of the series 60, 62, 63, 64, 160, 68 (618) and 69 (619), angular contact ball bearings
     72 and 73 (A: 30°, B: 40°, C: 15°), 52 and 53, self-aligning ball bearings, inserts, and bearings of public test
-    rigs. Most geometry is computed from published ratings; makers change numbers and sizes of balls, and where ratings
-    differ the name is listed by maker only. Of roller bearings the ratings do not tell the number of rollers. Orders
-    that matter come from the maker of the bearing that is in the machine.
+    rigs. Most geometry is computed from published ratings. Makers change the number and size of balls; where their
+    ratings differ, the name is listed by maker only. For roller bearings the ratings do not determine the number of
+    rollers. Where the orders matter, take them from the maker of the bearing fitted.
     """
     text = files("gearsig.rig").joinpath("bearings.csv").read_text(encoding="utf-8")
     rows = csv.DictReader(line for line in text.splitlines() if not line.startswith("#"))
@@ -79,9 +79,9 @@ def bearing_catalogue() -> Mapping[str, CatalogueBearing]:
 
 
 def catalogue_bearing(name: str) -> CatalogueBearing:
-    """Return a bearing of the catalogue.
+    """Look up a bearing in the catalogue.
 
-    Seals, shields, cage, clearance and, where makers agree, the maker do not matter.
+    Suffixes for seals, shields, cage and clearance are ignored, and so is the maker where makers agree.
 
     Examples
     --------
@@ -91,7 +91,7 @@ def catalogue_bearing(name: str) -> CatalogueBearing:
     Raises
     ------
     InputError
-        If the name is not in the catalogue, or names bearings that makers build with different numbers of balls.
+        If the name is not in the catalogue, or makers build that bearing with different numbers of balls.
     """
     known = {bearing.name.replace(" ", ""): bearing for bearing in bearing_catalogue().values()}
     full = re.sub(r"\s+", "", name.upper())
@@ -129,11 +129,11 @@ def catalogue_bearing(name: str) -> CatalogueBearing:
 
 @dataclass(frozen=True)
 class Bearing:
-    """A rolling-element bearing with a turning inner ring and a standing outer ring.
+    """A rolling-element bearing with a rotating inner ring and a stationary outer ring.
 
-    Give the name of one that the catalogue knows (`bearing = "6205"`), the geometry (`n_rolling_elements`, both
-    diameters, contact angle) or the orders from its maker; orders win over a geometry, and a geometry over that of the
-    name. Orders are cycles per revolution of the bearing's own shaft.
+    Give a catalogue name (`bearing = "6205"`), the geometry (`n_rolling_elements`, both diameters, contact angle) or
+    the orders from its maker. Orders take precedence over the geometry, and the geometry over the name. Orders are
+    cycles per revolution of the bearing's own shaft.
     """
 
     name: str
@@ -176,11 +176,11 @@ class Bearing:
                 positive(value, f"{key} {where}")
 
     def orders(self) -> dict[str, float]:
-        """Return the orders that are known, by name: BPFO, BPFI, BSF, FTF.
+        """Return the known orders by name: BPFO, BPFI, BSF, FTF.
 
         With n elements of diameter d on pitch diameter D and contact angle a, and g = d cos(a)/D:
         BPFO = n(1 - g)/2, BPFI = n(1 + g)/2, BSF = (D/2d)(1 - g²), FTF = (1 - g)/2.
-        BSF is the rolling element's spin; a defect on it strikes both races: twice per spin.
+        BSF is the rolling element's spin order; a defect on it strikes both races, so twice per spin.
 
         Source: T. A. Harris, *Rolling Bearing Analysis*, 4th ed., ch. 2 (kinematics without slip).
         """

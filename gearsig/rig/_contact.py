@@ -1,4 +1,4 @@
-"""How two gears touch: stiffness, damping, backlash and friction of the flanks, inertias behind them."""
+"""Contact of two gears: stiffness, damping, backlash and friction of the flanks, and the inertias behind them."""
 
 from __future__ import annotations
 
@@ -11,16 +11,15 @@ from gearsig.checks import FloatArray, not_negative, one_of, positive, within
 from gearsig.errors import InputError
 
 DAMPING_LAWS = ("flores", "lankarani", "hunt-crossley")
-"""Damping of an impact from its restitution; see `damping_ratio_s_per_m`."""
+"""Laws for impact damping from the restitution; see `damping_ratio_s_per_m`."""
 
 
 @dataclass(frozen=True)
 class ToothContact:
-    """The contact of one gear pair, on both flanks, and what turns with either gear.
+    """The contact of one gear pair, on both flanks, and the inertias that turn with each gear.
 
-    One tooth pair at depth g and closing speed ġ carries F = k g^λ (1 + β ġ) ≥ 0, with β from the restitution and from
-    the speed v at which the flanks met (`damping_ratio_s_per_m`). g = |q| − a, with q = r_b1 θ1 − r_b2 θ2 − q₀ and half
-    backlash a.
+    One tooth pair at depth g and approach speed ġ carries F = k g^λ (1 + β ġ) ≥ 0, with β from the restitution and the
+    impact speed v (`damping_ratio_s_per_m`). g = |q| − a, with q = r_b1 θ1 − r_b2 θ2 − q₀ and half backlash a.
 
     Parameters
     ----------
@@ -29,35 +28,35 @@ class ToothContact:
     stiffness_n_per_m_lambda : float
         k in N/m^λ, of one tooth pair; above 0.
     exponent : float
-        λ, 1 to 2; 1.5 of a Hertzian point contact.
+        λ, 1 to 2; 1.5 for a Hertzian point contact.
     half_backlash_um : float
-        a along the line of action: half of the play from flank to flank.
+        a, along the line of action: half the play from flank to flank.
     restitution : float
-        e, above 0 to 1: speed after a free impact over speed before.
+        e, above 0 to 1: speed after a free impact divided by the speed before.
     damping_law : str
         One of `DAMPING_LAWS`.
     impact_speed_floor_mps : float
-        Least v: a contact that closes slower is damped like one that closes at this speed. Above 0.
+        Minimum v: a slower impact is damped like one at this speed. Above 0.
     friction_coefficient : float
         μ of the flanks, 0 to 1.
     driver_inertia_kg_m2 : float
-        What turns between torque sensor and teeth. 0: nothing but the teeth.
+        Inertia between torque sensor and teeth. 0: nothing but the teeth.
     driven_inertia_kg_m2 : float or None
         The driven gear with its load; None: not known.
     motor_inertia_kg_m2 : float
-        Ahead of the torque sensor and rigidly coupled: it takes part in impacts.
+        Upstream of the torque sensor and rigidly coupled, so that it takes part in impacts.
     mesh_phase : float
-        Driver's angle in tooth pitches at which a pair enters on the drive flank, 0 to 1.
+        Driver angle in tooth pitches at which a pair enters contact on the drive flank, 0 to 1.
     contact_ratio : float or None
         1 to 2; None: that of standard teeth (addendum of one module).
     mesh_ramp : float
-        Base pitches over which a pair takes up its stiffness and gives it back, centred on the ideal entry and exit, 0
-        to 0.2: corner contact and tip relief spread the change between one and two pairs. 0: at once.
+        Base pitches over which a pair's stiffness builds up and decays, centred on the ideal entry and exit, 0 to 0.2:
+        corner contact and tip relief spread the change between one and two pairs. 0: a step.
 
     Raises
     ------
     InputError
-        If a value is out of its range: a negative inertia, a restitution above 1.
+        If a value is out of range, such as a negative inertia or a restitution above 1.
     """
 
     stiffness_n_per_m_lambda: float
@@ -93,18 +92,18 @@ class ToothContact:
         within(self.mesh_ramp, "mesh_ramp", 0.0, 0.2, "base pitches")
 
     def damping_ratio_at(self, impact_speed_mps: float) -> float:
-        """β = b/k in s/m of a contact whose flanks met at that speed, the floor at least."""
+        """β = b/k in s/m for an impact at that speed, or at `impact_speed_floor_mps` if that is higher."""
         speed = max(abs(impact_speed_mps), self.impact_speed_floor_mps)
         return damping_ratio_s_per_m(self.damping_law, self.restitution, speed)
 
 
 def damping_ratio_s_per_m(law: str, restitution: float, impact_speed_mps: float) -> float:
-    """Return β = b/k, by which the damping b g^λ ġ of a contact grows with its stiffness k g^λ.
+    """Return β = b/k in s/m, which relates the damping force b g^λ ġ of a contact to its stiffness force k g^λ.
 
     flores: 8(1 − e)/(5 e v); lankarani: 3(1 − e²)/(4 v); hunt-crossley: 3(1 − e)/(2 v).
 
-    None gives back the wanted e exactly: βv − ln(1 + βv) = −βv' − ln(1 − βv') ties the speed v' after a free impact to
-    v, whatever stiffness, exponent and mass. Wanted e = 0.5 comes out as 0.470, 0.725 and 0.663.
+    None reproduces the given e exactly: βv − ln(1 + βv) = −βv' − ln(1 − βv') relates the speed v' after a free impact
+    to v, for any stiffness, exponent and mass. For e = 0.5 the three laws result in 0.470, 0.725 and 0.663.
 
     Parameters
     ----------
@@ -113,7 +112,7 @@ def damping_ratio_s_per_m(law: str, restitution: float, impact_speed_mps: float)
     restitution : float
         e, above 0 to 1.
     impact_speed_mps : float
-        v, above 0: with v → 0 the damping grows without bound.
+        v, above 0: the damping grows without bound as v → 0.
 
     Notes
     -----
@@ -141,7 +140,7 @@ def hertz_stiffness_n_per_m1p5(
     youngs_modulus_pa: float = 210e9,
     poisson_ratio: float = 0.3,
 ) -> float:
-    """Return the stiffness of a point contact at the pitch point, k = 4/3 √ρ E*, both gears of one material.
+    """Return the stiffness of a Hertzian point contact at the pitch point, k = 4/3 √ρ E*, for gears of one material.
 
     ρ = u d1 sin α/(2(1 + u)) is the reduced radius of curvature at the pitch point, 1/E* = 2(1 − ν²)/E.
 
@@ -150,7 +149,7 @@ def hertz_stiffness_n_per_m1p5(
     ratio : float
         u = z2/z1.
     reference_radius_m : float
-        Of the driver's reference circle, d1/2.
+        Driver's reference radius, d1/2.
     pressure_angle_rad : float
     youngs_modulus_pa, poisson_ratio : float
 
@@ -175,17 +174,17 @@ def hertz_stiffness_n_per_m1p5(
 
 
 # --------------------
-# Which tooth pairs touch at an angle of the driver, forwards, backwards and on the back flank.
+# Which tooth pairs are in contact at a driver angle, forwards, backwards and on the back flank.
 # --------------------
 
 
 @dataclass(frozen=True)
 class PathOfContact:
-    """The path of contact of a spur pair in numbers.
+    """The path of contact of a spur gear pair.
 
-    Tooth pair j lies at p = z1 θ1/2π − phase − j base pitches behind its entry and touches for 0 ≤ p ≤ ε, at ρ1 = ρ1A +
-    p·p_b from the driver's base tangent point. A rotation alone decides: the count holds forwards and backwards alike.
-    On the back flank the path is mirrored, half a pitch away from where the drive flank passes the pitch point:
+    Tooth pair j is p = z1 θ1/2π − phase − j base pitches past its entry and in contact for 0 ≤ p ≤ ε, at ρ1 = ρ1A +
+    p·p_b from the driver's base tangent point. The position depends on the angle alone, forwards and backwards alike.
+    On the back flank the path is mirrored, half a pitch from where the drive flank passes the pitch point:
     p' = −(z1 θ1/2π − phase) + 2 p_C + ½.
 
     Parameters
@@ -197,13 +196,13 @@ class PathOfContact:
         ε, 1 to 2.
     base_pitch_m : float
     start_m : float
-        ρ1A, where a pair enters.
+        ρ1A, where a pair enters contact.
     length_m : float
         a sin α = ρ1 + ρ2.
     phase : float
-        Driver's angle in pitches at which a pair enters on the drive flank.
+        Driver angle in pitches at which a pair enters contact on the drive flank.
     ramp : float
-        Base pitches over which a pair takes up its stiffness, and gives it back.
+        Base pitches over which a pair's stiffness builds up and decays.
     """
 
     teeth: tuple[int, int]
@@ -222,7 +221,7 @@ class PathOfContact:
         return (self.length_m * r1 / (r1 + r2) - self.start_m) / self.base_pitch_m
 
     def position(self, driver_angle_rad: FloatArray, flank: FloatArray | float = 1.0) -> FloatArray:
-        """Position of the younger pair behind its entry, 0 to 1 base pitch; the older one is one further.
+        """Position of the newer pair past its entry, 0 to 1 base pitch; the older one is one pitch further.
 
         Parameters
         ----------
@@ -237,10 +236,10 @@ class PathOfContact:
     def pairs(
         self, driver_angle_rad: FloatArray, flank: FloatArray | float = 1.0
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the pairs that may touch: positions behind entry, weights, and dweight/dposition, each (4, ...).
+        """Return the pairs that may touch: positions past entry, weights, and dweight/dposition, each (4, ...).
 
-        A pair's weight is the part of its stiffness that it has: s((p + r/2)/r) · s((ε − p + r/2)/r) with the ramp r
-        and s(x) = x³(10 − 15x + 6x²), which is 0 below 0 and 1 above 1.
+        A pair's weight is the active fraction of its stiffness, s((p + r/2)/r) · s((ε − p + r/2)/r), with the ramp r
+        and s(x) = x³(10 − 15x + 6x²), clamped to 0 below x = 0 and to 1 above x = 1.
         """
         u = self.position(driver_angle_rad, flank)
         p = u + np.arange(-1.0, 3.0).reshape(-1, *([1] * u.ndim))
@@ -251,21 +250,21 @@ class PathOfContact:
         return p, rise * stay, (up * stay - rise * down) / self.ramp
 
     def n_pairs(self, driver_angle_rad: FloatArray, flank: FloatArray | float = 1.0) -> FloatArray:
-        """Pairs in contact: 2 where u < ε − 1, else 1, u = frac(z1 θ1/2π − phase); in between over the ramps."""
+        """Number of pairs in contact: 2 if u = frac(z1 θ1/2π − phase) < ε − 1, else 1; in between on the ramps."""
         return np.asarray(self.pairs(driver_angle_rad, flank)[1].sum(axis=0))
 
     def tooth(self, driver_angle_rad: FloatArray) -> FloatArray:
-        """Tooth of the driver that entered last, from 1, as diagnoses count them."""
+        """Driver tooth that last entered contact, counted from 1 as in diagnoses."""
         x = np.asarray(driver_angle_rad, dtype=np.float64) * self.teeth[0] / (2.0 * pi) - self.phase
         return np.asarray(np.mod(np.floor(x), self.teeth[0]) + 1.0)
 
     def driver_lever_m(self, position: FloatArray) -> FloatArray:
-        """ρ1 of a pair at `position` base pitches behind its entry."""
+        """ρ1 in m of a pair at `position` base pitches past its entry."""
         return np.asarray(self.start_m + np.asarray(position, dtype=np.float64) * self.base_pitch_m)
 
 
 def _smooth_step(x: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Rise from 0 to 1 with two continuous derivatives, and its slope."""
+    """Return a step from 0 to 1 with two continuous derivatives, and its slope."""
     t = np.clip(x, 0.0, 1.0)
     return t**3 * (10.0 + t * (6.0 * t - 15.0)), 30.0 * (t * (1.0 - t)) ** 2
 
@@ -281,12 +280,12 @@ def standard_path(
 ) -> PathOfContact:
     """Return the path of contact of standard teeth: addendum of one module, no shift, reference centre distance.
 
-    ε p_b = √(ra1² − rb1²) + √(ra2² − rb2²) − a sin α. A stated contact ratio shortens or lengthens both ends alike.
+    ε p_b = √(ra1² − rb1²) + √(ra2² − rb2²) − a sin α. A stated contact ratio moves both ends by the same amount.
 
     Raises
     ------
     InputError
-        If the teeth interfere, or the contact ratio is not 1 to 2.
+        If the teeth interfere, or the contact ratio is not between 1 and 2.
 
     Examples
     --------

@@ -19,11 +19,11 @@ class OrderLine:
     Parameters
     ----------
     order : float
-        Cycles per revolution of the shaft that was asked for.
+        Cycles per revolution of the requested shaft.
     kind : str
         "shaft", "mesh", "sideband", "hunting" or "bearing".
     label : str
-        As shown in tables and at cursors, e.g. "2× mesh stage 1".
+        As shown in tables and plots, e.g. "2× mesh stage 1".
     element : str
         Name of the shaft, pair or bearing it belongs to.
     harmonic : int
@@ -43,7 +43,7 @@ class OrderLine:
 def order_lines(
     rig: Rig, shaft: str = "", *, n_mesh_harmonics: int = 3, n_shaft_harmonics: int = 3, n_sidebands: int = 2
 ) -> tuple[OrderLine, ...]:
-    """Return all lines that follow from what is known of `rig`, by rising order.
+    """Return all lines that follow from what is known of `rig`, in ascending order.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def order_lines(
     shaft : str
         Orders are cycles per revolution of this shaft; default: the rig's reference shaft.
     n_mesh_harmonics, n_shaft_harmonics, n_sidebands : int
-        How many of each; sidebands are counted on either side of each mesh harmonic and for each of the two shafts.
+        Number of each; sidebands are counted on each side of a mesh harmonic and for each of the two shafts.
 
     Returns
     -------
@@ -139,7 +139,7 @@ def describe_rig(rig: Rig) -> str:
             hertz = f"{line.order * speed / 60:12.3f} Hz" if speed else ""
             lines.append(f"  {line.order:12.5f} {hertz}  {line.kind:<9} {line.label}")
     if rig.assumed:
-        lines += ["", "Assumed, not known: " + ", ".join(rig.assumed) + ". What rests on it is worth less."]
+        lines += ["", "Assumed, not known: " + ", ".join(rig.assumed) + ". Results that rest on it are less certain."]
     missing = _missing(rig)
     if missing:
         lines += ["", "Not given:", *(f"  - {text}" for text in missing)]
@@ -150,7 +150,7 @@ def _shaft_text(rig: Rig) -> list[str]:
     lines = ["", "Shafts"] if rig.shafts else ["", "No shafts: only spectra over frequency are possible."]
     for name in rig.shaft_names:
         ratio, speed = rig.ratio(name), rig.nominal_speed_rpm(name)
-        text = f"order {ratio:.6g}" if ratio is not None else "order not known: a tooth count on the way is missing"
+        text = f"order {ratio:.6g}" if ratio is not None else "order not known: a tooth count on the path is missing"
         lines.append(f"  {name}: {text}" + (f", {speed:.6g} rpm" if speed else ""))
     return lines
 
@@ -178,7 +178,7 @@ def _bearing_text(rig: Rig) -> list[str]:
 
 
 def _contact_text(rig: Rig) -> list[str]:
-    """Return how the teeth touch, with what follows from it, where the rig says so."""
+    """Describe the tooth contact and the resulting path of contact, if the rig has one."""
     contact = rig.contact
     if contact is None:
         return []
@@ -203,7 +203,7 @@ def _missing(rig: Rig) -> list[str]:
     if not rig.bearings:
         texts.append("bearings: a bearing can only be suspected, not named by race")
     if rig.speed_source is None and not rig.pairs:
-        texts.append("a speed source, [speed]: without gears nothing tells the speed, and there are no orders")
+        texts.append("a speed source, [speed]: without gears the speed cannot be found, and there are no orders")
     elif rig.operating_point.speed_rpm is None and rig.speed is None:
         texts.append("a nominal speed or a speed source: the speed must be found from the mesh lines alone")
     return texts

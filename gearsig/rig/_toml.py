@@ -32,9 +32,9 @@ from gearsig.rig._types import (
 
 MAX_TOML_BYTES = 1_000_000
 MAX_TABLES = 1000
-"""A rig file or preset is a page or two of text; anything larger is something else."""
+"""A rig file or preset is a page or two of text; anything larger is not one."""
 
-# Seventeen names with dots between: parsing takes the square of their number. Only a name's beginning is tried.
+# Seventeen dotted names: parsing time grows with the square of their number. Matches start only at a name's beginning.
 _DEEP_KEY = re.compile(r"(?<![\w\"'-])[\w\"'-]++(?:[ \t]*+\.[ \t]*+[\w\"'-]++){16}")
 
 _LISTS = {"shaft": Shaft, "pair": GearPair, "bearing": Bearing, "sensor": Sensor}
@@ -53,26 +53,26 @@ def read_rig(path: str | Path) -> Rig:
     Parameters
     ----------
     path : str or Path
-        A TOML file; the README lists its tables and keys. Where no [[shaft]] is given, the pairs name the shafts;
-        pairs without a name are "stage 1", "stage 2", … in their order.
+        A TOML file; the README lists its tables and keys. Without [[shaft]] tables, the pairs name the shafts. Pairs
+        without a name are called "stage 1", "stage 2", … in order.
 
     Raises
     ------
     InputError
-        If the file cannot be read, is not TOML, holds a key that does not exist (with the closest that does) or a value
-        that does not fit; it names the file, the table and the key.
+        If the file cannot be read, is not TOML, or has an unknown key or an unsuitable value. The error names the
+        file, table and key, and the closest known key.
     """
     path = Path(path)
     return rig_from_dict(read_toml(path, remedy="`gearsig rig example` prints one to start from"), where=path.name)
 
 
 def read_toml(path: Path, *, remedy: str = "") -> dict[str, Any]:
-    """Return the tables of a TOML file that may come from anybody.
+    """Return the tables of a TOML file from an untrusted source.
 
     Raises
     ------
     InputError
-        If it cannot be read, is longer than 1 MB, nested too deep, or not valid TOML in UTF-8.
+        If it cannot be read, is longer than 1 MB, is nested too deeply, or is not valid TOML in UTF-8.
     """
     try:
         with path.open("rb") as file:
@@ -88,12 +88,12 @@ def read_toml(path: Path, *, remedy: str = "") -> dict[str, Any]:
 
 
 def parse_toml(text: str, where: str, *, remedy: str = "") -> dict[str, Any]:
-    """Return the tables of a text in TOML that may come from anybody.
+    """Return the tables of a TOML text from an untrusted source.
 
     Raises
     ------
     InputError
-        If it is nested too deep, or not valid TOML.
+        If it is nested too deeply or is not valid TOML.
     """
     deep = _DEEP_KEY.search(text)
     if deep is not None:
@@ -106,19 +106,19 @@ def parse_toml(text: str, where: str, *, remedy: str = "") -> dict[str, Any]:
 
 
 def rig_file_beside(recording: str | Path) -> Path | None:
-    """Return the rig file of the same name beside a recording (`x.csv.gz`: `x.toml`), None if there is none."""
+    """Return the rig file of the same name beside a recording (`x.toml` for `x.csv.gz`); None if there is none."""
     path = Path(recording)
     if not path.name:
         return None
     rig_file = path.with_name(f"{recording_stem(path.name)}.toml")
     try:
         return rig_file if rig_file.is_file() else None
-    except (OSError, ValueError):  # the name is too long, or no name
+    except (OSError, ValueError):  # the name is too long or not a valid one
         return None
 
 
 def recording_stem(name: str) -> str:
-    """Return a file's name without its type.
+    """Return a file's name without its extension.
 
     Examples
     --------
@@ -129,7 +129,7 @@ def recording_stem(name: str) -> str:
 
 
 def rig_from_dict(data: dict[str, Any], where: str = "rig") -> Rig:
-    """Build a rig from the tables of a rig file (or of any mapping of the same shape)."""
+    """Build a rig from the tables of a rig file, or from any mapping of the same structure."""
     allowed = (*_LISTS, *_PLAIN, "operating_point", "speed", "contact", "machine")
     for key in data:
         known_name(key, allowed, f"there is no {key!r}", where=where)
@@ -157,7 +157,7 @@ def rig_from_dict(data: dict[str, Any], where: str = "rig") -> Rig:
 
 
 def rig_to_dict(rig: Rig) -> dict[str, Any]:
-    """Return tables that `rig_from_dict` reads back to the same rig; pulse times are left out: a record's own."""
+    """Return tables from which `rig_from_dict` builds the same rig, without pulse times: they belong to a record."""
     data: dict[str, Any] = {key: value for key in _PLAIN if (value := _plain(getattr(rig, key)))}
     for name in _LISTS:
         items = [to_table(item) for item in getattr(rig, name + "s")]
@@ -176,7 +176,7 @@ def rig_to_dict(rig: Rig) -> dict[str, Any]:
 
 
 def write_rig(rig: Rig, path: str | Path) -> None:
-    """Write `rig` as a rig file that `read_rig` reads back to the same rig."""
+    """Write `rig` as a rig file from which `read_rig` restores it."""
     import tomli_w
 
     text = tomli_w.dumps(rig_to_dict(rig))
@@ -208,7 +208,7 @@ def _speed(table: Any, where: str, nominal: OperatingPoint | None) -> SpeedSourc
 
 
 def from_table(kind: type, table: Any, where: str, **ready: Any) -> Any:
-    """Make one dataclass from a TOML table after checking its keys and the types of its values; `where` names it."""
+    """Build a dataclass from a TOML table, checking keys and types; `where` names the table in errors."""
     if not isinstance(table, dict):
         raise InputError("is not a table", where=where, allowed="key = value lines")
     known = {f.name: f for f in fields(kind)}
@@ -231,7 +231,7 @@ def from_table(kind: type, table: Any, where: str, **ready: Any) -> Any:
 
 
 def _elsewhere(key: str) -> str:
-    """Say in which other tables of a rig file a key belongs; nothing where in none."""
+    """Say in which other tables of a rig file a key belongs; empty if in none."""
     tables = {f"[[{name}]]": kind for name, kind in _LISTS.items()}
     tables |= {"[operating_point]": OperatingPoint, "[contact]": ToothContact, "[machine]": MachineSize}
     places = [table for table, kind in tables.items() if any(f.name == key for f in fields(kind))]
@@ -239,7 +239,7 @@ def _elsewhere(key: str) -> str:
 
 
 def _typed(value: Any, hint: Any, where: str) -> Any:
-    """Return the value in the type of the field, or say which type is wanted. TOML has no null: None never occurs."""
+    """Convert a value to its field's type, or say which type is expected. TOML has no null, so None never occurs."""
     types = [t for t in get_args(hint) if t is not NoneType] if isinstance(hint, UnionType) else [hint]
     kind = types[0]
     if kind is float and isinstance(value, (int, float)) and not isinstance(value, bool):
@@ -260,19 +260,19 @@ def _typed(value: Any, hint: Any, where: str) -> Any:
 def _with_implied_shafts(
     shafts: tuple[Shaft, ...], pairs: tuple[GearPair, ...], bearings: tuple[Bearing, ...]
 ) -> tuple[Shaft, ...]:
-    """Add shafts that gear pairs name; where there is no shaft and no pair at all, also those of bearings.
+    """Add shafts that gear pairs name; without any shafts or pairs, those that bearings name.
 
-    A bearing on a shaft that nothing else names is more often a misspelling than a shaft of its own.
+    A shaft that only a bearing names is more likely a misspelling than another shaft.
     """
     names = [n for p in pairs for n in (p.driver, p.driven)] if pairs else [b.shaft for b in bearings if not shafts]
     new = [name for name in dict.fromkeys(names) if name not in {s.name for s in shafts}]
     if shafts and new:
-        return shafts  # some are listed: a name that is not among them is reported by the rig's own check
+        return shafts  # some are listed: the rig's own check reports a name that is missing
     return (*shafts, *(Shaft(name) for name in new))
 
 
 def to_table(item: Any) -> dict[str, Any]:
-    """Return the fields of a dataclass that differ from their defaults: `from_table` reads them back."""
+    """Return the fields of a dataclass that differ from their defaults; `from_table` restores it from them."""
     return {f.name: _plain(v) for f in fields(item) if (v := getattr(item, f.name)) is not None and v != f.default}
 
 

@@ -1,4 +1,4 @@
-"""The machine: shafts, gear pairs, bearings, sensors, operating point. Only what is known need be given."""
+"""The machine: shafts, gear pairs, bearings, sensors, operating point. Give only what is known."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ from gearsig.rig._contact import PathOfContact, ToothContact, standard_path
 
 
 def known_ratio(rig: Rig | None, shaft: str, to: str = "") -> float:
-    """Return revolutions of `shaft` per revolution of `to` (default: the reference shaft), see `Rig.ratio`.
+    """Return revolutions of `shaft` per revolution of `to` (default: the reference shaft); see `Rig.ratio`.
 
     Raises
     ------
     RefusalError
-        If the teeth on the way, or the whole rig, are not known.
+        If tooth counts between the two shafts, or the whole rig, are not known.
     """
     ratio = None if rig is None else rig.ratio(shaft, to=to)
     if ratio is None:
@@ -50,13 +50,13 @@ def known_ratio(rig: Rig | None, shaft: str, to: str = "") -> float:
 def shaft_ratios(rig: Rig) -> dict[str, float]:
     """Return revolutions of each shaft per revolution of the reference shaft.
 
-    A shaft that cannot be reached because a tooth count is missing is left out. Exact fractions are carried through the
-    train, so that a loop of pairs is checked without rounding.
+    Shafts that cannot be reached because a tooth count is missing are left out. Ratios are exact fractions along the
+    gear train, so closed loops of pairs are checked without rounding.
 
     Raises
     ------
     InputError
-        If the pairs fall into parts that share no shaft, or a loop of pairs contradicts itself.
+        If the pairs form groups that share no shaft, or a closed loop of pairs contradicts itself.
     """
     if not rig.shafts:
         return {}
@@ -74,7 +74,7 @@ def shaft_ratios(rig: Rig) -> dict[str, float]:
                 where="rig",
                 remedy="use the same shaft name where two gears sit on one shaft, or describe two rigs",
             )
-        # A pair with a known shaft first, so that a chain is followed outwards and a loop is closed last.
+        # Pairs with a known shaft come first: the train is followed outwards and a loop is closed last.
         pair = next((p for p in touching if p.driver in known or p.driven in known), touching[0])
         waiting.remove(pair)
         reached |= {pair.driver, pair.driven}
@@ -126,10 +126,10 @@ class PulseTimes:
     Parameters
     ----------
     times_s : array, (n_pulses,)
-        Checked where they are turned into speed, so that a bad train is reported with its pulses.
+        Validated when they are converted to speed, so that errors can name the pulses at fault.
     pulses_per_revolution : int
     shaft : str
-        Whose angle it is; empty: the reference shaft's.
+        The shaft they are measured on; empty: the reference shaft.
     """
 
     times_s: FloatArray
@@ -151,13 +151,13 @@ class TachometerChannel:
     channel : str
     pulses_per_revolution : int
     threshold : float or None
-        In the channel's unit; None: half way between the low and the high level.
+        In the channel's unit; None: halfway between the low and the high level.
     hysteresis : float or None
         Full width in the channel's unit; None: a quarter of the step from low to high.
     edge : str
         "rising" or "falling".
     shaft : str
-        Whose angle it is; empty: the reference shaft's.
+        The shaft it measures; empty: the reference shaft.
     """
 
     channel: str
@@ -177,7 +177,7 @@ class TachometerChannel:
 
 @dataclass(frozen=True)
 class EncoderChannel:
-    """A channel with the shaft angle, wrapping or running on.
+    """A channel with the shaft angle, either wrapping or continuous.
 
     Parameters
     ----------
@@ -185,9 +185,9 @@ class EncoderChannel:
     units_per_revolution : float
         360 for degrees, 2π for radians, 1 for revolutions, the line count for counts.
     wraps : bool
-        Whether the angle starts again after each revolution.
+        Whether the angle restarts after each revolution.
     shaft : str
-        Whose angle it is; empty: the reference shaft's.
+        The shaft it measures; empty: the reference shaft.
     """
 
     channel: str
@@ -214,11 +214,11 @@ class SpeedChannel:
 
 
 SpeedSource = ConstantSpeed | PulseTimes | TachometerChannel | EncoderChannel | SpeedChannel
-"""Any of the ways to know the speed; None stands for none."""
+"""All kinds of speed source; None means that there is none."""
 
 
 def check_speed_source(value: object, name: str = "speed") -> None:
-    """Raise unless the value is a source of speed or None; say which source is meant by a number, a name or times."""
+    """Raise unless the value is a speed source or None; for a number, a name or times, suggest the source meant."""
     remedy = ""
     if isinstance(value, str):
         remedy = f"a channel is named by gearsig.TachometerChannel({value!r}), SpeedChannel or EncoderChannel"
@@ -276,7 +276,7 @@ class Shaft:
 
 
 SIDES = ("driver", "driven")
-"""Of a pair of gears; by number, 0 and 1."""
+"""The two gears of a pair; index 0 and 1."""
 
 
 @dataclass(frozen=True)
@@ -289,9 +289,9 @@ class GearPair:
     driver, driven : str
         Names of the shafts that carry the gears.
     driver_teeth, driven_teeth : int or None
-        At least 3 where known. The mesh order needs one of them; the driven shaft's order needs both.
+        At least 3. The mesh order needs one of them; the driven shaft's order needs both.
     module_mm, face_width_mm : float or None
-        Above zero where known.
+        Above zero.
     pressure_angle_deg : float or None
         10 to 35.
     """
@@ -320,7 +320,7 @@ class GearPair:
             raise InputError(f"pair {self.name!r} meshes shaft {self.driver!r} with itself", remedy="name two shafts")
 
     def teeth(self, shaft: str) -> int | None:
-        """Teeth of the gear on `shaft`, None if not known."""
+        """Number of teeth of the gear on `shaft`; None if not known."""
         if shaft not in (self.driver, self.driven):
             raise InputError(
                 f"pair {self.name!r} has no gear on shaft {shaft!r}", allowed=f"{self.driver}, {self.driven}"
@@ -332,7 +332,7 @@ class GearPair:
 class Sensor:
     """What a channel of the recordings measures: value = number in the file × scale + offset.
 
-    `wraps` says that an angle starts again after each revolution.
+    `wraps` means that an angle restarts after each revolution.
     """
 
     channel: str
@@ -354,20 +354,20 @@ class Sensor:
 
 
 MOUNTINGS = ("rigid", "flexible")
-"""Of a machine on its foundation, as ISO 20816-3 tells them: rigid where the lowest natural frequency of both together,
-in the direction measured, is a quarter above the main frequency (mostly the speed) or more."""
+"""Machine supports as ISO 20816-3 classifies them: rigid if the lowest natural frequency of machine and foundation
+together, in the direction measured, exceeds the main excitation frequency (usually the speed) by at least 25 %."""
 
 
 @dataclass(frozen=True)
 class MachineSize:
-    """What ISO 20816-3 judges overall vibration by: the machine's size, and how it stands.
+    """The machine's size and support, by which ISO 20816-3 rates its overall vibration.
 
     Parameters
     ----------
     power_kw : float or None
         Rated power.
     shaft_height_mm : float or None
-        Of an electrical machine: from its feet to the middle of its shaft (the 225 of an IEC 225 frame).
+        Of an electrical machine: from its feet to its shaft centreline (225 for an IEC 225 frame).
     mounting : str
         "rigid" or "flexible"; empty: not known.
     """
@@ -385,7 +385,7 @@ class MachineSize:
 
     @property
     def group(self) -> int | None:
-        """Group of ISO 20816-3: 1 above 300 kW or from 315 mm, 2 above 15 kW or from 160 mm, else None."""
+        """ISO 20816-3 group: 1 above 300 kW or from 315 mm, 2 above 15 kW or from 160 mm, else None."""
         for group, power_kw, height_mm in ((1, 300.0, 315.0), (2, 15.0, 160.0)):
             if self.shaft_height_mm is not None and self.shaft_height_mm >= height_mm:
                 return group
@@ -395,14 +395,14 @@ class MachineSize:
 
 
 STATED_SPEED_TOLERANCE_PERCENT = 6.0
-"""How far a stated speed may be off for the lines of a shaft to tell the true one: a small motor slips by as much."""
+"""Maximum error of a stated speed from which the shaft's lines still give the true one: the slip of a small motor."""
 
 
 @dataclass(frozen=True)
 class OperatingPoint:
-    """The nominal running condition; its speed guides the search for the true one and is not taken as measured.
+    """The nominal operating condition; its speed guides the search for the true speed and is not taken as measured.
 
-    Without gears, whose meshes would tell the speed, it stands for a stated one: see `Rig.speed_source`.
+    Without gears, whose mesh lines would give the speed, it counts as stated: see `Rig.speed_source`.
     """
 
     shaft: str = ""
@@ -421,25 +421,25 @@ class OperatingPoint:
 
 @dataclass(frozen=True)
 class Rig:
-    """A machine, as far as it is known; validated when it is made.
+    """A machine, as far as it is known; validated when it is created.
 
     Parameters
     ----------
     name : str
     shafts, pairs, bearings, sensors : tuples
-        Pairs and bearings name their shafts. Where there are several pairs, they must connect.
+        Pairs and bearings name their shafts. Several pairs must form one connected train.
     operating_point : OperatingPoint
     speed : SpeedSource or None
-        How recordings of this rig tell the speed.
+        Where recordings of this rig get their speed from.
     sampling_rate_hz : float or None
         For files that do not state it.
     sources : tuple of str
         Where the data come from.
     assumed : tuple of str
-        Names of facts that were inferred or guessed ("teeth", "sampling_rate_hz", …): a diagnosis that rests on
-        them is worth less, and says so.
+        Names of facts that were inferred or guessed ("teeth", "sampling_rate_hz", …). A diagnosis that rests on them
+        is less certain, and says so.
     contact : ToothContact or None
-        How the teeth of one pair touch, and what turns with them: for forces from measured motion.
+        Tooth contact and inertias of one pair, for forces from measured motion.
     machine : MachineSize or None
         For the zones of ISO 20816-3.
     """
@@ -478,19 +478,19 @@ class Rig:
         if self.sampling_rate_hz is not None:
             positive(self.sampling_rate_hz, "sampling_rate_hz", "Hz")
         if self.contact is not None and self.contact.pair:
-            self.pair(self.contact.pair)  # says so where there is no such pair
-        shaft_ratios(self)  # raises where the pairs do not connect or contradict each other
+            self.pair(self.contact.pair)  # raises if there is no such pair
+        shaft_ratios(self)  # raises if the pairs do not connect or contradict each other
 
     def __repr__(self) -> str:
-        """Return a summary; `key` tells rigs apart."""
+        """Return a summary; it does not identify a rig, `key` does."""
         return "\n".join([f"Rig {self.name!r}", *(f"  {name}: {text}" for name, text in self._facts())])
 
     def key(self) -> str:
-        """Return a text that tells rigs apart, under which results are kept; pulse times, a record's own, in short."""
+        """Return a text that identifies the rig, as a key for cached results; pulse times are abbreviated."""
         return repr(vars(self))
 
     def _repr_html_(self) -> str:
-        """Return the same as a table, for notebooks; names may come from files."""
+        """Return the same as an HTML table for notebooks; names are escaped, as they may come from files."""
         return verdict_html([f"Rig {self.name!r}"], ("known", "what"), self._facts())
 
     def _facts(self) -> tuple[tuple[str, str], ...]:
@@ -498,7 +498,7 @@ class Rig:
         return tuple(row for row in (*self.rows(), sensors) if row[0] != "machine" and row[1])
 
     def rows(self) -> tuple[tuple[str, str], ...]:
-        """Return what is known of the machine: names, and texts as a person would write them."""
+        """Return what is known of the machine as (label, text) rows."""
         nominal, size = self.nominal_speed_rpm(), self.machine or MachineSize()
         facts = [
             f"{readable(size.power_kw)} kW" if size.power_kw is not None else "",
@@ -519,7 +519,7 @@ class Rig:
         return tuple((name, text) for name, text in rows if text)
 
     def _check_kinds(self) -> None:
-        """Raise on parts that are of another kind; make lists tuples."""
+        """Raise on parts of a wrong type; convert lists to tuples."""
         check_texts(self, "name")
         parts = (("shafts", Shaft), ("pairs", GearPair), ("bearings", Bearing), ("sensors", Sensor))
         for name, kind in (*parts, ("sources", str), ("assumed", str)):
@@ -544,7 +544,7 @@ class Rig:
 
     @property
     def reference_shaft(self) -> str:
-        """The shaft that orders are counted on: the speed source's, else the operating point's, else the first."""
+        """The shaft that orders refer to: the speed source's, else the operating point's, else the first."""
         if self.speed is not None and self.speed.shaft:
             return self.speed.shaft
         if self.operating_point.shaft:
@@ -552,7 +552,7 @@ class Rig:
         return self.shafts[0].name if self.shafts else ""
 
     def with_measurement_of(self, other: Rig) -> Rig:
-        """Return this machine with what another rig file of it states of sensors, speed source and sampling rate.
+        """Return this machine with sensors, speed source and sampling rate from another rig file of it, if given there.
 
         Raises
         ------
@@ -568,7 +568,7 @@ class Rig:
 
     def ratio(self, shaft: str, to: str = "") -> float | None:
         """Revolutions of `shaft` per revolution of `to` (default: the reference shaft); None if not known."""
-        if shaft != self.reference_shaft:  # which has no name where no shaft is described
+        if shaft != self.reference_shaft:  # whose name is empty if no shaft is described
             self._check_shaft(shaft, "ratio")
         ratios = shaft_ratios(self)
         from_ratio, to_ratio = ratios.get(shaft), ratios.get(to or self.reference_shaft)
@@ -578,9 +578,9 @@ class Rig:
 
     @property
     def speed_source(self) -> SpeedSource | None:
-        """How recordings tell the speed; where neither a source nor a mesh does, the nominal speed as a constant one.
+        """The rig's speed source; without one and without gears, the nominal speed as a constant speed.
 
-        Only one that is good to `STATED_SPEED_TOLERANCE_PERCENT`.
+        The nominal speed counts only if its tolerance is at most `STATED_SPEED_TOLERANCE_PERCENT`.
         """
         nominal_rpm = self.nominal_speed_rpm()
         is_good = self.operating_point.speed_tolerance_percent <= STATED_SPEED_TOLERANCE_PERCENT
@@ -589,7 +589,7 @@ class Rig:
         return ConstantSpeed(nominal_rpm, self.reference_shaft)
 
     def nominal_speed_rpm(self, shaft: str = "") -> float | None:
-        """Nominal speed of `shaft` (default: the reference shaft), None if not known."""
+        """Nominal speed of `shaft` (default: the reference shaft) in rpm; None if not known."""
         point = self.operating_point
         if point.speed_rpm is None:
             return None
@@ -597,9 +597,9 @@ class Rig:
         return None if ratio is None else point.speed_rpm * ratio
 
     def nominal_torque_nm(self, shaft: str = "") -> float | None:
-        """Magnitude of the nominal torque as `shaft` (default: the reference shaft) feels it; None if not known.
+        """Magnitude of the nominal torque at `shaft` (default: the reference shaft) in N m; None if not known.
 
-        The same power everywhere: torque falls as speed rises.
+        Power is the same at each shaft: torque is inversely proportional to speed.
         """
         point = self.operating_point
         if point.torque_nm is None:
@@ -617,26 +617,26 @@ class Rig:
         return tuple(pair for pair in self.pairs if shaft in (pair.driver, pair.driven))
 
     def gear_teeth(self, shaft: str) -> dict[str, int]:
-        """Return the teeth of the gears on a shaft by their pairs' names, as far as they are known."""
+        """Return the known tooth counts of the gears on a shaft, by pair name."""
         return {pair.name: teeth for pair in self.pairs_on(shaft) if (teeth := pair.teeth(shaft)) is not None}
 
     def teeth_on(self, shaft: str) -> int | None:
-        """Return the teeth of the first gear on a shaft whose teeth are known; None without one."""
+        """Return the first known tooth count on a shaft; None if there is none."""
         return next(iter(self.gear_teeth(shaft).values()), None)
 
     def teeth_of(self, gear: str) -> int | None:
-        """Return the teeth of a gear, "pair/shaft" as in findings; None if it or they are not known."""
+        """Return the tooth count of a gear, named "pair/shaft" as in findings; None if not known."""
         return {f"{p.name}/{shaft}": p.teeth(shaft) for p in self.pairs for shaft in (p.driver, p.driven)}.get(gear)
 
     @property
     def teeth_text(self) -> str:
-        """Teeth of all pairs, driver's first, e.g. "29/71, ?/40"; empty without pairs."""
+        """Tooth counts of all pairs, driver first, e.g. "29/71, ?/40"; empty without pairs."""
         return ", ".join(f"{pair.driver_teeth or '?'}/{pair.driven_teeth or '?'}" for pair in self.pairs)
 
     def mesh_order(self, pair: GearPair, shaft: str = "") -> float | None:
-        """Mesh cycles of `pair` per revolution of `shaft` (default: the reference shaft); None if it cannot be known.
+        """Mesh cycles of `pair` per revolution of `shaft` (default: the reference shaft); None if not known.
 
-        Teeth of either gear times that gear's shaft ratio; both give the same where both are known.
+        The tooth count of either gear times the ratio of its shaft; both gears must agree.
         """
         orders = [
             teeth * ratio
@@ -652,7 +652,7 @@ class Rig:
 
 
 def check_rig(value: object, name: str = "rig", *, needed: bool = False) -> None:
-    """Raise unless the value is a rig, or None where none is needed; the remedy of a path is to read it."""
+    """Raise unless the value is a rig, or None if none is needed; for a path, suggest reading it."""
     remedy = "describe the machine: gearsig.Rig(shafts=…, pairs=…), or read a rig file: gearsig.read_rig(path)"
     if isinstance(value, str | PathLike):
         remedy = f"read the rig file first: gearsig.read_rig({str(value)!r})"
@@ -704,7 +704,7 @@ def path_of_contact(rig: Rig) -> PathOfContact:
 
 
 # --------------------
-# A rig in words.
+# A rig as text.
 # --------------------
 
 

@@ -107,7 +107,7 @@ def test_modes_open_with_the_waveform_that_the_text_speaks_of_and_notes_are_a_li
     page = opened_at("Modes", "root_crack_3mm")
     number = re.search(r"Mode \*\*(\d+)\*\* is the most impulsive", shown_text(page))[1]
     assert labelled(page, "selectbox", "Waveform of").value.startswith(f"mode {number},")
-    notes = next(caption.value for caption in page.caption if "Upright lines" in caption.value)
+    notes = next(caption.value for caption in page.caption if "Vertical lines" in caption.value)
     assert all(line.startswith("- ") for line in notes.splitlines())
     assert len(notes.splitlines()) > 1
 
@@ -407,8 +407,8 @@ def test_coherence_names_the_lines_that_stand_out() -> None:
     page = opened_at("Cyclic coherence", "outer_race")
     at, values = measured_line(page)
     assert values[np.abs(at - OUTER_RACE_HZ) <= 1.0].max() > 0.3
-    assert "stand above noise's level" in shown_text(page)
-    named = shown_text(page).split("for their slip: ")[1].split("Bearing lines whose peak")[0]
+    assert "above the level of noise" in shown_text(page)
+    named = shown_text(page).split("for slip: ")[1].split("Bearing lines whose peak")[0]
     assert "BPFO bearing" in named
     assert "not that there is damage" in shown_text(page)
     choose(page, "Modulation over", "Order")

@@ -137,7 +137,7 @@ def test_a_flight_at_constant_acceleration_is_exact() -> None:
 def test_a_play_drowned_in_noise_is_refused() -> None:
     recording = start_stop(angle_noise_urad=1000.0)
     motion = measure_motion(recording)
-    with pytest.raises(RefusalError, match="flights cannot be seen"):
+    with pytest.raises(RefusalError, match="it hides flights"):
         find_impacts(motion, 0.0)
 
 

@@ -147,7 +147,7 @@ def test_without_torque_the_datum_lies_between_the_flanks() -> None:
     assert abs(found.datum.compression_m) < 12e-6
     assert FROM_TORQUE not in found.references_n
     assert relative(found, TEETH, TOOTH_FORCE) < 1.0
-    with pytest.raises(RefusalError, match="which flank touches cannot be told"):
+    with pytest.raises(RefusalError, match="it is unclear which flank touches"):
         estimate(without(continuous(), "torque"))
     with pytest.raises(InputError, match="datum"):
         estimate(start_stop(), "somewhere")

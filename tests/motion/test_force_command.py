@@ -27,7 +27,7 @@ def test_text_data_table_and_pictures(capsys: pytest.CaptureFixture[str], file: 
     code, out, _ = run(capsys, "force", file, "-o", folder, "--noise")
     assert code == 0
     assert "piecewise                torque / base radius" in out
-    assert "nearer than Hunt–Crossley up to" in out
+    assert "closer than Hunt–Crossley up to" in out
     assert "J1/r_b1 = 0.213 N per rad/s²" in out
     assert sorted(p.name for p in folder.iterdir()) == ["force.csv", "force.json", "force.png", "noise.png"]
     data = json.loads((folder / "force.json").read_text())

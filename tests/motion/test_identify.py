@@ -134,7 +134,7 @@ def test_the_command(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None
     code, out, _ = run(capsys, "identify", file, "-o", fitted)
     assert code == 0
     assert "half_backlash_um" in out
-    assert "motor_inertia_kg_m2: it lies ahead of the torque sensor" in out
+    assert "motor_inertia_kg_m2: it is ahead of the torque sensor" in out
     contact = read_rig(fitted).contact
     assert contact is not None
     assert contact.half_backlash_um == pytest.approx(180.0, rel=0.01)

@@ -113,7 +113,7 @@ def test_a_coarse_encoder_does_not_jump(counts: int) -> None:
 
 def test_a_wheel_that_counts_the_other_way_is_told() -> None:
     recording = start_stop()
-    with pytest.raises(InputError, match=r"the other way round.*scale = -1"):
+    with pytest.raises(InputError, match=r"in the opposite direction.*scale = -1"):
         measure_motion(changed(recording, "wheel angle", -recording.values("wheel angle")))
     with pytest.raises(InputError, match="20 and 100 teeth"):
         measure_motion(changed(recording, "wheel angle", 1.2 * recording.values("wheel angle")))
@@ -137,7 +137,7 @@ def test_unclear_roles_are_asked_for() -> None:
         (*recording.channels, Channel("wheel angle 2", "angle", "rad", "wheel")),
         rig=recording.rig,
     )
-    with pytest.raises(InputError, match="may all be the driven angle"):
+    with pytest.raises(InputError, match="could each be the driven angle"):
         measure_motion(twice)
     assert (
         measure_motion(twice, use={"driven angle": "wheel angle 2"}).methods["driven angle"]

@@ -57,5 +57,5 @@ def test_segments_that_are_too_short() -> None:
     with pytest.raises(RefusalError, match="no segment forwards holds 2 revolutions"):
         segment_order_spectrum(np.cos(angle), angle, segments, revolutions_per_block=2.0)
     fast = 40_000.0 * np.arange(400) / RATE
-    with pytest.raises(RefusalError, match="samples a revolution"):
+    with pytest.raises(RefusalError, match="samples per revolution"):
         segment_order_spectrum(np.cos(fast), fast, motion_segments(fast, RATE), revolutions_per_block=1.0)

@@ -70,7 +70,7 @@ def test_starts_and_stops_of_the_simulated_drive() -> None:
 
 
 def test_lengths_that_do_not_fit() -> None:
-    with pytest.raises(InputError, match="as many"):
+    with pytest.raises(InputError, match="equal numbers"):
         motion_segments(np.zeros(10), RATE, np.zeros(9))
 
 

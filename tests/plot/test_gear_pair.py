@@ -296,7 +296,7 @@ def test_crack_comparison_marks_impacts_and_enlarges_the_middle_one():
         "a (m/s²)",
         "|change| (m/s²)",
         "|a| (m/s²)",
-        "felt for 5.0 cycles",
+        "noticeable for 5.0 cycles",
         "revolutions of the cracked gear",
     } <= texts
     assert "mesh cycles since the cracked tooth's entry" in texts

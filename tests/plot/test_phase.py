@@ -150,7 +150,7 @@ def test_recurrence_shows_the_matrix_over_time_and_the_measures():
     figure = recurrence_figure(plot, measures)
     np.testing.assert_array_equal(figure.axes[0].images[0].get_array(), matrix)
     assert figure.axes[0].images[0].get_extent() == pytest.approx([0.0, 4.9, 0.0, 4.9])
-    assert {"determinism 0.900", "every 7. point", "longest line 2 s"} <= set(texts_of(figure))
+    assert {"determinism 0.900", "1 in 7 points", "longest line 2 s"} <= set(texts_of(figure))
 
 
 @pytest.mark.parametrize(("dimension", "words"), [(3, "dimension 3"), (0, "no dimension: stochastic")])

@@ -88,8 +88,8 @@ def test_everything_about_an_effect_is_said(pages):
         "A burst once per revolution at tooth 21 of the input shaft",
         "+14.2 dB · 8.7 × structural floor · 61 × repeatability floor",
         "tooth 21 of the driver, 2.3 mm (1.9 to 2.8)",
-        "It takes away 72 % (64 % to 79 %) of what exceeds the floor, checked on another operating condition.",
-        "In a wrong place (placebo) it takes away at most 6 %.",
+        "It removes 72 % (64 % to 79 %) of what exceeds the floor, checked on another operating condition.",
+        "In a wrong place (placebo) it removes at most 6 %.",
         "kurtosis of the input shaft's residual average ✓ speaks for it +11.8 +12.4 1.1",
         "level of the mesh harmonics ✗ speaks against it",
         "middle of the spectrum ↗ further than predicted +2.0 +7.0 1.3",
@@ -228,7 +228,7 @@ def test_advice_for_one_condition_only():
     assert advice.startswith("One operating condition: ")
     assert "900 rpm and 120 N·m" in advice
     one = replace(no_gap_report(), conditions=no_gap_report().conditions[:1])
-    assert "was not looked at" in condition_advice(one)
+    assert "was not checked" in condition_advice(one)
 
 
 def test_what_takes_nothing_away_is_not_said_to_take_a_negative_part():
@@ -237,20 +237,21 @@ def test_what_takes_nothing_away_is_not_said_to_take_a_negative_part():
         report.causes[0], shrinkage=replace(report.causes[0].shrinkage, shrink=Interval(-1, -1, -1), placebo=-1.0)
     )
     statements = cause_rows(replace(report, causes=(worse, *report.causes[1:])))[0].statements
-    assert "It takes away nothing: with it the gap grows, checked on another operating condition." in statements
-    assert "In a wrong place (placebo) it takes away nothing." in statements
+    assert "It removes nothing: with it the gap grows, checked on another operating condition." in statements
+    assert "In a wrong place (placebo) it removes nothing." in statements
 
 
 def test_it_says_what_is_compared_with():
     with_reference, without = effect_report(), cannot_separate_report()
     assert "healthy_1.h5" in floors_text(with_reference)
     assert "from one recording to another" in floors_text(with_reference)
-    assert "what the simulation of the healthy machine lets expect" in floors_text(without)
+    assert "what the simulation of the healthy machine predicts" in floors_text(without)
     assert floors_text(gearless_report()) == ""
     first, *others = with_reference.conditions
     partly = replace(with_reference, conditions=(replace(first, reference="healthy_1.h5"), *others))
-    assert f"Without a reference at its point, with what the simulation lets expect: {others[0].name}" in floors_text(
-        partly
+    assert (
+        f"Without a reference at its operating point, with the simulated prediction: {others[0].name}"
+        in floors_text(partly)
     )
 
 
@@ -269,11 +270,11 @@ def test_rings_are_of_the_shafts_that_the_gap_names():
 
 def test_recording_and_reference_are_drawn_where_there_is_one(pages):
     text = text_of(pages["effect"])
-    assert "what has changed since the reference, line by line" in text
+    assert "the change of each line since the reference" in text
     assert text.count("One mean revolution of shaft") == 2
     assert text.count("No line is marked: with a reference, only what has changed since it is scored.") == 2
     without = text_of(pages["cannot separate"])
-    assert "the reference, line by line" not in without
+    assert "each line since the reference" not in without
     assert "only what has changed since it is scored" not in without
 
 

@@ -169,13 +169,13 @@ def test_the_cepstrum_peaks_at_the_period_of_a_family() -> None:
     turns = {cursor.label: cursor.position for cursor in answer.panels[0].cursors}
     assert turns["period of input"] == pytest.approx(0.04)
     assert turns["period of output"] == pytest.approx(0.08)
-    assert "taken for noise" not in "".join(apply_method("denoising", recording()).warnings)
+    assert "removed as noise" not in "".join(apply_method("denoising", recording()).warnings)
 
 
 def test_a_signal_of_lines_that_denoising_takes_away_is_said() -> None:
     lines = replace(recording(), samples=np.cos(2 * np.pi * 3000.0 * T)[None])
     of_finest = apply_method("denoising", lines, noise="finest level")
-    assert "taken for noise" in "".join(of_finest.warnings)
+    assert "removed as noise" in "".join(of_finest.warnings)
 
 
 def test_the_spectrum_reads_the_tone_and_the_map_its_order() -> None:
@@ -220,7 +220,7 @@ def test_options_of_other_methods_wrong_names_and_missing_speeds_are_refused() -
         apply_method("ordermap", recording())
     with pytest.raises(InputError, match="1 to 3"):
         apply_method("modes", recording(), n_modes=3, mode=4)
-    with pytest.raises(InputError, match="goes on to no transform"):
+    with pytest.raises(InputError, match="cannot be followed by a transform"):
         named_method("kurtogram+cwt")
     still = Recording(recording().samples, RATE_HZ, recording().channels)
     with pytest.raises((InputError, RefusalError)):
