@@ -102,8 +102,8 @@ def _safe(source: str) -> str:
 
 def _unique(name: str, taken: set[str], present: Mapping[str, tuple[str, str]], mark: str) -> str:
     """Return the first free name, or that of the page with this mark; adds it in lower case to `taken`."""
-    with_matching_channel_names = re.compile(rf"{re.escape(name)}(-\d+)?", re.IGNORECASE)
-    pages = [page for page, of in present.values() if of == mark and with_matching_channel_names.fullmatch(page)]
+    of_this_name = re.compile(rf"{re.escape(name)}(-\d+)?", re.IGNORECASE)
+    pages = [page for page, of in present.values() if of == mark and of_this_name.fullmatch(page)]
     choice = next((page for page in pages if page.lower() not in taken), name)
     number = 1
     while choice.lower() in taken or (choice not in pages and choice.lower() in present):
