@@ -65,7 +65,9 @@ def start_stop_analysis(
     examined, of_teeth = _examined_teeth(recording, rig, reference_analysis)
     findings += [*of_teeth, _left_out(segments, examined)]
     bursts = _bursts(recording, problems)
-    findings += [_burst_finding(name, blows, angle_rad, recording, rig) for name, blows in bursts.items() if blows]
+    findings += [
+        _burst_finding(name, impacts, angle_rad, recording, rig) for name, impacts in bursts.items() if impacts
+    ]
     order = ranked(findings if reference_analysis is None else beside_reference(findings, reference_analysis))
     return Analysis(
         recording,
@@ -271,19 +273,19 @@ def _bursts(recording: Recording, problems: list[Finding]) -> dict[str, tuple[Bu
 
 
 def _burst_finding(
-    name: str, blows: tuple[Burst, ...], angle_rad: FloatArray, recording: Recording, rig: Rig
+    name: str, impacts: tuple[Burst, ...], angle_rad: FloatArray, recording: Recording, rig: Rig
 ) -> Finding:
     """Return the finding on the number of impacts in a vibration, and the time of the hardest."""
-    hardest = max(blows, key=lambda blow: blow.peak)
+    hardest = max(impacts, key=lambda impact: impact.peak)
     unit = recording.channels[recording.index(name)].unit
     angle = float(angle_rad[round(hardest.time_s * recording.sampling_rate_hz)])
     return Finding(
-        "vibration-blows",
+        "vibration-impacts",
         Kind.NOTICE,
-        f"{counted(len(blows), 'blow')} in {name}, the hardest with {hardest.peak:.3g} {unit} "
+        f"{counted(len(impacts), 'impact')} in {name}, the hardest with {hardest.peak:.3g} {unit} "
         f"at {hardest.time_s:.5g} s.",
         Where(channels=(name,), shaft=rig.reference_shaft, angle_deg=float(np.degrees(angle) % 360.0)),
-        evidence=("only blows of more than a third of the hardest, at least 4 ms apart, are counted",),
+        evidence=("only impacts of more than a third of the hardest, at least 4 ms apart, are counted",),
     )
 
 
@@ -298,5 +300,5 @@ def _indicators(
     }
     rows = tuple(Indicator(name, float(value), computed_on="motion") for name, value in counts.items())
     n_cycles = max(1, len(segments.moving))
-    blows = tuple(Indicator("blows per cycle", len(b) / n_cycles, channel=n) for n, b in bursts.items())
-    return (*(rows if examined is None else examined.indicators), *blows)
+    impacts = tuple(Indicator("impacts per cycle", len(b) / n_cycles, channel=n) for n, b in bursts.items())
+    return (*(rows if examined is None else examined.indicators), *impacts)

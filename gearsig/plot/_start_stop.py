@@ -305,9 +305,9 @@ def force_figure(estimate: motions.ForceEstimate, reference: str = "", *, title:
     )
     # Beside the whole record: 120 ms around the minimum force.
     start = max(float(time[0]), float(time[int(np.argmin(measured))]) - 0.03)
-    blow = (start, min(float(time[-1]), start + 0.12))
+    at_impact = (start, min(float(time[-1]), start + 0.12))
     lines = []
-    for column, limits in enumerate(((float(time[0]), float(time[-1])), blow)):
+    for column, limits in enumerate(((float(time[0]), float(time[-1])), at_impact)):
         upper, lower = axes[column::2]
         inside = (time >= limits[0]) & (time <= limits[1])
         forces = {name: measured} | {model: estimate.forces_n[model] for model in models}

@@ -82,9 +82,9 @@ def head(schema: str, version: int = 1) -> Json:
     return {"schema": schema, "schema_version": version, "gearsig_version": __version__}
 
 
-def document(schema: str, content: Json) -> str:
+def document(schema: str, content: Json, version: int = 1) -> str:
     """Return the text of a file with its head and content."""
-    return json.dumps(head(schema) | plain(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return json.dumps(head(schema, version) | plain(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def members(value: object, *names: str) -> Json:

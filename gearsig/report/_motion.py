@@ -118,7 +118,7 @@ def force_csv(estimate: ForceEstimate) -> str:
 # The JSON object has these members; names end in their unit, numbers have nine significant digits, and unknown values
 # are null. Members may be added within a version, never renamed or removed.
 #
-# - ``schema``: "gearsig.identify", ``schema_version``: 1, ``gearsig_version``, ``source``
+# - ``schema``: "gearsig.identify", ``schema_version``: 2, ``gearsig_version``, ``source``
 # - ``parameters``: each with ``name``, ``unit``, ``value``, ``low``, ``high`` (95 %), ``is_determined``, ``why_not``,
 #   ``rig_value``, ``correlated_with``
 # - ``equations``: each with ``name``, ``text``, ``condition``
@@ -130,10 +130,12 @@ def identify_text(identification: Identification) -> str:
     lines += [f"{name} equation: {text}" for name, text in identification.equations.items()]
     lines += ["", f"{'parameter':<26} {'value':>11} {'from':>11} {'to':>11} {'rig':>11}  unit"]
     lines += [_row(p) for p in identification.parameters if p.is_determined]
-    untold = [p for p in identification.parameters if not p.is_determined]
-    if untold:
+    undetermined = [p for p in identification.parameters if not p.is_determined]
+    if undetermined:
         lines += ["", "Not determined by this record"]
-        lines += [fill(f"{p.name}: {p.why_not}", WIDTH, initial_indent="  ", subsequent_indent="    ") for p in untold]
+        lines += [
+            fill(f"{p.name}: {p.why_not}", WIDTH, initial_indent="  ", subsequent_indent="    ") for p in undetermined
+        ]
     alike = [
         f"{p.name} with {p.correlated_with}" for p in identification.parameters if p.is_determined and p.correlated_with
     ]
@@ -155,7 +157,7 @@ def identify_json(identification: Identification) -> str:
         for name, text in identification.equations.items()
     ]
     content = {"source": identification.source, "parameters": parameters, "equations": equations}
-    return document("gearsig.identify", content)
+    return document("gearsig.identify", content, 2)
 
 
 def _row(p: FittedParameter) -> str:
@@ -170,8 +172,8 @@ def _row(p: FittedParameter) -> str:
 # The JSON object has these members; names end in their unit, numbers have nine significant digits, and unknown values
 # are null. Members may be added within a version, never renamed or removed.
 #
-# - ``schema``: "gearsig.start_stop", ``schema_version``: 1, ``gearsig_version``, ``source``
-# - ``stretches``: each with ``direction`` (1, −1, 0 at rest), ``start_s``, ``end_s``, ``turned_rad``, ``top_speed_rpm``
+# - ``schema``: "gearsig.start_stop", ``schema_version``: 2, ``gearsig_version``, ``source``
+# - ``segments``: each with ``direction`` (1, −1, 0 at rest), ``start_s``, ``end_s``, ``turned_rad``, ``top_speed_rpm``
 # - ``backlash``: null, or ``backlash_um``, ``uncertainty_um``, ``stiffness_n_per_m_lambda``, ``n_drive``, ``n_back``,
 #   ``scatter_um``, ``method``
 # - ``impacts``: each with ``time_s``, ``flank``, ``driver_tooth``, ``driven_tooth``, ``driver_angle_deg``,
@@ -235,7 +237,7 @@ def start_stop_json(
     play = ("backlash_um", "uncertainty_um", "stiffness_n_per_m_lambda", "n_drive", "n_back", "scatter_um", "method")
     content = {
         "source": examined.motion.source,
-        "stretches": [
+        "segments": [
             members(s, "direction", "start_s", "end_s", "turned_rad")
             | {"top_speed_rpm": s.top_speed_rad_s * 30 / np.pi}
             for s in examined.segments.segments
@@ -249,4 +251,4 @@ def start_stop_json(
         "refusals": examined.refusals,
         "notes": examined.notes,
     }
-    return document("gearsig.start_stop", content)
+    return document("gearsig.start_stop", content, 2)

@@ -76,8 +76,8 @@ def test_teeth_are_compared_and_said_to_be_alike_from_which_loss_on() -> None:
 
 
 def test_vibration_blows_are_told_where_the_rate_allows() -> None:
-    assert "vibration-blows" in codes(start_stop(rate_hz=10_000.0))
-    assert "vibration-blows" not in codes(start_stop())
+    assert "vibration-impacts" in codes(start_stop(rate_hz=10_000.0))
+    assert "vibration-impacts" not in codes(start_stop())
 
 
 def test_continuous_rotation_is_analysed_as_before() -> None:

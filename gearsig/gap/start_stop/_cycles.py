@@ -199,7 +199,7 @@ class PreparedCycles:
             torque, window, x = m.torque_nm[rows], np.hanning(len(rows)), np.linspace(-1.0, 1.0, len(rows))
             degree = int(np.clip(len(rows) / m.sampling_rate_hz / 0.25, 3, 6))
             ripple = torque - Legendre.fit(x, torque, degree, w=np.sqrt(window))(x)
-            limit = 6.0 * motions.median_deviation(ripple)  # of a blow no more counts
+            limit = 6.0 * motions.median_deviation(ripple)  # of an impact no more counts
             total += np.exp(-1j * self.orders[:, None] * m.driver_angle_rad[rows]) @ (
                 window * np.clip(ripple, -limit, limit)
             )
@@ -269,7 +269,7 @@ def thin(motion: motions.PairMotion) -> motions.PairMotion:
 def robust_least_squares(
     design: FloatArray, y: FloatArray, usable: Mask, groups: tuple[Mask, ...] = (), *, far: float = 4.0, rounds: int = 4
 ) -> tuple[FloatArray, Mask]:
-    """Solve y = A x by least squares without samples far off: blows, slipped counts.
+    """Solve y = A x by least squares without samples far off: impacts, slipped counts.
 
     Far off is said by the scatter of a sample's own group: the back flank impacts while the drive flank runs smoothly,
     and without noise all of it would lie far off.
@@ -699,7 +699,7 @@ def prediction_errors(cycles: PreparedCycles, known: CycleFeatures) -> dict[tupl
 
     Compression: q − q₀ − s(a + κ(|F|/n)^{1/λ}), a and κ those known, q₀ so that the drive flank lies right on average.
     Torque: τ − J1 α1 − (r_b1/r_b2)(J2 α2 + T sgn ω2)/(1 + μ G) within 40 Hz, while the load turns. Each is that of an
-    offset and a normal scatter about it, both by medians: single blows do not decide.
+    offset and a normal scatter about it, both by medians: single impacts do not decide.
 
     Parameters
     ----------
