@@ -4,6 +4,8 @@ import gzip
 import json
 import os
 import pickle
+import subprocess
+import sys
 import time
 import tracemalloc
 from contextlib import suppress
@@ -247,6 +249,31 @@ def test_text_beside_numbers_is_not_unpacked(tmp_path):
     most = pa.default_memory_pool().max_memory()
     assert read_recording(tmp_path / "x.parquet", sampling_rate_hz=1.0).channel_names == ("a",)
     assert pa.default_memory_pool().max_memory() < most + 50e6  # the texts are 2 GB
+
+
+@pytest.mark.parametrize("ending", [".h5", ".parquet"])
+def test_types_that_contradict_the_rest_of_the_file_do_not_end_the_process(tmp_path, ending):
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    path, x = tmp_path / f"x{ending}", np.random.default_rng(0).standard_normal(40)
+    if ending == ".h5":
+        with h5py.File(path, "w") as file:
+            file["a"] = x
+            file["a"].attrs["unit"] = "m/s^2"
+        # Of class 9, of any length: a text becomes what there is not.
+        right, wrong = b"\x19\x01\x01\x00\x10\x00", b"\x19\x2d\x01\x00\x10\x00"
+    else:
+        parquet.write_table(pa.table({"a": x}), path)
+        # A column that may be null becomes one that may not, but has counts of nulls.
+        right, wrong = b"\x15\x0a\x25\x02\x18\x01a", b"\x15\x0a\x25\x00\x18\x01a"
+    content = path.read_bytes()
+    assert content.count(right) == 1
+    path.write_bytes(content.replace(right, wrong))
+    script = f"from gearsig.recording import read_recording; read_recording({str(path)!r}, sampling_rate_hz=1.0)"
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert run.returncode == (0 if ending == ".h5" else 1), run.stderr
+    assert ending == ".h5" or "x.parquet: cannot be read as Parquet" in run.stderr
 
 
 @pytest.mark.parametrize("part", [None, slice(0, 9)])

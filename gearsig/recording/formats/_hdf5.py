@@ -160,8 +160,11 @@ def _rates_of(attributes: Any, path: str) -> dict[str, float]:
 
 
 def _unit_of(attributes: Any) -> str:
+    import h5py
+
     for name in UNIT_ATTRIBUTES:
-        if name in attributes:
+        # Of a damaged type the library reads past the end of what there is, and ends the process.
+        if name in attributes and h5py.check_string_dtype(attributes.get_id(name).dtype) is not None:
             value = attributes[name]
             return value.decode("utf-8", errors="replace") if isinstance(value, bytes) else str(value)
     return ""
