@@ -327,3 +327,16 @@ def test_name_that_is_no_utf8_and_one_as_long_as_names_can_be(tmp_path):
     assert read_recording(path, sampling_rate_hz=1.0).n_samples == 40
     refused_missing(tmp_path / ("x" * 300 + ".csv"))
     refused_missing(tmp_path / ("x" * 300 + ".csv#2"))
+
+
+def test_time_that_falls_back_is_found_in_little_memory(tmp_path):
+    path, time_s = tmp_path / "x.h5", np.arange(1 << 19) / 100.0
+    time_s[1000] = 0.0
+    with h5py.File(path, "w") as file:
+        file["time"], file["a"] = time_s, np.random.default_rng(0).standard_normal(1 << 19)
+    refused(path)
+    tracemalloc.start()
+    refused(path, "does not increase at sample 1000")
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 7 * time_s.nbytes
