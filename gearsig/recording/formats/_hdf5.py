@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import struct
 from math import prod
 from pathlib import Path
@@ -191,7 +192,8 @@ def write_hdf5(recording: Recording, path: Path) -> None:
             samples.attrs["units"] = [c.unit.replace("\0", " ") for c in recording.channels]
             file.create_dataset(OWN_NAME, data=metadata_json(recording))
     except RuntimeError as error:  # of a file that cannot be closed, as on a disk that is full
-        raise OSError(str(error)) from error
+        number = re.search(r"errno = (\d+)", str(error))
+        raise OSError(int(number[1]) if number else None, str(error)) from error
 
 
 HDF5 = FileFormat(
