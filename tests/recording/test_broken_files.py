@@ -276,6 +276,26 @@ def test_types_that_contradict_the_rest_of_the_file_do_not_end_the_process(tmp_p
     assert ending == ".h5" or "x.parquet: cannot be read as Parquet" in run.stderr
 
 
+@pytest.mark.parametrize("damage", ["endless", "huge"])
+def test_units_in_a_damaged_heap_of_texts(tmp_path, damage):
+    path = tmp_path / "x.h5"
+    with h5py.File(path, "w") as file:
+        file["a"] = np.random.default_rng(0).standard_normal(40)
+        file["a"].attrs["unit"] = "m/s^2"
+    assert read_recording(path, sampling_rate_hz=1.0).channels[0].unit == "m/s^2"
+    content = bytearray(path.read_bytes())
+    if damage == "endless":  # what follows the text is zero bytes long
+        at = content.index(b"GCOL") + 16 + 16 + 8 + 8
+        content[at : at + 8] = bytes(8)
+    else:  # the reference says 4 GB
+        at = content.index(b"\x05\0\0\0", content.index(b"unit\0"))
+        content[at : at + 4] = b"\xf0\xff\xff\xff"
+    path.write_bytes(content)
+    begin = time.perf_counter()
+    refused(path)
+    assert time.perf_counter() - begin < 10
+
+
 @pytest.mark.parametrize("part", [None, slice(0, 9)])
 @pytest.mark.parametrize("ending", [".h5", ".parquet"])
 def test_numbers_that_are_packed_to_almost_nothing(tmp_path, ending, part):
