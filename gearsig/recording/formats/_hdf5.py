@@ -220,7 +220,7 @@ def write_hdf5(recording: Recording, path: Path) -> None:
             file.create_dataset(OWN_NAME, data=metadata_json(recording))
     except RuntimeError as error:  # of a file that cannot be closed, as on a disk that is full
         number = re.search(r"errno = (\d+)", str(error))
-        raise OSError(int(number[1]) if number else None, str(error)) from error
+        raise (OSError(int(number[1]), str(error)) if number else OSError(str(error))) from error
 
 
 HDF5 = FileFormat(
