@@ -291,9 +291,9 @@ def test_units_in_a_damaged_heap_of_texts(tmp_path, damage):
         at = content.index(b"\x05\0\0\0", content.index(b"unit\0"))
         content[at : at + 4] = b"\xf0\xff\xff\xff"
     path.write_bytes(content)
-    begin = time.perf_counter()
+    begin = time.process_time()  # of this process: the other one is ended after two seconds of its own
     refused(path)
-    assert time.perf_counter() - begin < 10
+    assert time.process_time() - begin < 2
 
 
 @pytest.mark.parametrize("part", [None, slice(0, 9)])
