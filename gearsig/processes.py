@@ -15,6 +15,7 @@ from contextvars import ContextVar
 from itertools import islice
 from multiprocessing import connection, parent_process
 from multiprocessing.context import SpawnContext, SpawnProcess
+from pathlib import Path
 from threading import Lock, Thread
 from typing import Any, TypeVar
 
@@ -121,7 +122,9 @@ def _jobs_pool(n_processes: int) -> Iterator[ProcessPoolExecutor]:
         raise
 
 
-def call_apart(function: Callable[..., Result], *arguments: object, longest_s: float) -> Result:
+def call_apart(
+    function: Callable[..., Result], *arguments: object, longest_s: float, most_bytes: int | None = None
+) -> Result:
     """Call a function that may crash, such as a compiled reader of damaged files, in a separate, reused process.
 
     Parameters
@@ -131,9 +134,13 @@ def call_apart(function: Callable[..., Result], *arguments: object, longest_s: f
     longest_s : float
         Limit of processor time in s, which is independent of the machine's load; the limit of elapsed time is twenty
         times as long. If the system cannot measure processor time, the limit of elapsed time.
+    most_bytes : int or None
+        Limit of additional memory, where the system can enforce it: a damaged length makes a reader ask for gigabytes.
 
     Raises
     ------
+    MemoryError, or what the function makes of it
+        If it asks for more.
     BrokenProcessPool
         If the process died, or exceeded the limit and was killed; the next call gets a new process.
     """
@@ -144,7 +151,7 @@ def call_apart(function: Callable[..., Result], *arguments: object, longest_s: f
         try:
             _APART.submit(_nothing).result()  # wait for the start: the time from here on is the function's
             longest_wait_s = 20.0 * longest_s if hasattr(signal, "setitimer") else longest_s
-            return _APART.submit(_counted, function, arguments, longest_s).result(longest_wait_s)
+            return _APART.submit(_counted, function, arguments, longest_s, most_bytes).result(longest_wait_s)
         except TimeoutError:
             for process in list(_APART._processes.values()):
                 process.kill()
@@ -159,16 +166,39 @@ def _nothing() -> None:
     """Do nothing: a reply shows that the process has started."""
 
 
-def _counted(function: Callable[..., Result], arguments: tuple[object, ...], longest_s: float) -> Result:
+def _counted(
+    function: Callable[..., Result], arguments: tuple[object, ...], longest_s: float, most_bytes: int | None
+) -> Result:
     """Call a function; the system kills this process after `longest_s` of processor time, even in compiled code."""
-    if not hasattr(signal, "setitimer"):
-        return function(*arguments)
-    signal.signal(signal.SIGPROF, signal.SIG_DFL)
-    signal.setitimer(signal.ITIMER_PROF, longest_s)
+    with _memory_limit(most_bytes):
+        if not hasattr(signal, "setitimer"):
+            return function(*arguments)
+        signal.signal(signal.SIGPROF, signal.SIG_DFL)
+        signal.setitimer(signal.ITIMER_PROF, longest_s)
+        try:
+            return function(*arguments)
+        finally:
+            signal.setitimer(signal.ITIMER_PROF, 0.0)
+
+
+@contextmanager
+def _memory_limit(most_bytes: int | None) -> Iterator[None]:
+    """Limit the memory that this process may take in addition to what it has, where the system can."""
+    statm = Path("/proc/self/statm")
+    if most_bytes is None or not statm.exists():
+        yield
+        return
+    import resource
+
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    most_bytes += int(statm.read_text().split()[0]) * resource.getpagesize()
+    if before[0] != resource.RLIM_INFINITY:
+        most_bytes = min(most_bytes, before[0])
+    resource.setrlimit(resource.RLIMIT_AS, (most_bytes, before[1]))
     try:
-        return function(*arguments)
+        yield
     finally:
-        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        resource.setrlimit(resource.RLIMIT_AS, before)
 
 
 def n_processors() -> int:

@@ -97,7 +97,11 @@ def write_set(recording: Recording, names: FileSet) -> None:
         parts.truth.write_text(_truth_json(recording) + "\n", encoding="utf-8")
         _move(parts, names)
     except OSError as error:
-        raise InputError(f"cannot be written ({error})", where=str(names.recording), remedy="check the disk") from error
+        raise InputError(
+            f"cannot be written ({error.strerror or error})",
+            where=str(names.recording),
+            remedy="make room on the disk, or choose another folder",
+        ) from error
     finally:
         shutil.rmtree(unfinished, ignore_errors=True)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -38,6 +39,7 @@ def dashboard(
 
     _read_no_configuration()
     _hide_streamlit_offers()
+    _print_also_to_nobody()
     with TemporaryDirectory(prefix="gearsig-") as folder:
         _tell_page_its_server(Path(folder))
         compiled.begin()
@@ -89,6 +91,24 @@ def _hide_streamlit_offers() -> None:
         skills: Any = import_module("streamlit.web.skills")
         skills.nudge_suppression_reason = lambda *_: "not for the users of an application"
         skills.are_skills_installed = lambda *_, **__: True
+
+
+def _print_also_to_nobody() -> None:
+    """Let the server start and stop where its output cannot be written: the reader has gone (`| head`), a disk is full.
+
+    Streamlit says that it stops before it does, and an error of the one would keep it from the other.
+    """
+    from streamlit import cli_util
+
+    print_to_cli = cli_util.print_to_cli
+
+    def print_if_read(message: str, **style: Any) -> None:
+        try:
+            print_to_cli(message, **style)
+        except OSError:  # what is still to be flushed goes nowhere too
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+    cli_util.print_to_cli = print_if_read
 
 
 def _tell_page_its_server(folder: Path) -> None:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from errno import ENOSPC
 from functools import partial
 from importlib import import_module
 from pathlib import Path
+from tempfile import gettempdir
 
 import streamlit as st
 
 from app.dashboard import address, state, work
 from app.dashboard.widgets.texts import show_error
-from gearsig.errors import GearsigError
+from gearsig.errors import GearsigError, InputError
 
 FOLDER = Path(__file__).parent
 # Module name, which is also the page's address, → title and icon; a module is imported when its page is first opened.
@@ -31,6 +33,11 @@ def show(name: str) -> None:
         import_module(f"app.dashboard.{name}").show()
     except GearsigError as error:
         show_error(error)
+    except OSError as error:
+        if error.errno != ENOSPC:
+            raise
+        remedy = "make room there, or start the dashboard with TMPDIR set to another folder"
+        show_error(InputError(f"cannot be written ({error.strerror})", where=gettempdir(), remedy=remedy))
 
 
 st.set_page_config(page_title="gearsig", page_icon=str(FOLDER / "icon.svg"), layout="wide")

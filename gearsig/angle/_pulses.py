@@ -394,6 +394,8 @@ def fit_within_ticks(t: FloatArray, counts: FloatArray, tick_s: float, breaks: I
     speed = np.gradient(counts, t)
     weights = np.ones(n)
     weights[late_pulses(t, counts, tick_s)] = 0.0
+    # Nothing but its own time tells of a pulse at a standstill.
+    weights[np.convolve(penalty, np.ones(4)) == 0.0] = 1.0
     fitted = counts
     for _ in range(30):  # each round reduces λ by 4, so that the last ones interpolate
         fitted = counts + _penalised(rows, penalty, weights, -_apply(rows, counts))
@@ -520,6 +522,7 @@ def pulse_train_angle(
         relative_speed_uncertainty=_uncertainty(kept, tick),
         quality=max(0.0, 1.0 - 5.0 * (len(train.spurious_s) + train.n_missed) / len(t)),
         notes=_notes(train, len(t), tick, late_s),
+        standstills_s=tuple(map(float, train.pauses_s)),
     )
 
 

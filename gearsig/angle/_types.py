@@ -40,6 +40,9 @@ class ShaftAngle(Result, columns=("time_s", "revolutions", "speed_rev_per_s")):
         0 to 1: the method's confidence that this is the true angle and not, e.g., that of another harmonic.
     notes : tuple of str
         Repairs and assumptions (missed pulses, …), for the reader of the report.
+    standstills_s : tuple of float
+        Times at which the shaft stands still, or nearly so, between two pulses, which the speed at the knots does not
+        show.
     """
 
     shaft: str
@@ -50,6 +53,7 @@ class ShaftAngle(Result, columns=("time_s", "revolutions", "speed_rev_per_s")):
     relative_speed_uncertainty: float = float("nan")
     quality: float = 1.0
     notes: tuple[str, ...] = ()
+    standstills_s: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         freeze(self, "time_s", "revolutions", "speed_rev_per_s")

@@ -223,8 +223,9 @@ def speed_warnings(angle: ShaftAngle | CannotTell, rig: Rig) -> list[Finding]:
         title = f"The speed, {high:.3g} rpm, is beyond that of any machine with gears or rolling bearings."
         surer = "Check sampling rate and pulses per revolution."
         doubts.append(Finding(OFF_NOMINAL, Kind.DATA_PROBLEM, title, Where(shaft=angle.shaft), surer=surer))
-    if low < NEAR_ZERO_SHARE * high:
-        title = f"The speed falls to {low:.3g} rpm, near standstill: whether the shaft then reverses is not known."
+    if low < NEAR_ZERO_SHARE * high or angle.standstills_s:
+        lowest = "near standstill between two pulses" if angle.standstills_s else f"to {low:.3g} rpm, near standstill"
+        title = f"The speed falls {lowest}: whether the shaft then reverses is not known."
         where = Where(shaft=angle.shaft)
         doubts.append(Finding(NEAR_ZERO, Kind.DATA_PROBLEM, title, where, surer=SURER_BEYOND_ZERO))
     return doubts

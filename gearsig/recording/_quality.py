@@ -227,8 +227,8 @@ def find_problems(recording: Recording) -> tuple[ChannelProblem, ...]:
     - *stuck*: runs of equal samples away from the extremes, at least 16 long, ten times longer than 99 % of the
       runs in the channel, and with a corner at both ends (eight samples further the signal is more than eight of the
       converter's steps away, which it is not at a smooth turning point): a dropout of the measurement chain.
-    - *wrapped*: five or more steps from one end of the range to the other that vanish when the range is added: an
-      integer that overflowed.
+    - *wrapped*: five or more steps from one end of the range to the other that vanish when the range is added, or
+      three or more samples that are off by the range from what those beside them say: an integer that overflowed.
     - *stepped*: the level changes by 4 dB or more from one moment to the next, and is steady before and after: gain,
       mounting or load.
     - *reversed*: impacts swell and end suddenly, where those of a machine begin suddenly and ring down.
@@ -399,16 +399,29 @@ def _further_problems(channel: Channel, x: FloatArray, rate_hz: float) -> Iterat
 
 def _wrapped(channel: Channel, x: FloatArray) -> ChannelProblem | None:
     low, high = float(x.min()), float(x.max())
+    n = _n_steps_that_go_on(x, low, high)
+    if n:
+        evidence = f"{n} steps from one end of the range, {low:.4g} to {high:.4g}, to the other, and the slope goes on"
+    elif n := _n_off_by_the_range(x, low, high):
+        evidence = f"{n} samples are off by the range, {low:.4g} to {high:.4g}, from what those beside them say"
+    else:
+        return None
+    remedy = "export again in a wider number format; nothing can be read from this channel"
+    return ChannelProblem(channel.name, "wrapped", n / len(x), evidence, remedy)
+
+
+def _n_steps_that_go_on(x: FloatArray, low: float, high: float) -> int:
+    """Count steps from end to end of the range where many samples overflowed; 0 where they may be the signal's own."""
     span = high - low
     jumps = np.abs(np.diff(x)) > 0.75 * span
     n = int(np.count_nonzero(jumps))
     # A square wave jumps as well, but rests in between; noise hardly ever goes from end to end.
     if n < 5 or n > 0.2 * len(x):
-        return None
+        return 0
     starts = np.flatnonzero(jumps)[1:-1]
     starts = starts[(starts > 0) & (starts + 2 < len(x))]
     if not len(starts):
-        return None
+        return 0
     before, after = x[starts] - x[starts - 1], x[starts + 2] - x[starts + 1]
     turned = np.sign(x[starts + 1] - x[starts])
     goes_on = (np.sign(before) == -turned) & (np.sign(after) == -turned)
@@ -419,14 +432,66 @@ def _wrapped(channel: Channel, x: FloatArray) -> ChannelProblem | None:
     held = np.count_nonzero((x == low) | (x == high))
     # More of them at the ends, or at one value there, were cut.
     if not 0.08 * next_to <= outer <= 0.5 * next_to or outer < 20 or held > 0.5 * outer:
-        return None
+        return 0
     # Uniform noise fills it evenly, and goes from end to end as well.
     is_even = np.median(neighbour_steps) > 0.6 and np.count_nonzero(np.abs(place - 0.5) < 0.05) < 3 * next_to
-    if np.mean(goes_on) < 0.6 or np.median(neighbour_steps) < 0.02 or is_even:
-        return None
-    evidence = f"{n} steps from one end of the range, {low:.4g} to {high:.4g}, to the other, and the slope goes on"
-    remedy = "export again in a wider number format; nothing can be read from this channel"
-    return ChannelProblem(channel.name, "wrapped", n / len(x), evidence, remedy)
+    return 0 if np.mean(goes_on) < 0.6 or np.median(neighbour_steps) < 0.02 or is_even else n
+
+
+ORDER, LONGEST_RUN, MIN_OFF, MOST_OFF, MOST_NEAR_ENDS = 24, 4, 3, 1000, 50_000
+"""Of linear prediction; samples that overflow in a row; runs that are off; samples that may be."""
+
+
+def _n_off_by_the_range(x: FloatArray, low: float, high: float) -> int:
+    r"""Count samples that overflowed where they are few; 0 where they may be the signal's own.
+
+    Linear prediction from both sides tells how far a run of L samples is off: :math:`g = \sum e t / \sum t^2` with the
+    error :math:`e = a * x` of one-sided prediction and that of such a run, :math:`t = a * 1_L`. One that overflowed is
+    off by the range, others of 43 measured and simulated channels by a third at most.
+    """
+    span = high - low
+    # An integer's range lies about zero; clicks to one side, of a bad contact, make one that does not.
+    if abs(low + high) > 0.1 * span or np.count_nonzero(np.abs(np.diff(x)) > 0.5 * span) < MIN_OFF:
+        return 0
+    starts = np.flatnonzero(np.abs(x) > 0.35 * span)
+    starts = starts[(starts >= ORDER) & (starts + ORDER + LONGEST_RUN <= len(x))]
+    if len(starts) > MOST_NEAR_ENDS:
+        return 0
+    restored = np.asarray(x, dtype=np.float64).copy()
+    around = starts[:, None] + np.arange(-ORDER, ORDER + LONGEST_RUN)
+    for _ in range(20):
+        error_filter = _prediction_error_filter(restored[:LONGEST_TURNED])
+        runs = [np.convolve(error_filter, np.ones(length)) for length in range(1, LONGEST_RUN + 1)]
+        weights = np.zeros((around.shape[1], LONGEST_RUN))
+        for i, run in enumerate(runs):
+            weights[: ORDER + len(run), i] = np.convolve(run, error_filter[::-1]) / (run @ run)
+        off = restored[around] @ weights
+        clear = np.abs(off) * [np.linalg.norm(run) for run in runs]
+        clear[np.abs(np.abs(off) - span) > 0.4 * span] = 0.0
+        found = np.flatnonzero(np.any(clear > 0, axis=1))
+        if not len(found):
+            break
+        if len(found) > MOST_OFF:
+            return 0
+        # One that is off shows also where its neighbours are looked at: the clearest within reach goes first.
+        best = clear[found].max(axis=1)
+        near = np.abs(starts[found, None] - starts[found]) <= ORDER
+        for i in found[best == np.where(near, best, 0.0).max(axis=1)]:
+            length = int(np.argmax(clear[i]))
+            restored[starts[i] : starts[i] + length + 1] -= np.sign(off[i, length]) * span
+    n = int(np.count_nonzero(restored != x))
+    return n if n >= MIN_OFF and np.count_nonzero(np.abs(off[:, 0]) > 0.35 * span) <= 0.02 * n else 0
+
+
+def _prediction_error_filter(x: FloatArray) -> FloatArray:
+    """Return 1, -a₁, … of linear prediction by the autocorrelation method (J. Makhoul, Proc. IEEE 63, 561, 1975)."""
+    from scipy.fft import irfft, next_fast_len, rfft
+    from scipy.linalg import solve_toeplitz
+
+    size = next_fast_len(len(x) + ORDER, real=True)
+    correlation = irfft(np.abs(rfft(x - x.mean(), size)) ** 2, size)[: ORDER + 1]
+    correlation[0] *= 1.0 + 1e-6  # noise of -60 dB: tones alone could be predicted for ever
+    return np.concatenate(([1.0], -solve_toeplitz(correlation[:-1], correlation[1:])))
 
 
 def _stepped(channel: Channel, x: FloatArray) -> ChannelProblem | None:

@@ -371,7 +371,13 @@ def write_recording(recording: Recording, path: str | Path) -> Path:
         unfinished.chmod(0o666 & ~mask)
         unfinished.replace(target)
     except OSError as error:
-        raise InputError(f"cannot be written ({error})", where=target.name, remedy="check the disk") from error
+        # What libraries say goes on with addresses in memory.
+        reason = os.strerror(error.errno) if error.errno else error
+        raise InputError(
+            f"cannot be written ({reason})",
+            where=target.name,
+            remedy="make room on the disk, or choose another folder",
+        ) from error
     finally:
         unfinished.unlink(missing_ok=True)
     return target

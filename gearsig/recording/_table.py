@@ -448,9 +448,20 @@ def rate_of_time(
     step = span / (len(t) - 1)
     steps = np.diff(t)
     i = int(np.argmin(steps))
-    # Distance of the stamps from the straight line fitted to them.
-    k, centred = np.arange(len(t)) - (len(t) - 1) / 2, t - t.mean()
-    jitter = np.abs(centred - (k @ centred) / (k @ k) * k)
+    stands_still = InputError(
+        f"time does not increase at {row_place(i + 1)}: {t[i]:.9g} is followed by {t[i + 1]:.9g}",
+        where=where,
+        allowed="strictly increasing time",
+        remedy="remove doubled rows, export time with more digits, or drop the column and give --fs",
+    )
+    if steps[i] < 0:
+        raise stands_still
+    # Distance of the stamps from the straight line fitted to them; in place, as records are long.
+    line, jitter = np.arange(len(t)) - (len(t) - 1) / 2, t - t.mean()
+    line *= (line @ jitter) / (line @ line)
+    jitter -= line
+    np.abs(jitter, out=jitter)
+    del line
     if jitter.max() < 0.01 * step:  # then stamps increase, and no rounding hides any
         return float(1.0 / (step * scale_s)), ()
     jitters, roundings = _jitters_by_rounding(values, t, jitter)
@@ -458,13 +469,8 @@ def rate_of_time(
     coarsest = float(roundings.max())
     # Stamps that were rounded lie one rounding apart where they are not equal; rows that are doubled lie farther.
     hides_none = is_uniform and coarsest <= MAX_ROUNDING * span and steps.max() < 1.5 * max(coarsest, step)
-    if steps[i] < 0 or (steps[i] == 0 and not hides_none):
-        raise InputError(
-            f"time does not increase at {row_place(i + 1)}: {t[i]:.9g} is followed by {t[i + 1]:.9g}",
-            where=where,
-            allowed="strictly increasing time",
-            remedy="remove doubled rows, export time with more digits, or drop the column and give --fs",
-        )
+    if steps[i] == 0 and not hides_none:
+        raise stands_still
     if is_uniform:
         rate_hz = float(1.0 / (step * scale_s))
         if coarsest < 1.5 * step:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-import secrets
 from base64 import b64decode
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, is_dataclass
@@ -14,7 +13,7 @@ from enum import Enum
 from functools import cache, partial
 from importlib.resources import files
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryDirectory, TemporaryFile
 from typing import TYPE_CHECKING, Any, Literal
 
 from gearsig import __version__
@@ -74,15 +73,16 @@ def check_writable(folder: Path, option: str = "-o") -> None:
     Raises
     ------
     InputError
-        If it is a file or not writable.
+        If it is a file, is not writable, or its disk is full.
     """
-    probe = f".{secrets.token_hex(4)}"
     try:
         if folder.exists() and not folder.is_dir():
             raise InputError("is a file", where=str(folder), remedy=f"choose a folder with {option}")
         existing = next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
-        (existing / probe).mkdir()  # permissions alone do not show whether anything can be created
-        (existing / probe).rmdir()
+        # Permissions alone do not show whether anything can be created: the disk may be full.
+        with TemporaryFile(dir=existing) as probe:
+            probe.write(bytes(1 << 16))
+            probe.flush()
     except OSError as error:
         raise _unwritable(folder, error, option) from None
 

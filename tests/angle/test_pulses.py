@@ -166,6 +166,19 @@ def test_a_stop_between_two_pulses_does_not_turn_the_shaft() -> None:
     assert np.all(np.diff(fine) >= -1e-12)
 
 
+@pytest.mark.parametrize("pulses_per_revolution", [1, 60])
+def test_a_shaft_that_turns_back_stands_still_in_between(pulses_per_revolution: int) -> None:
+    """Its pulses do not say that it turns back; those of a ring come late for their neighbours beside the turn."""
+    t = np.arange(60_000) / RATE
+    turned = np.cumsum(np.abs(22.0 * np.sin(2 * np.pi * t / 6.0 + 0.3))) / RATE
+    at = np.searchsorted(turned, np.arange(1, turned[-1] * pulses_per_revolution) / pulses_per_revolution)
+    angle = pulse_train_angle(t[at], pulses_per_revolution, tick_s=1 / RATE)
+    low, high = angle.speed_range_rpm
+    assert angle.standstills_s or low < 0.1 * high
+    found = angle.revolutions_at(t[at])
+    assert found - found[0] == pytest.approx(turned[at] - turned[at[0]], abs=0.15)
+
+
 @settings(deadline=None, max_examples=25)
 @given(st.floats(0.01, 100.0), st.floats(1.0, 50.0), st.floats(-0.5, 2.0))
 def test_scaling_time_scales_speed(factor: float, start: float, acceleration: float) -> None:

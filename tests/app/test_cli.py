@@ -3,6 +3,10 @@
 import json
 import pickle
 import re
+import socket
+import subprocess
+import sys
+import urllib.request
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -438,3 +442,24 @@ def test_a_misspelt_method_has_a_suggestion(capsys: pytest.CaptureFixture[str]) 
     code, _, err = run(capsys, "show", "spectrm", "x.csv")
     assert code == 2
     assert err.strip().endswith("did you mean spectrum?")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="SIGTERM ends a process of Windows without asking it")
+def test_a_dashboard_whose_output_nobody_reads_stops_when_it_is_told_to() -> None:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    words = [sys.executable, "-m", "app.cli.main", "dashboard", "--port", str(port), "--no-browser"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as server:
+        assert server.stdout is not None
+        server.stdout.readline()
+        server.stdout.close()
+        # It answers when all that is printed at its start is printed.
+        with urllib.request.urlopen(f"http://localhost:{port}/_stcore/health", timeout=20) as answer:
+            assert answer.status == 200
+        server.terminate()
+        try:
+            assert server.wait(20) == 0
+        finally:
+            server.kill()

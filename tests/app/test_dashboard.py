@@ -1,9 +1,11 @@
 """The dashboard's pages, run without a browser."""
 
+import errno
 import json
 import re
 import tomllib
 from base64 import b64decode
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -116,6 +118,21 @@ def test_an_upload_and_its_rig_give_the_diagnosis_of_the_same_files_on_disk() ->
     page = upload(page, "2003.10.22.12.06.24", sample.recording.read_bytes(), sample.rig.read_text())
     assert not page.exception
     assert page.subheader[0].value == verdict
+
+
+def test_a_disk_without_room_for_an_upload_is_said(monkeypatch) -> None:
+    def write(*_: object, **__: object) -> int:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    page = opened()
+    content = SAMPLES["outer_race"].recording.read_bytes()
+    with monkeypatch.context() as full:
+        full.setattr(Path, "write_bytes", write)
+        page = upload(page, "new.mat", content)
+        assert not page.exception
+        assert "No space left on device" in page.error[0].value
+    page.run()
+    assert not page.error
 
 
 @pytest.mark.slow

@@ -161,6 +161,29 @@ def test_noise_of_a_wide_band_that_wraps_is_told_from_noise(share):
     assert {p.kind for p in find_problems(recording)} == {"wrapped"}
 
 
+@pytest.mark.parametrize("n", [3, 12, 41, 144])
+@pytest.mark.parametrize("name", ["damaged_tooth.csv.gz", "run_up.h5", "root_crack_0mm.h5"])
+def test_a_few_samples_that_overflowed_are_noticed(name, n):
+    """A gain a little too high: n samples of some 100,000 lie beyond the range of 16 bits."""
+    recording = read_recording(FOLDER / name)
+    x = recording.values("a1").astype(float)
+    counts = np.round((x - x.mean()) / np.partition(np.abs(x - x.mean()), -n - 1)[-n - 1] * 32767.0)
+    for sent, is_wrapped in (((counts + 32768) % 65536 - 32768, True), (np.clip(counts, -32768, 32767), False)):
+        problems = find_problems(Recording(sent[None], recording.sampling_rate_hz, recording.channels[:1]))
+        assert ("wrapped" in {p.kind for p in problems}) == is_wrapped
+
+
+@pytest.mark.parametrize("ring_hz", [900.0, 3000.0, 5900.0])
+def test_impacts_and_clicks_are_no_overflow(ring_hz):
+    rng, time_s = np.random.default_rng(0), np.arange(1 << 15) / 12800
+    impacts = np.where(np.arange(len(time_s)) % 512, 0, rng.lognormal(0, 1, len(time_s)))
+    ringing = np.convolve(impacts, np.sin(2 * np.pi * ring_hz * time_s[:256]) * np.exp(-800 * time_s[:256]))
+    clicks = 0.1 * np.sin(2 * np.pi * 110 * time_s) + np.where(np.arange(len(time_s)) % 1009, 0, 5)
+    noise = 1e-3 * rng.standard_normal(len(time_s))
+    for x in (ringing[: len(time_s)] + noise, clicks + noise):
+        assert "wrapped" not in {p.kind for p in find_problems(Recording(x[None], 12800.0, (TRUE.channels[0],)))}
+
+
 @pytest.mark.parametrize(("speed_rpm", "is_hum"), [(1500.0, False), (2001.0, True)])
 def test_a_shaft_excuses_hum_at_its_own_frequency_only(speed_rpm, is_hum):
     rig = Rig(shafts=(Shaft("motor"),), speed=ConstantSpeed(speed_rpm, "motor"))  # 3 × 2001 rpm are 100.05 Hz

@@ -3,8 +3,8 @@
     python fuzz_reader.py KIND N_FILES SEED FOLDER
 
 It prints a line for each file that ends in anything but a result or an error of gearsig, takes over 5 s of processor
-time, or more than twice its decoded size and 200 MB; the file stays in the folder. A hang of 60 s or a crash ends the
-process.
+time, or more than twice its decoded size and 200 MB; the file stays in the folder. A hang of two minutes, more than a
+reader's own process is waited for, or a crash ends the process.
 """
 
 import faulthandler
@@ -339,7 +339,7 @@ def main(kind, n_files, seed, folder):
         # A stream that is damaged never gets as far as its text.
         inside = kind == "gzip" and i % 8
         path.write_bytes(gzip.compress(mutated(gzip.decompress(data), rng)) if inside else mutated(data, rng))
-        faulthandler.dump_traceback_later(60, exit=True)
+        faulthandler.dump_traceback_later(120, exit=True)
         before, begin, wrong, result = reset_peaks(), time.process_time(), "", None
         try:
             result = read(path)

@@ -4,6 +4,8 @@ import gzip
 import json
 import os
 import pickle
+import subprocess
+import sys
 import time
 import tracemalloc
 from contextlib import suppress
@@ -249,6 +251,51 @@ def test_text_beside_numbers_is_not_unpacked(tmp_path):
     assert pa.default_memory_pool().max_memory() < most + 50e6  # the texts are 2 GB
 
 
+@pytest.mark.parametrize("ending", [".h5", ".parquet"])
+def test_types_that_contradict_the_rest_of_the_file_do_not_end_the_process(tmp_path, ending):
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    path, x = tmp_path / f"x{ending}", np.random.default_rng(0).standard_normal(40)
+    if ending == ".h5":
+        with h5py.File(path, "w") as file:
+            file["a"] = x
+            file["a"].attrs["unit"] = "m/s^2"
+        # Of class 9, of any length: a text becomes what there is not.
+        right, wrong = b"\x19\x01\x01\x00\x10\x00", b"\x19\x2d\x01\x00\x10\x00"
+    else:
+        parquet.write_table(pa.table({"a": x}), path)
+        # A column that may be null becomes one that may not, but has counts of nulls.
+        right, wrong = b"\x15\x0a\x25\x02\x18\x01a", b"\x15\x0a\x25\x00\x18\x01a"
+    content = path.read_bytes()
+    assert content.count(right) == 1
+    path.write_bytes(content.replace(right, wrong))
+    script = f"from gearsig.recording import read_recording; read_recording({str(path)!r}, sampling_rate_hz=1.0)"
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
+    assert run.returncode == (0 if ending == ".h5" else 1), run.stderr
+    assert ending == ".h5" or "x.parquet: cannot be read as Parquet" in run.stderr
+
+
+@pytest.mark.parametrize("damage", ["endless", "huge"])
+def test_units_in_a_damaged_heap_of_texts(tmp_path, damage):
+    path = tmp_path / "x.h5"
+    with h5py.File(path, "w") as file:
+        file["a"] = np.random.default_rng(0).standard_normal(40)
+        file["a"].attrs["unit"] = "m/s^2"
+    assert read_recording(path, sampling_rate_hz=1.0).channels[0].unit == "m/s^2"
+    content = bytearray(path.read_bytes())
+    if damage == "endless":  # what follows the text is zero bytes long
+        at = content.index(b"GCOL") + 16 + 16 + 8 + 8
+        content[at : at + 8] = bytes(8)
+    else:  # the reference says 4 GB
+        at = content.index(b"\x05\0\0\0", content.index(b"unit\0"))
+        content[at : at + 4] = b"\xf0\xff\xff\xff"
+    path.write_bytes(content)
+    begin = time.process_time()  # of this process: the other one is ended after two seconds of its own
+    refused(path)
+    assert time.process_time() - begin < 2
+
+
 @pytest.mark.parametrize("part", [None, slice(0, 9)])
 @pytest.mark.parametrize("ending", [".h5", ".parquet"])
 def test_numbers_that_are_packed_to_almost_nothing(tmp_path, ending, part):
@@ -300,3 +347,16 @@ def test_name_that_is_no_utf8_and_one_as_long_as_names_can_be(tmp_path):
     assert read_recording(path, sampling_rate_hz=1.0).n_samples == 40
     refused_missing(tmp_path / ("x" * 300 + ".csv"))
     refused_missing(tmp_path / ("x" * 300 + ".csv#2"))
+
+
+def test_time_that_falls_back_is_found_in_little_memory(tmp_path):
+    path, time_s = tmp_path / "x.h5", np.arange(1 << 19) / 100.0
+    time_s[1000] = 0.0
+    with h5py.File(path, "w") as file:
+        file["time"], file["a"] = time_s, np.random.default_rng(0).standard_normal(1 << 19)
+    refused(path)
+    tracemalloc.start()
+    refused(path, "does not increase at sample 1000")
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 7 * time_s.nbytes

@@ -134,7 +134,7 @@ def test_a_full_disk_is_said_and_leaves_nothing(extension, most_bytes, tmp_path)
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, before[1]))  # as if no more room were left
     try:
-        with pytest.raises(InputError, match="cannot be written"):
+        with pytest.raises(InputError, match=r"cannot be written \(File too large\); make room"):
             write_recording(recording, tmp_path / f"x{extension}")
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)

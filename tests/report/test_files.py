@@ -1,3 +1,4 @@
+import os
 from pathlib import Path
 
 import pytest
@@ -83,9 +84,21 @@ def test_a_folder_is_writable_where_something_can_be_made_in_it_or_in_what_will_
     def deny(*_, **__):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(Path, "mkdir", deny)
+    monkeypatch.setattr(os, "open", deny)
     with pytest.raises(InputError, match=r"cannot be written \(Permission denied\)"):
         check_writable(tmp_path)
+
+
+def test_a_full_disk_is_said_before_long_work(tmp_path):
+    resource = pytest.importorskip("resource")
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))  # as if no more room were left
+    try:
+        with pytest.raises(InputError, match=r"there: cannot be written \(File too large\); choose .* with -o"):
+            check_writable(tmp_path / "there")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_an_interrupted_write_is_tidied_up(tmp_path, monkeypatch):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import struct
+from concurrent.futures.process import BrokenProcessPool
 from math import prod
 from pathlib import Path
 from typing import Any
@@ -10,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from gearsig.errors import InputError
-from gearsig.recording._limits import check_decoded
+from gearsig.processes import call_apart
+from gearsig.recording._limits import FREE_BYTES, check_decoded
 from gearsig.recording._table import NamedArrays, NumberArray, RawTable, table_from_arrays
 from gearsig.recording._types import Recording, stated_rate_hz
 from gearsig.recording.formats._format import OWN_NAME, FileFormat, begins, metadata_json, table_from_metadata
@@ -45,7 +48,6 @@ def read_hdf5(path: Path, part: slice | None = None) -> RawTable:
     where = path.name
     with h5py.File(path, "r", locking=False) as file:
         arrays: dict[str, NumberArray] = {}
-        units: dict[str, str] = {}
         rates_hz = _rates_of(file.attrs, "")
         skipped: list[str] = []
         datasets = own_datasets(file, skipped)
@@ -60,8 +62,8 @@ def read_hdf5(path: Path, part: slice | None = None) -> RawTable:
             return table_from_metadata(_own_text(by_path[OWN_NAME], path), list(np.atleast_2d(samples)), READER, where)
         for dataset_path, dataset in datasets:
             arrays[dataset_path] = np.atleast_1d(load_dataset(dataset, where, part))
-            units[dataset_path] = _unit_of(dataset.attrs)
             rates_hz |= _rates_of(dataset.attrs, dataset_path)
+        units = _units_of(path, datasets)
     notes = [f"not followed, because they lead out of the file: {', '.join(skipped[:8])}"] if skipped else []
     return table_from_arrays(NamedArrays(arrays, {}, units, rates_hz, tuple(notes)), READER, where)
 
@@ -159,12 +161,41 @@ def _rates_of(attributes: Any, path: str) -> dict[str, float]:
     return rates
 
 
-def _unit_of(attributes: Any) -> str:
-    for name in UNIT_ATTRIBUTES:
-        if name in attributes:
-            value = attributes[name]
-            return value.decode("utf-8", errors="replace") if isinstance(value, bytes) else str(value)
-    return ""
+def _units_of(path: Path, datasets: list[tuple[str, Any]]) -> dict[str, str]:
+    """Return the units that attributes state, by the datasets' paths.
+
+    Texts of no fixed length are read in another process: the library takes as much memory as a damaged reference says,
+    goes round for ever in a damaged heap, and ends the process over a type that there is not.
+    """
+    import h5py
+
+    held: dict[str, tuple[str, str]] = {}
+    kinds = set()
+    for place, dataset in datasets:
+        for name in UNIT_ATTRIBUTES:
+            if name in dataset.attrs and (kind := h5py.check_string_dtype(dataset.attrs.get_id(name).dtype)):
+                held[place] = dataset.name, name
+                kinds.add(kind.length)
+                break
+    if None not in kinds:
+        return _texts_of(path, held)
+    try:
+        return call_apart(_texts_of, path, held, longest_s=2.0, most_bytes=FREE_BYTES)
+    except (BrokenProcessPool, MemoryError):
+        raise InputError(
+            "is damaged: the units of its datasets cannot be read",
+            where=path.name,
+            allowed="a complete HDF5 file",
+            remedy="export it again",
+        ) from None
+
+
+def _texts_of(path: Path, held: dict[str, tuple[str, str]]) -> dict[str, str]:
+    import h5py
+
+    with h5py.File(path, "r", locking=False) as file:
+        values = {place: file[dataset].attrs[name] for place, (dataset, name) in held.items()}
+    return {k: v.decode("utf-8", errors="replace") if isinstance(v, bytes) else str(v) for k, v in values.items()}
 
 
 def write_hdf5(recording: Recording, path: Path) -> None:
@@ -188,7 +219,8 @@ def write_hdf5(recording: Recording, path: Path) -> None:
             samples.attrs["units"] = [c.unit.replace("\0", " ") for c in recording.channels]
             file.create_dataset(OWN_NAME, data=metadata_json(recording))
     except RuntimeError as error:  # of a file that cannot be closed, as on a disk that is full
-        raise OSError(str(error)) from error
+        number = re.search(r"errno = (\d+)", str(error))
+        raise (OSError(int(number[1]), str(error)) if number else OSError(str(error))) from error
 
 
 HDF5 = FileFormat(

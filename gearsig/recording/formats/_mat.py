@@ -414,7 +414,9 @@ def read_mat73(path: Path) -> RawTable:
 
 
 def _matlab_class(dataset: Any) -> str:
-    value = dataset.attrs.get("MATLAB_class", b"")
+    # One of any length may be damaged in ways that the library does not survive; MATLAB writes none.
+    is_fixed = "MATLAB_class" in dataset.attrs and dataset.attrs.get_id("MATLAB_class").dtype.kind == "S"
+    value = dataset.attrs["MATLAB_class"] if is_fixed else b""
     return value.decode("ascii", errors="replace") if isinstance(value, bytes) else str(value)
 
 

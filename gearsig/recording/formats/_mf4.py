@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
-from collections.abc import Iterator
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from contextlib import redirect_stderr, redirect_stdout
 from importlib.util import find_spec
 from io import StringIO
 from pathlib import Path
@@ -44,7 +43,9 @@ def read_mf4(path: Path) -> RawTable:
     check_memory(4 * path.stat().st_size, where)
     try:  # its compiled parts trust the file: a damaged one can end the process
         call_apart(_load, longest_s=60.0)  # takes seconds, once
-        return call_apart(_read, path, longest_s=4.0 + 1e-6 * path.stat().st_size)
+        size = path.stat().st_size
+        most_bytes = 2 * max(FREE_BYTES, MAX_RATIO * size)
+        return call_apart(_read, path, longest_s=4.0 + 1e-6 * size, most_bytes=most_bytes)
     except (BrokenProcessPool, MemoryError):
         raise InputError(
             "is damaged: its reader crashes, finds no end, or asks for far more memory than it can hold",
@@ -65,8 +66,7 @@ def _read(path: Path) -> RawTable:
     from asammdf import MDF
 
     sys.unraisablehook = lambda _: None  # destructors of half-opened files fail; this process does nothing else
-    most_bytes = 2 * max(FREE_BYTES, MAX_RATIO * path.stat().st_size)
-    with _memory_limit(most_bytes), redirect_stdout(StringIO()), redirect_stderr(StringIO()), MDF(str(path)) as file:
+    with redirect_stdout(StringIO()), redirect_stderr(StringIO()), MDF(str(path)) as file:
         signals = [s for s in file.iter_channels(skip_master=True) if s.samples.dtype.kind in "fiub"]
     signals = [s for s in signals if s.samples.ndim == 1 and len(s.samples) > 1]
     if not signals:
@@ -76,30 +76,6 @@ def _read(path: Path) -> RawTable:
     slower = [str(s.name) for s in signals if not np.array_equal(s.timestamps, time)]
     notes = (f"channels at other times were left out: {', '.join(slower[:8])}",) if slower else ()
     return RawTable(_columns(kept), READER, time=RawColumn("time", time, "s"), warnings=notes)
-
-
-@contextmanager
-def _memory_limit(n_bytes: int) -> Iterator[None]:
-    """Let this process take no more than so much besides what it has; where the system does not tell, it may.
-
-    A damaged length makes the reader ask for hundreds of megabytes for a file of three kilobytes.
-    """
-    statm = Path("/proc/self/statm")
-    if not statm.exists():
-        yield
-        return
-    import resource
-
-    before = resource.getrlimit(resource.RLIMIT_AS)
-    now_bytes = int(statm.read_text().split()[0]) * resource.getpagesize()
-    most_bytes = now_bytes + n_bytes
-    if before[0] != resource.RLIM_INFINITY:
-        most_bytes = min(most_bytes, before[0])
-    resource.setrlimit(resource.RLIMIT_AS, (most_bytes, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_AS, before)
 
 
 def _columns(signals: list[Any]) -> tuple[RawColumn, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -40,7 +40,9 @@ def read_parquet(path: Path, part: slice | None = None) -> RawTable:
         numeric = [f for f in schema if any(test(f.type) for test in is_number)]
         kept = [f for f in numeric if not f.name.startswith("__index_level_")]
         row_bytes = sum(max(1, int(f.type.bit_width) // 8) for f in kept)
-        sizes = _group_bytes(parts, kept, row_bytes)
+        # Buffered: column by column, and nothing of it before it is used.
+        lazily = parquet.ParquetFile(file, metadata=parts.metadata, buffer_size=4096, pre_buffer=False)
+        sizes = _group_bytes(lazily, kept, row_bytes)
         check_decoded(sum(sizes), path, at_once_bytes=None if part is None else max(sizes, default=0))
         # Other columns are not even decoded: texts unpack to any size.
         single = [f.name for f in kept if schema.names.count(f.name) == 1]
@@ -95,17 +97,17 @@ def _column_values(parts: Any, name: str, part: slice | None) -> NumberArray:
 
 def _group_bytes(parts: Any, fields: Sequence[Any], row_bytes: int) -> list[int]:
     """Return what some columns unpack to in each group of rows, pages and dictionaries as the file states them."""
-    names = {field.name for field in fields}
-    groups = [parts.metadata.row_group(i) for i in range(parts.metadata.num_row_groups)]
-    return [
-        max(group.num_rows * row_bytes, sum(int(c.total_uncompressed_size) for c in _chunks(group, names)))
-        for group in groups
-    ]
-
-
-def _chunks(group: Any, names: Set[str]) -> list[Any]:
-    chunks = (group.column(i) for i in range(group.num_columns))
-    return [chunk for chunk in chunks if chunk.path_in_schema in names]
+    names, schema = {field.name for field in fields}, parts.schema
+    columns = [i for i in range(len(schema)) if schema.column(i).path in names]
+    sizes = []
+    for i in range(parts.metadata.num_row_groups):
+        # What is stated of a column may contradict itself. To read it, be it no rows at all, raises an error that can
+        # be caught; the question below would end the process.
+        list(parts.reader.iter_batches(0, [i], columns))
+        group = parts.metadata.row_group(i)
+        stated = sum(int(group.column(column).total_uncompressed_size) for column in columns)
+        sizes.append(max(group.num_rows * row_bytes, stated))
+    return sizes
 
 
 def _stated_rate(metadata: Mapping[bytes, bytes]) -> float | None:
