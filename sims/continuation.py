@@ -30,8 +30,7 @@ TRANSMISSION_ERROR = "transmission_error_m"
 DECAYS = 8.0
 """Time constants of the slowest decay that are discarded at each value: 0.03 % of the transient remains."""
 RAMP_S = 0.1
-"""Time over which speed and torque change from one value to the next, so that no step throws the motion off its branch.
-"""
+"""Duration of the ramp of speed and torque between values; a step could throw the motion off its branch."""
 SPARE_CYCLES = 2
 MIN_PER_CYCLE = 16
 """Minimum number of points kept per cycle, so that the section can be interpolated."""
