@@ -361,7 +361,7 @@ _CHAIN = (
     Parameter.choice(
         "slow_channels",
         "torque, force, speeds and accelerations: instantaneous, as stored by a motion controller and needed for "
-        "forces from motion; or filtered below half the sampling rate, as stored by a data logger and needed for spectra",
+        "forces from motion; or filtered below half the sampling rate, as by a data logger and needed for spectra",
         SAMPLINGS,
         "instants",
     ),
