@@ -111,7 +111,7 @@ class Branch:
         one_of(self.section, "section", SECTIONS)
         count(self.n_cycles, "n_cycles", minimum=4, maximum=100_000)
         if self.sweep.model != NAME:
-            raise InputError(f"model {self.sweep.model} cannot go on from a state", allowed=NAME)
+            raise InputError(f"model {self.sweep.model} cannot continue from a state", allowed=NAME)
         if len(self.sweep.axes) != 1:
             raise InputError(f"{len(self.sweep.axes)} quantities are varied", allowed="one", remedy="give --vary once")
         for profile, name in ((self.sweep.speed_rpm, "speed_rpm"), (self.sweep.torque_nm, "torque_nm")):

@@ -201,7 +201,7 @@ class BearingSupport:
         not_negative(self.clearance_um, "clearance_um of a bearing", "µm")
         if self.elements_pass and self.bearing.n_rolling_elements is None:
             raise InputError(
-                f"{self.bearing.name!r} has a defect, clearance or contacts of its own, and no geometry",
+                f"{self.bearing.name!r} has a defect, clearance or the Hertzian law, but no geometry",
                 allowed="n_rolling_elements, rolling_element_diameter_mm and pitch_diameter_mm",
                 remedy="give the bearing's geometry",
             )
@@ -434,8 +434,8 @@ class Profile:
         values = frozen_array(self.values, "values of a profile", ndim=1)
         if len(times) != len(values) or len(times) == 0 or np.any(np.diff(times) <= 0):
             raise InputError(
-                f"{len(times)} times for {len(values)} values of a profile, or times that do not rise",
-                allowed="one value per time, times rising",
+                f"{len(times)} times for {len(values)} values of a profile, or times that do not increase",
+                allowed="one value per time, increasing times",
             )
         object.__setattr__(self, "times_s", times)
         object.__setattr__(self, "values", values)
@@ -628,7 +628,7 @@ def nominal_of(rig: Rig) -> Nominal:
     if torque and abs(torque) > largest_nm:
         raise RefusalError(
             f"{torque:g} N·m on shaft {pair.driver!r} would break teeth of module {module:g} mm, {width:g} mm wide",
-            remedy=f"state the torque in N·m; up to {largest_nm:.3g} can be",
+            remedy=f"state the torque in N·m; up to {largest_nm:.3g} is possible",
         )
     stated = {
         "face_width_mm": pair.face_width_mm,

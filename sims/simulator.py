@@ -193,7 +193,7 @@ class Simulator(ABC):
 
     def rig_sources(self, preset_name: str) -> list[str]:
         """Return the sources that such a rig states."""
-        return [f"simulated with the model {self.name!r}, preset {preset_name!r}; the truth stands in the recording"]
+        return [f"simulated with the model {self.name!r}, preset {preset_name!r}; the truth is in the recording"]
 
     @abstractmethod
     def simulate(

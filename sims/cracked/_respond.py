@@ -514,7 +514,9 @@ def _checked(state: PairState) -> tuple[FloatArray, FloatArray]:
     """Check another run's last state; return its coordinates and velocities."""
     if state.q.shape != (N_COORDINATES,) or state.v.shape != (N_COORDINATES,):
         raise InputError(
-            f"a state of {state.q.size} coordinates", where="first", allowed=f"{N_COORDINATES}: another run's last"
+            f"a state of {state.q.size} coordinates",
+            where="first",
+            allowed=f"{N_COORDINATES}, as in another run's last state",
         )
     return state.q, state.v
 

@@ -392,7 +392,7 @@ def loaded(path: Path) -> Effect:
     """
     spec = spec_from_file_location(f"own_effect_{path.stem}", path)
     if spec is None or spec.loader is None or not path.is_file():
-        raise InputError("is no Python file", where=str(path), remedy="give a file NAME.py that defines EFFECT")
+        raise InputError("is not a Python file", where=str(path), remedy="give a file NAME.py that defines EFFECT")
     module = module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
@@ -433,7 +433,7 @@ def _changed(
         ) from error
     if not isinstance(changed, Machine):
         raise InputError(
-            f"the effect {user_effect.name!r} returns {type(changed).__name__} and no machine",
+            f"the effect {user_effect.name!r} returns {type(changed).__name__} instead of a machine",
             where=str(path),
             remedy="let change return the machine, as sims/effects/tooth_wear.py does",
         )
@@ -454,7 +454,7 @@ def effects() -> dict[str, Effect]:
         further = loaded(path)
         if further.name in by_name:
             raise InputError(
-                f"there is an effect {further.name!r} already", where=str(path), remedy="choose another name"
+                f"there is already an effect {further.name!r}", where=str(path), remedy="choose another name"
             )
         by_name[further.name] = further
     return dict(sorted(by_name.items(), key=lambda item: (GROUPS.index(item[1].group), item[0])))

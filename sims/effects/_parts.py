@@ -30,9 +30,9 @@ def replaced_item(items: tuple, index: int, **changes: object) -> tuple:  # type
 BEARING_OPTION = Option("bearing", "", "name of the bearing; empty: the first of the driver's shaft")
 RACE_OPTIONS = (
     BEARING_OPTION,
-    Option("angle_deg", 0.0, "where the defect lies, see the race", "deg", -360.0, 360.0),
-    Option("jitter_percent", 1.0, "scatter of the rolling elements' places, of their spacing", "%", 0.0, 10.0),
-    Option("slip_percent", 1.0, "part of the cage's turning that is lost", "%", 0.0, 5.0),
+    Option("angle_deg", 0.0, "angle of the defect, see the race", "deg", -360.0, 360.0),
+    Option("jitter_percent", 1.0, "scatter of the rolling elements' positions over their spacing", "%", 0.0, 10.0),
+    Option("slip_percent", 1.0, "part of the cage rotation that is lost", "%", 0.0, 5.0),
 )
 
 
@@ -185,7 +185,7 @@ def with_tooth_fault(machine: Machine, faults: str, index: int, fault: RootCrack
         raise InputError(
             f"tooth {fault.tooth + 1} of the {GEARS[index]} gear already has a {word}",
             allowed=f"one {word} per tooth",
-            remedy="choose another tooth, or take away what the model's own parameters give",
+            remedy="choose another tooth, or remove the one given by the model's parameters",
         )
     return with_mesh_field(machine, faults, index, (*present, fault))
 
@@ -227,7 +227,7 @@ def tolerance_of(tolerance_um: Callable[[float, float], float]) -> Scale:
 
 
 ANGLE_OPTION = Option(
-    "angle_deg", None, "where it lies, from the middle of tooth 1 the way the gear turns", "deg", -360.0, 360.0
+    "angle_deg", None, "its angle from the middle of tooth 1 in the direction of rotation", "deg", -360.0, 360.0
 )
 """Drawn if not given."""
 

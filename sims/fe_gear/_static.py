@@ -69,7 +69,7 @@ def load_tooth(
     g = mesh.blank.geometry
     force = positive(force_n, "force_n", "N")
     roll = (g.form_roll_rad + g.tip_roll_rad) / 2.0 if roll_rad is None else roll_rad
-    within(roll, "roll_rad", g.form_roll_rad, g.tip_roll_rad, "rad", remedy="take a point of the involute")
+    within(roll, "roll_rad", g.form_roll_rad, g.tip_roll_rad, "rad", remedy="take a point on the involute")
     within(flank, "flank", 0, 1)
     gear = CyclicGear(mesh)
     grid = FlankGrid(np.array([roll]), np.array([0.0]))

@@ -126,9 +126,15 @@ class ForgingDrive:
 
     def __post_init__(self) -> None:
         highest = 1.9 - self.path.ramp
-        within(self.path.contact_ratio, "contact_ratio", MIN_CONTACT_RATIO, highest, remedy="one to two pairs touch")
+        within(
+            self.path.contact_ratio,
+            "contact_ratio",
+            MIN_CONTACT_RATIO,
+            highest,
+            remedy="one to two pairs are in contact",
+        )
         if self.contact.driven_inertia_kg_m2 is None or self.pinion_side_inertia_kg_m2 <= 0.0:
-            raise InputError("an inertia is missing", where="forging drive", allowed="above 0 kg m^2 on either side")
+            raise InputError("an inertia is missing", where="forging drive", allowed="above 0 kg m^2 on both sides")
 
     @property
     def pinion_side_inertia_kg_m2(self) -> float:

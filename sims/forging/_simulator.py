@@ -118,7 +118,7 @@ CHANNELS = (
     Channel("wheel speed", "rotational_speed", "rad/s", "wheel"),
     Channel("pinion acceleration", "angular_acceleration", "rad/s^2", "pinion"),
     Channel("wheel acceleration", "angular_acceleration", "rad/s^2", "wheel"),
-    Channel("interaction force", "force", "N", "tooth flanks, of the model: no sensor measures it"),
+    Channel("interaction force", "force", "N", "tooth flanks, from the model: no sensor measures it"),
 )
 """Channels of a recording of the motion."""
 FILTERED = SAMPLINGS[1]

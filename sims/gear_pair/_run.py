@@ -316,7 +316,7 @@ class RunPlan:
             )
             if filled < len(rows[part]) or not np.isfinite(rows[part]).all():
                 raise RefusalError(
-                    f"the solution grows beyond all bounds after {(begun + filled * every) * self.step_s:.3g} s "
+                    f"the solution diverges after {(begun + filled * every) * self.step_s:.3g} s "
                     f"at a step of {self.step_s:.3g} s",
                     remedy=remedy,
                 )

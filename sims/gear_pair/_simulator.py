@@ -164,7 +164,7 @@ class PairModel(Simulator, Generic[Ready]):
         try:
             twin.pair_geometry()
         except InputError as error:
-            raise RefusalError(f"the model {self.name!r} cannot be set to this rig: {error}") from None
+            raise RefusalError(f"the model {self.name!r} cannot be adapted to this rig: {error}") from None
         return twin
 
     @abstractmethod
@@ -491,8 +491,8 @@ class PairTwin:
             assumed=(
                 "usual for its size: masses, inertias, shafts, stiffness and damping, tip relief, tolerances, oil",
                 "transfer path: drawn",
-                f"profiles of the flanks, and angles of its effects: those of seed {seed}",
-                *(f"{name}: usual, the rig does not tell" for name in self.nominal.assumed),
+                f"flank profiles, and angles of effects: those of seed {seed}",
+                *(f"{name}: usual value, as the rig does not state it" for name in self.nominal.assumed),
             ),
             does_not_represent=("the real machine's own flanks, tolerances and housing",),
             parameters=MappingProxyType(

@@ -75,7 +75,7 @@ class Motion:
 
     def angle_rad(self, shaft: str, user: str) -> FloatArray:
         """Angle of the shaft that a sensor (`user`) is fitted to, (n_steps,)."""
-        complaint = f"the {user} sits on shaft {shaft!r}, whose angle the simulation does not give"
+        complaint = f"the {user} is on shaft {shaft!r}, whose angle the simulation does not provide"
         return self.shaft_angles_rad[known_name(shaft, self.shaft_angles_rad, complaint)]
 
     def time_s(self, start_s: float = 0.0) -> FloatArray:
@@ -147,7 +147,7 @@ class AntiAlias:
         low, high = covered(signals.shape[1], step_s, sampling_rate_hz, half / up * step_s)
         if first < low or first + n_samples - 1 > high:
             raise InputError(
-                f"samples {first} to {first + n_samples - 1} reach past the simulated time",
+                f"samples {first} to {first + n_samples - 1} reach beyond the simulated time",
                 where="anti-alias filter",
                 allowed=f"{low} to {high}",
                 remedy="simulate longer",
@@ -180,7 +180,7 @@ def ratio_of_rates(step_s: float, sampling_rate_hz: float) -> tuple[int, int]:
     ratio = Fraction(product).limit_denominator(_LARGEST_TERM)
     if abs(float(ratio) / product - 1.0) > 1e-12:
         raise InputError(
-            f"a step of {step_s!r} s does not go into a sampling rate of {sampling_rate_hz:g} Hz",
+            f"a step of {step_s!r} s does not fit a sampling rate of {sampling_rate_hz:g} Hz",
             allowed=f"rates in the ratio of whole numbers up to {_LARGEST_TERM}",
             remedy=f"take {1 / (sampling_rate_hz * ceil(1 / product))!r} s",
         )

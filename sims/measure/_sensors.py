@@ -47,8 +47,8 @@ def low_pass(frequency_hz: float, damping_ratio: float, step_s: float) -> Sectio
     if frequency_hz * step_s > HIGHEST_FRACTION:
         n_steps = 1 / (frequency_hz * step_s)
         raise InputError(
-            f"a natural frequency of {frequency_hz:g} Hz has {n_steps:.2g} steps of {step_s:g} s a cycle",
-            allowed=f"at least {1 / HIGHEST_FRACTION:g} steps a cycle",
+            f"a natural frequency of {frequency_hz:g} Hz has {n_steps:.2g} steps of {step_s:g} s per cycle",
+            allowed=f"at least {1 / HIGHEST_FRACTION:g} steps per cycle",
             remedy="leave it out, or give the motion at a finer step",
         )
     w = 2 * np.pi * frequency_hz
@@ -288,7 +288,7 @@ class ModalPath:
 
 def _weights(gains: Mapping[str, float], positions: tuple[str, ...]) -> FloatArray:
     for name in gains:
-        known_name(name, positions, f"the path starts at {name!r}, which the simulation does not give")
+        known_name(name, positions, f"the path starts at {name!r}, which the simulation does not provide")
     return np.array([gains.get(name, 0.0) for name in positions])
 
 

@@ -473,7 +473,7 @@ def _phases(phases_rad: FloatArray, ndim: int, n_lines: int) -> FloatArray:
     phases = frozen_array(phases_rad, "phases_rad of the roughness", ndim=ndim)
     if phases.shape[-1] != n_lines:
         raise InputError(
-            f"{phases.shape[-1]} phases", where="phases_rad of the roughness", allowed=f"{n_lines}, per line"
+            f"{phases.shape[-1]} phases", where="phases_rad of the roughness", allowed=f"{n_lines}, one per line"
         )
     return phases
 

@@ -753,7 +753,7 @@ class GearMesh:
             half_angle = gear.base_half_angle_rad - (roll - np.arctan(roll))
             if half_angle <= 0.0:
                 raise InputError(
-                    f"ramp is {self.ramp:g} base pitches: the tooth of the gear of {gear.teeth} teeth ends before",
+                    f"ramp is {self.ramp:g} base pitches: the tooth of the {gear.teeth}-tooth gear ends before that",
                     allowed="a shorter ramp, or 0",
                     remedy="shorten the ramp or lower the addendum",
                 )

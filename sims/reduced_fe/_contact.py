@@ -715,7 +715,7 @@ def mesh_maps(
     """
     torques = frozen_array(TORQUES_NM if torque_nm is None else torque_nm, "torque_nm", ndim=1)
     if len(torques) == 0 or torques[0] <= 0.0 or np.any(np.diff(torques) <= 0.0):
-        raise InputError("torques that do not ascend from above 0", where="torque_nm", allowed="ascending, above 0 N m")
+        raise InputError("torques not ascending, or not above 0", where="torque_nm", allowed="ascending, above 0 N m")
     cycles = one_mesh_cycle() if mesh_cycles is None else frozen_array(mesh_cycles, "mesh_cycles", ndim=1)
     table = static_table(gears, mesh, support=support) if table is None else table
     loads = torques / mesh.pair.base_radii_m[0]

@@ -290,7 +290,7 @@ def test_a_file_of_no_use_is_an_error_and_leaves_the_catalogue_as_it_was(file: P
 
 
 def test_a_file_that_is_not_there_is_an_error(file: Path) -> None:
-    with pytest.raises(InputError, match="is no Python file"):
+    with pytest.raises(InputError, match="is not a Python file"):
         add_effect(file.with_name("other.py"))
 
 
