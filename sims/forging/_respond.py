@@ -322,9 +322,7 @@ def _first(run: DriveResponse, flank: float, after_s: float) -> tuple[float, flo
     """Time and speed of the first contact on a flank (0: any) after a given time."""
     fitting = (run.contact("start_s") > after_s) & ((run.contact("flank") == flank) | (flank == 0.0))
     if not np.any(fitting):
-        raise RefusalError(
-            "the flanks never meet there, so there is nothing to compare", remedy="give torque, or a brake"
-        )
+        raise RefusalError("the flanks never meet, so there is nothing to compare", remedy="give torque, or a brake")
     row = int(np.argmax(fitting))
     return float(run.contact("start_s")[row]), float(run.contact("start_speed_mps")[row])
 
