@@ -277,7 +277,7 @@ def test_a_twin_tries_it_about_its_typical_severity_on_each_gear(file: Path) -> 
         ("EFFECT = 3", "defines no effect"),
         ("x = ", "does not run .SyntaxError"),
         ("1 / 0", "does not run .ZeroDivisionError"),
-        (FILE.replace("NAME", "clipping"), "an effect 'clipping' already"),
+        (FILE.replace("NAME", "clipping"), "already an effect 'clipping'"),
         (FILE.replace("NAME", "<b>a, b</b>"), "allowed: letters, digits and underscores"),
     ],
 )
