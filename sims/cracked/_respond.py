@@ -257,7 +257,7 @@ def start_state(machine: Machine, operation: Operation, start_s: float) -> tuple
     return q, v
 
 
-# The linearized machine: mass and stiffness matrices, eigenfrequencies, and the step that follows from them.
+# The linearised machine: mass and stiffness matrices, eigenfrequencies, and the step that follows from them.
 
 STEP_ANGLE_RAD = 0.28
 """Step times the maximum angular eigenfrequency. RK4 is stable up to 2.8; at 0.28 the error is 3e-4 of the

@@ -235,7 +235,7 @@ def matched(
     reduced_hz : array, (m,)
         Elastic ones, ascending, m ≥ n.
     products : array, (n, m)
-        Mass products of full and reduced modes, both mass-normalized.
+        Mass products of full and reduced modes, both mass-normalised.
     rigid_hz : array
 
     Source: R. J. Allemang, The modal assurance criterion – twenty years of use and abuse, Sound and Vibration (2003),

@@ -155,7 +155,7 @@ def modal_load(gear: CyclicGear, modes: CyclicModes, load: ToothLoad) -> FloatAr
     return total
 
 
-# Discretization error against a finer mesh: natural frequencies and the compliance of a tooth.
+# Discretisation error against a finer mesh: natural frequencies and the compliance of a tooth.
 
 FINER_DOF = 150_000
 """Degrees of freedom of the finer mesh; its first frequency is 0.2 % above that with a million."""

@@ -113,7 +113,7 @@ def stiffness_under_load_n_per_m(support: BearingSupport, load_n: FloatArray) ->
 def balanced(
     radial: FloatArray, contact: float, clearance_m: float, load_n: FloatArray, guess: FloatArray
 ) -> FloatArray:
-    """Position p that minimizes the convex energy Σ K δ^2.5/2.5 − W·p, by Newton's method with step halving.
+    """Position p that minimises the convex energy Σ K δ^2.5/2.5 − W·p, by Newton's method with step halving.
 
     radial : (n, 2), directions of the elements. Lengths are scaled so that the curvature is about 1.
     """

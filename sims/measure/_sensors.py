@@ -370,7 +370,7 @@ class ColouredNoise:
         if n_samples % 2 == 0:
             weight[-1] = 1.0
         # Scaled by the expected power of the filtered noise: rms_mps2 is a property of the model and is not imposed on
-        # each realization.
+        # each realisation.
         scale = self.rms_mps2 / np.sqrt(np.sum(weight * shape**2) / n_samples)
         coloured: FloatArray = scale * fft.irfft(fft.rfft(white) * shape, n_samples)
         return coloured
@@ -486,7 +486,7 @@ class Encoder:
     wraps : bool
         Whether the reading restarts at each revolution.
     noise_deg : float
-        Standard deviation of each reading's error before quantization.
+        Standard deviation of each reading's error before quantisation.
     """
 
     channel: str = "encoder"

@@ -813,7 +813,7 @@ class ContactState(NamedTuple):
 
 
 def contact_state(table: ContactTable, mesh: GearMesh, force_n: float, mesh_cycles: float) -> ContactState:
-    """Solve the contact at one mesh angle and return the data for a model linearized about it."""
+    """Solve the contact at one mesh angle and return the data for a model linearised about it."""
     direct, cross, corner, extra, separation, rows, pitch, hertz = table.arrays
     slots, n_s = table.n_slots, table.n_slices
     pairs, parts = np.zeros(slots), np.zeros(slots)

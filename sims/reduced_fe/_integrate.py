@@ -41,7 +41,7 @@ from sims.reduced_fe._contact import (
     solve_contacts,
 )
 
-# Compiled: modal coordinates seen from a tooth, and generalized forces on them.
+# Compiled: modal coordinates seen from a tooth, and generalised forces on them.
 #
 # Inlined where used, as are the phases of a step: calls with many arrays took a fifth of the time.
 

@@ -225,7 +225,7 @@ INPUTS = (
     "second y force",
     "even acceleration",
 )
-"""Generalized forces on a side in addition to the contact, including those of bearings on the shaft; the last is minus
+"""Generalised forces on a side in addition to the contact, including those of bearings on the shaft; the last is minus
 that of an even rotation of the whole side."""
 MIN_PART = 1e-3
 """Static contribution of a mode at the flank, relative to the largest, below which it is left to the residual
@@ -471,7 +471,7 @@ def _matrices(
 
 
 def _modes_of(stiffness: FloatArray, mass: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Squared angular frequencies, ascending, rigid ones exactly 0, and mass-normalized shapes."""
+    """Squared angular frequencies, ascending, rigid ones exactly 0, and mass-normalised shapes."""
     from scipy.linalg import eigh
 
     squares, shapes = eigh(stiffness, mass)
@@ -480,7 +480,7 @@ def _modes_of(stiffness: FloatArray, mass: FloatArray) -> tuple[FloatArray, Floa
 
 
 def _input_places(n: int, even: FloatArray) -> FloatArray:
-    """Generalized forces of unit `INPUTS`, (9, n)."""
+    """Generalised forces of unit `INPUTS`, (9, n)."""
     places = np.zeros((len(INPUTS), n))
     for row, coordinate in enumerate((ROTOR, GEAR, X, Y, 4, 5, 6, 7)):
         places[row, coordinate] = 1.0
@@ -735,7 +735,7 @@ def _pad(side: FlexibleSide, single: int, pairs: int, silent: int) -> FlexibleSi
     )
 
 
-# The pair linearized about its loaded state: its undamped modes, including the torsional one.
+# The pair linearised about its loaded state: its undamped modes, including the torsional one.
 
 MIN_TORSIONAL_HZ = 200.0
 """Lower modes are those of rotors on their couplings."""

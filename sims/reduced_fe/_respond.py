@@ -505,7 +505,7 @@ def check_convergence(pair: FlexiblePair, operation: Operation, step_s: float, t
 
 
 # --------------------
-# Eigenfrequencies of the pair over the mesh angle, linearized about its loaded state.
+# Eigenfrequencies of the pair over the mesh angle, linearised about its loaded state.
 # --------------------
 
 
