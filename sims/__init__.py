@@ -1,4 +1,4 @@
-"""Simulators and signal models: of gearsig's rooms they use rig, recording and the gap diagnosis's protocol."""
+"""Simulators and signal models; from gearsig they use only rig, recording and the gap diagnosis's protocol."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def simulate(
     sampling_rate_hz: float = 20480.0,
     seed: int = 0,
 ) -> Recording:
-    """Simulate a machine and measure it; the recording carries rig and truth.
+    """Simulate a machine and its measurement; the recording carries the rig and the truth.
 
     Parameters
     ----------
@@ -37,11 +37,11 @@ def simulate(
     preset : str
         Empty: the model's first.
     parameters : mapping or None
-        Name → value; what is not given is the preset's.
+        Name → value; the preset's value for each one not given.
     effects : mapping, sequence of EffectSetting or None
         Name → severity in the effect's unit, or settings with options (which gear, which tooth).
     speed_rpm, torque_nm : number, sequence of (time in s, value), Profile or None
-        Of the input shaft; between points in straight lines. None: the preset's.
+        Of the input shaft, linear between points. None: the preset's.
     duration_s, sampling_rate_hz : float
     seed : int
         The same seed gives the same recording.

@@ -1,9 +1,10 @@
 """A second forging drive that makes blind cases of start–stop motion, for the benchmark and the tests only.
 
-It is built otherwise than `sims.forging` and shares no code with it: four masses (motor, pinion, wheel, gripper with
-piece) on two elastic shafts; fixed steps of the classical Runge–Kutta method without events; linear pairs of teeth
-whose stiffness follows a parabola over the path, each with its own separation, tip relief, pitch errors on both flanks;
-Kelvin–Voigt damping that fades in with depth; Coulomb–Stribeck friction; valves of first order. Effects are its own.
+It differs from `sims.forging` and shares no code with it: four masses (motor, pinion, wheel, gripper with piece) on two
+elastic shafts; fixed steps of the classical Runge–Kutta method without event detection; linear tooth pairs with a
+parabolic stiffness over the path, each with its own separation, tip relief and pitch errors on both flanks;
+Kelvin–Voigt damping that increases smoothly with depth; Coulomb–Stribeck friction; first-order valves. It has its own
+form of every effect.
 """
 
 # mypy: allow-untyped-defs, allow-untyped-calls
@@ -37,7 +38,7 @@ GEARS = {
     "calibration": ((18, 90, 6.0), (23, 92, 4.5), (21, 63, 6.0), (25, 110, 4.0)),
     "evaluation": ((21, 105, 5.0), (24, 84, 5.0), (20, 76, 6.0), (26, 117, 4.0)),
 }
-"""Teeth and module in mm; no pair is in two roles."""
+"""Teeth, and module in mm; no pair is in two roles."""
 TOLERANCE = 0.15
 PRESSURE_ANGLE = radians(20.0)
 SHAFTS = ("pinion", "wheel")
@@ -45,7 +46,7 @@ SHAFTS = ("pinion", "wheel")
 
 @dataclass(frozen=True)
 class Drawing:
-    """What somebody knows who has the drawing.
+    """The data in a machine's drawing.
 
     Parameters
     ----------
@@ -76,22 +77,22 @@ class Drawing:
 
     @property
     def base_radii_m(self) -> tuple[float, float]:
-        """Of pinion and wheel."""
+        """Base radii of pinion and wheel."""
         r1, r2 = (0.5e-3 * self.module_mm * z * cos(PRESSURE_ANGLE) for z in (self.z1, self.z2))
         return r1, r2
 
     @property
     def tooth_force_n(self) -> float:
-        """Under the motor's full torque."""
+        """Tooth force at the motor's full torque."""
         return self.torque_nm / self.base_radii_m[0]
 
     @property
     def hertz_n_per_m1p5(self) -> float:
-        """Stiffness of a pair by the textbook, as the drawing's owner computes it."""
+        """Textbook stiffness of a tooth pair, as computed from the drawing."""
         return hertz_stiffness_n_per_m1p5(self.z2 / self.z1, 0.5e-3 * self.module_mm * self.z1, PRESSURE_ANGLE)
 
     def rig(self, channels: tuple[Sensor, ...]) -> Rig:
-        """Return the rig file's content."""
+        """Return the content of the rig file."""
         pair = GearPair("stage 1", *SHAFTS, self.z1, self.z2, self.module_mm, 20.0, 16.0 * self.module_mm)
         return Rig(
             name="forging drive",
@@ -115,14 +116,14 @@ class Drawing:
 
 @dataclass(frozen=True)
 class BlindDrive:
-    """One drive as it is.
+    """An actual drive.
 
     Parameters
     ----------
     drawing : Drawing
     numbers : mapping
-        Every number of the kernel and the sensors by name, in SI units: always the same names, or the kernel would be
-        compiled anew.
+        All numbers of the kernel and the sensors by name, in SI units; the names are always the same, as otherwise the
+        kernel would be recompiled.
     errors : (array, array)
         Deviations in m of each tooth's drive and back flank, (2, z1) and (2, z2); above 0: material is missing.
     """
@@ -132,7 +133,7 @@ class BlindDrive:
     errors: tuple[FloatArray, FloatArray] = field(repr=False)
 
     def record(self) -> np.recarray:
-        """Return the numbers as the kernel reads them."""
+        """Return the numbers as a record for the kernel."""
         kind = np.dtype([(name, np.float64) for name in sorted(self.numbers)])
         r = np.zeros(1, dtype=kind)
         for name, value in self.numbers.items():
@@ -166,7 +167,7 @@ def draw_drawing(rng: np.random.Generator, role: str) -> Drawing:
 
 
 def build(rng: np.random.Generator, drawing: Drawing) -> BlindDrive:
-    """Build a machine by its drawing, within its tolerances."""
+    """Build a machine from its drawing, within its tolerances."""
     d = drawing
     depth = (d.tooth_force_n / d.hertz_n_per_m1p5) ** (2.0 / 3.0)
     k0 = _about(rng, d.tooth_force_n / depth) / 0.9
@@ -204,7 +205,7 @@ def _about(rng: np.random.Generator, value: float) -> float:
 
 
 def _shafts(rng: np.random.Generator, d: Drawing, swing_kg_m2: float) -> dict[str, float]:
-    """Torque sensor's shaft, and the one between wheel and gripper, on which both swing."""
+    """Shaft of the torque sensor, and shaft between wheel and gripper, on which both oscillate."""
     kt = _about(rng, 6e4) * (d.torque_nm / 95.0)
     kw = swing_kg_m2 * (2.0 * pi * rng.uniform(50.0, 90.0)) ** 2
     return {
@@ -216,7 +217,7 @@ def _shafts(rng: np.random.Generator, d: Drawing, swing_kg_m2: float) -> dict[st
 
 
 def _flanks(rng: np.random.Generator, d: Drawing, k0: float, load: float, depth_m: float) -> dict[str, float]:
-    """Stiffness, damping, play, relief and friction of the teeth; nothing worn, nothing cracked."""
+    """Stiffness, damping, backlash, relief and friction of the teeth, without wear or crack."""
     rb1, rb2 = d.base_radii_m
     per_mass = rb1**2 / d.motor_inertia_kg_m2 + rb2**2 / load
     return {
@@ -260,7 +261,7 @@ def _motor(rng: np.random.Generator, d: Drawing) -> dict[str, float]:
 
 
 def _path(d: Drawing) -> dict[str, float]:
-    """Path of contact of standard teeth, in base pitches from where a pair enters."""
+    """Path of contact of standard teeth, in base pitches from the entry of a pair."""
     rb = d.base_radii_m
     out = [1e-3 * d.module_mm * (0.5 * z + 1.0) for z in (d.z1, d.z2)]
     rho = [ra * sin(acos(b / ra)) for ra, b in zip(out, rb, strict=True)]
@@ -284,27 +285,27 @@ def _path(d: Drawing) -> dict[str, float]:
 
 
 # --------------------
-# What can be wrong with a drive: each a change of its numbers, in this rig's own way.
+# Faults of a drive: each changes its numbers, in this rig's own way.
 # --------------------
 
 
 Applied = tuple[dict[str, float], dict[str, float]]
-"""Numbers that change, and where it sits."""
+"""Numbers that change, and the location."""
 
 
 @dataclass(frozen=True)
 class DriveChange:
-    """One thing that can be wrong.
+    """A possible fault.
 
     Parameters
     ----------
     low, high : float
-        Severity, from barely noticeable to strong.
+        Severities, barely noticeable and strong.
     unit : str
     apply : callable
         Machine, severity, generator → numbers that change, place.
     needs_reference : bool
-        Whether no drawing states the healthy value.
+        Whether the healthy value is stated in no drawing.
     """
 
     low: float
@@ -315,7 +316,7 @@ class DriveChange:
 
 
 def _backlash(m: BlindDrive, added_um: float, _: np.random.Generator) -> Applied:
-    """Wheels that moved apart: both flanks give way, and pairs touch a little shorter."""
+    """Gears that moved apart: both flanks recede, and pairs are in contact for slightly less of the path."""
     apart = added_um * 1e-6 / (2.0 * np.sin(m.numbers["pressure_angle"]))
     shorter = 2.0 * apart * np.cos(m.numbers["pressure_angle"]) / m.numbers["base_pitch"] * 0.5
     return {"half_play": m.numbers["half_play"] + 0.5e-6 * added_um, "ratio": m.numbers["ratio"] - shorter}, {}
@@ -335,7 +336,7 @@ def _load_friction(m: BlindDrive, percent: float, _: np.random.Generator) -> App
 
 
 def _crack(m: BlindDrive, depth_mm: float, rng: np.random.Generator) -> Applied:
-    """A tooth's root as a cantilever: compliance with the third power of what is left of its thickness."""
+    """A tooth's root as a cantilever: compliance with the third power of its remaining thickness."""
     thickness_share = 1.0 - depth_mm / (2.2 * m.drawing.module_mm)
     tooth = int(rng.integers(m.drawing.z1))
     return {"crack": 0.12 * (thickness_share**-3 - 1.0), "cracked": float(tooth)}, {"tooth": tooth + 1}
@@ -381,38 +382,38 @@ CATALOGUE = {
     "torque_gain": DriveChange(12.0, 40.0, "%", _torque_gain),
     "torque_ripple": DriveChange(1.5, 10.0, "%", _ripple),
 }
-"""What a diagnosis may name."""
+"""Faults that a diagnosis can name."""
 OUTSIDE = {
     "run_out": DriveChange(30.0, 150.0, "um", _run_out),
     "off_centre": DriveChange(8.0, 40.0, "%", _off_centre),
     "encoder_slip": DriveChange(30.0, 200.0, "um", _slip),
 }
-"""What it must call unknown."""
+"""Faults that it must call unknown."""
 
 
 def changed(
     machine: BlindDrive, name: str, severity: float, rng: np.random.Generator
 ) -> tuple[BlindDrive, dict[str, float]]:
-    """Return the machine with something wrong, and where it sits."""
+    """Return the machine with a fault, and the fault's location."""
     change = (CATALOGUE | OUTSIDE)[name]
     numbers, place = change.apply(machine, severity, rng)
     return replace(machine, numbers=machine.numbers | numbers), place
 
 
 # --------------------
-# Its motion.
+# Motion of the drive.
 # --------------------
 
 
 N_STATES = 10
-"""Angle and speed of motor, pinion, wheel, load; opening of the valve; grip of the brake."""
+"""Angle and speed of motor, pinion, wheel and load; opening of the valve; grip of the brake."""
 N_OUT = 8
-"""Pinion's and wheel's angle, speed, acceleration; torque of the sensor; force of the teeth."""
+"""Angle, speed and acceleration of pinion and wheel; sensor torque; tooth force."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _relief(r, p):
-    """Tip relief at both ends of the path: the pair comes and goes without a step."""
+    """Tip relief at both ends of the path, so that pairs engage and disengage without a step."""
     if p < r.relief_length:
         x = (r.relief_length - p) / r.relief_length
         return r.relief * x * x
@@ -424,7 +425,7 @@ def _relief(r, p):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _worn(r, p):
-    """Depth of wear over the path: pressure times sliding, half of the load where two pairs share it."""
+    """Depth of wear over the path: pressure times sliding, with half the load where two pairs share it."""
     if r.wear == 0.0:
         return 0.0
     share = 1.0 if r.ratio - 1.0 < p < 1.0 else 0.5
@@ -532,7 +533,7 @@ def march(r, y, errors_1, errors_2, n_samples, interval, longest_step):
 
 
 # --------------------
-# From a drive's motion to a recording: encoders that round, noise, sensors that are not there.
+# From a drive's motion to a recording: encoder rounding, noise, missing sensors.
 # --------------------
 
 
@@ -551,21 +552,21 @@ ALL = (
 
 @dataclass(frozen=True)
 class Chain:
-    """What measures a machine.
+    """The measurement chain of a machine.
 
     Parameters
     ----------
     counts : int
         Of both encoders per revolution.
     n_channels : int
-        How many of `ALL`: 3 (torque and angles), 7 or 8.
+        Number of channels from `ALL`: 3 (torque and angles), 7 or 8.
     torque_noise, torque_offset : float
-        Part of the motor's torque.
+        As a fraction of the motor's torque.
     speed_noise, acceleration_noise : float
         rad/s, rad/s².
     force_gain : float
     wheel_zero_rad : float
-        Where the wheel's encoder begins to count.
+        Zero position of the wheel's encoder.
     """
 
     counts: int
@@ -579,17 +580,17 @@ class Chain:
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """Those that are recorded."""
+        """The recorded channels."""
         return ALL[: self.n_channels]
 
     @property
     def sensors(self) -> tuple[Sensor, ...]:
-        """For the rig file."""
+        """The sensors for the rig file."""
         return tuple(Sensor(c.name, c.quantity, c.unit, c.position) for c in self.channels)
 
 
 def draw_chain(rng: np.random.Generator) -> Chain:
-    """Draw what measures a machine."""
+    """Draw a measurement chain."""
     return Chain(
         2 ** int(rng.choice([16, 18, 20])),
         int(rng.choice([3, 7, 8])),
@@ -603,7 +604,7 @@ def draw_chain(rng: np.random.Generator) -> Chain:
 
 
 def run(machine: BlindDrive, chain: Chain, duration_s: float, rng: np.random.Generator) -> Recording:
-    """Run a machine from rest and measure it; the pinion stands anywhere at the beginning."""
+    """Run a machine from rest and measure it; the pinion starts at a random angle."""
     n = machine.numbers
     y = np.zeros(N_STATES)
     y[0] = y[2] = rng.uniform(0.0, 2.0 * pi)
@@ -644,7 +645,7 @@ def _readings(machine: BlindDrive, chain: Chain, motion: FloatArray, rng: np.ran
 
 
 def _slips(machine: BlindDrive, motion: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """The wheel's encoder stays behind by a random way in each start."""
+    """Slip of the wheel's encoder by a random distance in each start."""
     angle = np.zeros(len(motion))
     slip, n = machine.numbers["slip"], machine.numbers
     if slip == 0.0:
@@ -657,18 +658,18 @@ def _slips(machine: BlindDrive, motion: FloatArray, rng: np.random.Generator) ->
 
 
 # --------------------
-# One blind case: a machine by its drawing, something wrong or nothing, recordings now and when it was healthy.
+# One blind case: a machine built from a drawing, with or without a fault, recorded now and when it was healthy.
 # --------------------
 
 
 KINDS = ("none", "single", "unknown")
 DAILY = {"load_level": 0.05, "mu": 0.05, "torque": 0.02, "motor_level": 0.1, "brake": 0.05}
-"""What a healthy machine changes by from one day to another, relative."""
+"""Relative day-to-day changes of a healthy machine."""
 
 
 @dataclass(frozen=True)
 class DriveCase:
-    """A case as it was drawn.
+    """A drawn case.
 
     Parameters
     ----------
@@ -679,9 +680,9 @@ class DriveCase:
     level, severity : float
         0 (barely noticeable) to 1 (strong), and in the effect's unit.
     place : mapping
-        Tooth (from 1) or order, where it has one.
-    machine, healthy : Machine
-        Now; and as the reference knew it.
+        Tooth (from 1) or order, if it has one.
+    machine, healthy : BlindDrive
+        The present machine, and the healthy one of the reference.
     chain : Chain
     duration_s : float
     with_reference : bool
@@ -704,7 +705,7 @@ class DriveCase:
 
 @dataclass(frozen=True)
 class MadeCase:
-    """Recordings: now, and of the healthy machine where there is one."""
+    """Recordings of the present machine and, if there is one, of the healthy machine."""
 
     recording: Recording
     reference: Recording | None
@@ -721,7 +722,7 @@ def draw_case(
     role : str
         "development", "calibration" or "evaluation"; they share no gears.
     kind : str
-        "none", "single" (of `CATALOGUE`) or "unknown" (of `OUTSIDE`).
+        "none", "single" (from `CATALOGUE`) or "unknown" (from `OUTSIDE`).
     effect : str
         Empty for none.
     level : float
@@ -747,14 +748,14 @@ def draw_case(
 
 
 def record_case(case: DriveCase) -> MadeCase:
-    """Record a case."""
+    """Record a case and, if it has one, its reference."""
     rng, reference_rng = np.random.default_rng(case.seed).spawn(2)
     reference = run(case.healthy, case.chain, case.duration_s, reference_rng) if case.with_reference else None
     return MadeCase(run(case.machine, case.chain, case.duration_s, rng), reference)
 
 
 def label_of(case: DriveCase) -> dict[str, Any]:
-    """Return what is true of a case, as plain values."""
+    """Return the true answers of a case as plain values."""
     return {
         "kind": case.kind,
         "effect": case.effect,
@@ -770,6 +771,6 @@ def label_of(case: DriveCase) -> dict[str, Any]:
 
 
 def _another_day(machine: BlindDrive, rng: np.random.Generator) -> BlindDrive:
-    """Return the machine as warm, as oiled and as valved as it is today."""
+    """Return the machine with day-to-day changes of friction, torque and brake."""
     today = {name: machine.numbers[name] * rng.uniform(1.0 - part, 1.0 + part) for name, part in DAILY.items()}
     return replace(machine, numbers=machine.numbers | today)

@@ -1,4 +1,4 @@
-"""Steady runs at one value after another, each going on from where the last one ended: branches of a bifurcation."""
+"""Steady runs at successive parameter values, each starting where the last one ended: branches of a bifurcation."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ from sims.sweep import Sweep
 SECTIONS = ("mesh", "shaft")
 TRANSMISSION_ERROR = "transmission_error_m"
 DECAYS = 8.0
-"""Time constants of the slowest decay that are left out at each value: 0.03 % of what a change stirs up is left."""
+"""Time constants of the slowest decay that are discarded at each value: 0.03 % of the transient remains."""
 RAMP_S = 0.1
-"""Time over which speed and torque go from one value to the next: no blow throws the motion off its branch."""
+"""Duration of the ramp of speed and torque between values; a step could throw the motion off its branch."""
 SPARE_CYCLES = 2
 MIN_PER_CYCLE = 16
-"""Points that are kept per cycle, so that the section can be interpolated."""
+"""Minimum number of points kept per cycle, so that the section can be interpolated."""
 _ANGLE = ("driver angle", "driver angle velocity")
 
 
 @dataclass(frozen=True)
 class End:
-    """Where a run ended: the state, and the speed and torque it was steady at."""
+    """Where a run ended: its state, and its steady speed and torque."""
 
     state: PairState
     speed_rpm: float
@@ -48,22 +48,22 @@ class End:
 
 @dataclass(frozen=True)
 class SteadyRun:
-    """The machine at one value, its transient left out.
+    """The machine at one value, with its transient discarded.
 
     Parameters
     ----------
     value : float
-        Of what is varied.
+        Of the varied quantity.
     machine : Machine
         With its effects.
     response : Response
-        From time 0 on: driver angle, transmission error, mesh force and what was asked for.
+        From time 0 on: driver angle, transmission error, mesh force and the requested signals.
     recording : Recording or None
-        Where a channel of the measurement chain was asked for; on the same time axis.
+        Given where a channel of the measurement chain was requested; on the same time axis.
     settled_s : float
-        Time that was left out ahead.
+        Duration of the discarded transient.
     end : End
-        What the next run goes on from.
+        Starting point of the next run.
     """
 
     value: float
@@ -82,24 +82,24 @@ class SteadyRun:
 
     @property
     def separated_share(self) -> float:
-        """Share of the time without a tooth in contact."""
+        """Fraction of the time without a tooth in contact."""
         return float(np.mean(self.response["mesh_force_n"] == 0.0))
 
 
 @dataclass(frozen=True)
 class Branch:
-    """What is run at each value.
+    """A branch: what is run at each value.
 
     Parameters
     ----------
     sweep : Sweep
-        With one axis; every value draws the same roughness and tolerances. Its duration is not used.
+        With one axis; the same roughness and tolerances are drawn at every value. Its duration is not used.
     signal : str
-        One of `sims.cracked.SIGNALS`, or a channel of the measurement chain (noise and all), e.g. "a1".
+        One of `sims.cracked.SIGNALS`, or a channel of the measurement chain (noise included), e.g. "a1".
     section : str
-        Cycles are counted of the "mesh" or of the input "shaft".
+        Whether cycles are those of the "mesh" or of the input "shaft".
     n_cycles : int
-        Kept at each value.
+        Cycles kept at each value.
     """
 
     sweep: Sweep
@@ -111,7 +111,7 @@ class Branch:
         one_of(self.section, "section", SECTIONS)
         count(self.n_cycles, "n_cycles", minimum=4, maximum=100_000)
         if self.sweep.model != NAME:
-            raise InputError(f"model {self.sweep.model} cannot go on from a state", allowed=NAME)
+            raise InputError(f"model {self.sweep.model} cannot continue from a state", allowed=NAME)
         if len(self.sweep.axes) != 1:
             raise InputError(f"{len(self.sweep.axes)} quantities are varied", allowed="one", remedy="give --vary once")
         for profile, name in ((self.sweep.speed_rpm, "speed_rpm"), (self.sweep.torque_nm, "torque_nm")):
@@ -120,11 +120,11 @@ class Branch:
 
     @property
     def values(self) -> tuple[float, ...]:
-        """What the parameter is set to, ascending."""
+        """Values of the varied quantity, ascending."""
         return tuple(sorted(self.sweep.axes[0].values))
 
     def check_signal(self) -> None:
-        """Refuse a signal that neither the model nor its measurement chain has."""
+        """Reject a signal that neither the model nor its measurement chain has."""
         if self.signal in SIGNALS:
             return
         machine = self._prepared(self.values[0], np.random.default_rng(self.sweep.seed)).machine
@@ -137,9 +137,9 @@ class Branch:
             )
 
     def run(self, value: float, before: End | None = None) -> SteadyRun:
-        """Run one value, from where another run ended or from the static balance.
+        """Run one value, from the end of another run or from static equilibrium.
 
-        Left out ahead are `DECAYS` time constants of the machine's slowest decay.
+        The first `DECAYS` time constants of the machine's slowest decay are discarded.
         """
         rng = np.random.default_rng(self.sweep.seed)
         ready = self._prepared(value, rng)
@@ -159,7 +159,7 @@ class Branch:
                 rng, self.sweep.sampling_rate_hz, duration_s, also=self._signals_needed(), first=state
             )
             recording, response = simulate_with_motion(machine, operation, measured)
-        assert response.last is not None  # noqa: S101 - said to the type checker: `respond` always leaves one
+        assert response.last is not None  # noqa: S101 - for the type checker: `respond` always sets it
         end = End(response.last, speed, operation.torque_nm.largest)
         return SteadyRun(value, machine, _from_zero(response), recording, settle_s, end)
 
@@ -200,7 +200,7 @@ class Branch:
 
 
 def _ramped(ready: ReadyPair, before: End | None, seed: int) -> PairState | None:
-    """Go from one operation to the next slowly."""
+    """Return the state after a slow ramp from the previous operation to this one."""
     if before is None:
         return None
     now = ready.operation
@@ -221,7 +221,7 @@ def _ramped(ready: ReadyPair, before: End | None, seed: int) -> PairState | None
 
 
 def _from_zero(response: Response) -> Response:
-    """Keep what lies at time 0 and after; whole revolutions are taken off the angle, which keeps its digits."""
+    """Keep time 0 and later; whole revolutions are subtracted from the angle to preserve its precision."""
     start = int(np.searchsorted(response.time_s, -1e-12))
     signals = {name: values[start:].copy() for name, values in response.signals.items()}
     turn = 2.0 * pi

@@ -1,4 +1,4 @@
-"""A simulated recording on disk: the recording, its rig file and its truth, all or none."""
+"""A simulated recording on disk: the recording, its rig file and its truth, all or none written."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from gearsig.rig import read_rig, write_rig
 
 
 class FileSet(NamedTuple):
-    """Names of what belongs to one recording."""
+    """The files that belong to one recording."""
 
     recording: Path
     rig: Path
@@ -23,13 +23,13 @@ class FileSet(NamedTuple):
 
 
 def file_set(path: str | Path, *, replace: bool = False) -> FileSet:
-    """Return the names that belong to a recording, after checking that they can be written.
+    """Return the file names that belong to a recording, after checking that they can be written.
 
     Raises
     ------
     InputError
-        If the format is not known, the folder is missing, the name holds a dot more than its extension's (the rig file
-        beside it could not be found), or one of the files exists and `replace` is false.
+        If the format is unknown, the folder is missing, the name has a dot besides that of its extension (its rig file
+        could not be found), or one of the files exists and `replace` is false.
     """
     target = recording_target(path)
     if "." in target.stem:
@@ -54,7 +54,9 @@ def _names(target: Path) -> FileSet:
 
 
 def is_whole(path: Path) -> bool:
-    """Say whether all that belongs to a recording is there, can be read and agrees; of long formats, samples are not.
+    """Say whether a recording's files are all there, readable and consistent.
+
+    Where the format can be read in parts, only the first sample is read.
 
     Parameters
     ----------
@@ -76,10 +78,10 @@ def _truth_json(recording: Recording) -> str:
 
 
 def write_set(recording: Recording, names: FileSet) -> None:
-    """Write a recording that has rig and truth, its rig file and its truth.
+    """Write a recording that has rig and truth, with its rig file and its truth file.
 
-    They are written beside their places and moved there when all are complete, the recording last: where it stands,
-    the others do.
+    The files are written to a temporary folder and moved into place when all are complete, the recording last: if it
+    is there, so are the others.
     """
     if recording.rig is None or recording.truth is None:
         raise InputError("the recording has no rig or no truth", where=names.recording.name)
@@ -107,7 +109,7 @@ def write_set(recording: Recording, names: FileSet) -> None:
 
 
 def _move(parts: FileSet, names: FileSet) -> None:
-    """Move all parts to their places; where one cannot be moved, take back those that replaced nothing."""
+    """Move all parts into place; if one cannot be moved, remove those that replaced nothing."""
     moved: list[Path] = []
     try:
         for part, name in reversed(list(zip(parts, names, strict=True))):
@@ -122,7 +124,7 @@ def _move(parts: FileSet, names: FileSet) -> None:
 
 
 def _plain(value: Any) -> Any:
-    """Turn NumPy values and mappings of other kinds into JSON's."""
+    """Convert NumPy values and other mappings to JSON types."""
     if isinstance(value, Mapping):
         return dict(value)
-    return value.tolist()  # of arrays and of NumPy's numbers
+    return value.tolist()  # NumPy arrays and scalars

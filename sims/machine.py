@@ -1,4 +1,4 @@
-"""A gear pair between two rotors, how it is run and what a rig says of it: simulators share it, effects change it."""
+"""A gear pair between two rotors and its operation, shared by the simulators; the effects change it."""
 
 # mypy: allow-untyped-defs, allow-untyped-calls
 
@@ -16,12 +16,12 @@ from gearsig.rig import Bearing, Rig
 from sims.measure import MeasurementChain
 from sims.mesh import GearMesh
 
-# The parts of a geared drive as every simulator of one sees them, with what can be wrong with each.
+# The parts of a geared drive, common to its simulators, with the faults each can have.
 
 MAX_DRY_FRICTION = 0.6
-"""Coefficient of clean dry steel on steel."""
+"""Friction coefficient of clean, dry steel on steel."""
 RACE_EDGE_MM = 0.3
-"""Beyond either edge of a spall on a race, where a rolling element begins to feel it."""
+"""Distance from either edge of a race spall at which a rolling element begins to feel it."""
 
 
 @dataclass(frozen=True)
@@ -35,11 +35,11 @@ class Wheel:
     runout_um : float
         Distance of the pitch circle's centre from the axis of rotation (half of the measured run-out).
     runout_angle_deg : float
-        Where that centre lies, from the middle of tooth 0 in the gear's own direction of rotation.
+        Angle of that centre from the middle of tooth 0, in the gear's direction of rotation.
     unbalance_g_mm : float
         Mass times distance of the centre of mass from the axis of rotation.
     unbalance_angle_deg : float
-        Where the centre of mass lies, counted alike.
+        Angle of the centre of mass, measured in the same way.
     """
 
     mass_kg: float
@@ -71,17 +71,17 @@ class ShaftLine:
     ----------
     name : str
     bending_stiffness_n_per_m, bending_damping_n_s_per_m : float
-        Between the gear and the mean of its two bearings, alike in every direction.
+        Between the gear and the mean of its two bearings, the same in every direction.
     torsional_stiffness_nm_per_rad, torsional_damping_nm_s_per_rad : float
         Between gear and rotor.
     rotor_inertia_kg_m2 : float
     coupling_angle_deg : float
         Angle between rotor axis and shaft axis in the coupling, 0 to 5.
     coupling_bending_nm_per_rad : float
-        Bending stiffness of the coupling about the axis where it is stiff; about the other, a quarter turn away, it
-        has none, so that an angle bends the shaft twice a turn, however little torque it carries.
+        Bending stiffness of the coupling about its stiff axis. About the perpendicular axis it has none, so an angle
+        bends the shaft twice per revolution, however low the torque.
     bearing_distance_m : float
-        Between the two bearings; it turns the coupling's bending moments into forces on them.
+        Between the two bearings; it converts the coupling's bending moments into bearing forces.
     """
 
     name: str
@@ -107,7 +107,7 @@ class ShaftLine:
 
 @dataclass(frozen=True)
 class WeakTooth:
-    """A tooth that yields more than the others on its drive flank.
+    """A tooth that is more compliant than the others on its drive flank.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ class WeakTooth:
     tooth : int
         From 0 at the angles' zero.
     loss : float
-        Part of a pair's stiffness that is gone, 0 to below 1.
+        Fraction of the pair's stiffness that is lost, 0 to below 1.
     """
 
     gear: int
@@ -136,15 +136,15 @@ class RaceDefect:
     Parameters
     ----------
     race : str
-        "outer" (standing) or "inner" (turning).
+        "outer" (stationary) or "inner" (rotating).
     length_mm : float
         Along the raceway.
     angle_deg : float
         Outer: from the middle of the load zone. Inner: from tooth 0 at time 0.
     spacing_jitter : float
-        Standard deviation of each element's place in the cage, in element spacings; 0 to 0.1.
+        Standard deviation of each element's position in the cage, in element spacings; 0 to 0.1.
     slip : float
-        Part of the cage's turning that is lost by slip; 0 to 0.05.
+        Fraction of the cage rotation that is lost to slip; 0 to 0.05.
     """
 
     race: str
@@ -162,7 +162,7 @@ class RaceDefect:
 
 
 BEARING_LAWS = ("linear", "hertzian")
-"""Of what a bearing carries by."""
+"""Load–deflection laws of a bearing; see `BearingSupport`."""
 
 
 @dataclass(frozen=True)
@@ -172,17 +172,17 @@ class BearingSupport:
     Parameters
     ----------
     bearing : gearsig.rig.Bearing
-        Name, shaft, and the geometry that its orders follow from.
+        Name, shaft, and the geometry that determines its orders.
     mass_kg : float
-        Moving with the bearing.
+        Mass that moves with the bearing.
     stiffness_n_per_m, damping_n_s_per_m : float
-        To the ground, alike in x and y.
+        To ground, the same in x and y.
     clearance_um : float
-        Radial distance that the shaft can move from the middle until the bearing carries.
+        Radial distance that the shaft moves from the centre before the bearing carries load.
     defect : RaceDefect or None
     law : str
-        "linear": one spring. "hertzian": the elements' contacts carry one by one, with ball passage; the stiffness
-        then follows from the balls (Palmgren) and `stiffness_n_per_m` is not used.
+        "linear": one spring. "hertzian": each rolling element carries through its own contact, with ball passage; the
+        stiffness then follows from the balls (Palmgren) and `stiffness_n_per_m` is not used.
     """
 
     bearing: Bearing
@@ -201,18 +201,18 @@ class BearingSupport:
         not_negative(self.clearance_um, "clearance_um of a bearing", "µm")
         if self.elements_pass and self.bearing.n_rolling_elements is None:
             raise InputError(
-                f"{self.bearing.name!r} has a defect, clearance or contacts of its own, and no geometry",
+                f"{self.bearing.name!r} has a defect, clearance or the Hertzian law, but no geometry",
                 allowed="n_rolling_elements, rolling_element_diameter_mm and pitch_diameter_mm",
                 remedy="give the bearing's geometry",
             )
 
     @property
     def elements_pass(self) -> bool:
-        """Whether rolling elements that pass move the shaft: at a defect, in play, or where they carry one by one."""
+        """Whether passing rolling elements move the shaft: a defect, clearance, or the Hertzian law."""
         return self.defect is not None or self.clearance_um > 0 or self.law == "hertzian"
 
     def element_spacing_mm(self, race: str) -> float | None:
-        """Distance between rolling elements along a race, π (D ± d cos α)/n; a longer defect would hold two at once.
+        """Element spacing along a race, π (D ± d cos α)/n; a longer defect would hold two elements at once.
 
         None if the bearing's geometry is not known.
         """
@@ -231,13 +231,13 @@ class Lubrication:
     Parameters
     ----------
     friction : bool
-        False: none at all. (The regression does not give 0 for smooth flanks.)
+        False: no friction at all. (The regression does not give 0 for smooth flanks.)
     viscosity_cp : float
         Dynamic viscosity at the oil inlet.
     factor : float
         Multiplies the regression's coefficient: above 1 for starved or aged oil; 0 to 20.
     dry_coefficient : float
-        Comes on top where the film does not part the flanks, the same at every sliding speed; 0 to 0.6.
+        Added where the film does not separate the flanks, the same at every sliding speed; 0 to 0.6.
     """
 
     friction: bool = True
@@ -258,10 +258,10 @@ class Roughness:
     Parameters
     ----------
     rms_um : float
-        Composite rms roughness of both flanks; it acts on friction and on the fractal profile.
+        Composite rms roughness of both flanks; it affects friction and the fractal profile.
     locked_to : str
         "time": one endless profile that runs at a fixed speed, as in the source paper; "flank": each tooth of both
-        gears has a profile of its own, which returns with it; "none": only friction knows the roughness.
+        gears has its own profile, which repeats with that tooth; "none": roughness affects friction only.
     dimension : float
         Fractal dimension, 1.001 to 1.999.
     """
@@ -292,7 +292,7 @@ class TorqueRipple:
 
 @dataclass(frozen=True)
 class SpeedSwing:
-    """Set speed × (1 + fraction · sin(2πft + phase)): a mains- or load-driven hunting of the drive."""
+    """Set speed × (1 + fraction · sin(2πft + phase)): hunting of the drive, caused by the mains or the load."""
 
     fraction: float
     frequency_hz: float
@@ -305,21 +305,21 @@ class SpeedSwing:
 
 
 RECOVERY_S = 0.06
-"""Time in which an ordinary drive makes up for a deviation of its speed."""
+"""Time constant with which an ordinary drive corrects a speed deviation."""
 
 
 @dataclass(frozen=True)
 class Drive:
     """What turns the input rotor.
 
-    T_i = T(t)·ripple + J ω̇_set + g (ω_set − θ̇_i) + g²/4J (θ_set − θ_i): the set torque, what the set acceleration
-    needs, and a governor that makes up for friction without a lasting error of the speed. J is everything that turns,
-    as felt at the input. The load takes T(t) z2/z1.
+    T_i = T(t)·ripple + J ω̇_set + g (ω_set − θ̇_i) + g²/4J (θ_set − θ_i): the set torque, the torque for the set
+    acceleration, and a governor that compensates friction without a steady speed error. J is the total inertia
+    referred to the input. The load takes T(t) z2/z1.
 
     Parameters
     ----------
     governor_nm_s_per_rad : float or None
-        g, above 0; 2J/g is the time in which a deviation of the speed dies out. None: such that it is `RECOVERY_S`.
+        g, above 0; 2J/g is the decay time of a speed deviation. None: g such that it is `RECOVERY_S`.
     ripples : tuple of TorqueRipple
     swings : tuple of SpeedSwing
     """
@@ -343,8 +343,8 @@ def _finite(value: float, name: str) -> None:
 class Machine:
     """A spur gear pair, its shafts, bearings, drive and measurement chain. Index 0 is the driver, 1 the driven side.
 
-    Frame: y along the line of action, the way the driver's tooth pushes; x off it. The driver turns counter-clockwise,
-    the driven gear clockwise; angles count in the gears' own directions.
+    Frame: y along the line of action, in the direction in which the driver's tooth pushes; x perpendicular to it. The
+    driver turns counter-clockwise, the driven gear clockwise; angles are positive in each gear's own direction.
 
     Parameters
     ----------
@@ -353,22 +353,22 @@ class Machine:
     wheels : tuple of two Wheel
     shafts : tuple of two ShaftLine
     bearings : tuple of four BearingSupport
-        Two of the driver's shaft (the first on the coupling's side), then two of the driven one's.
+        Two on the driver's shaft (the first on the coupling side), then two on the driven shaft.
     mesh_damping_ratio : float
         ζ of the pair on its mean mesh stiffness; the damping of each tooth pair is proportional to its stiffness.
     half_backlash_um : float
-        b; the flanks have 2b of play along the line of action.
+        b; the total backlash along the line of action is 2b.
     lubrication : Lubrication
     roughness : Roughness
     drive : Drive
     chain : MeasurementChain
     gravity_mps2 : float
     line_of_action_deg : float
-        β, angle between the line of action and the vertical: upwards is x sin β + y cos β.
+        β, angle between the line of action and the vertical: the upward direction is x sin β + y cos β.
 
     Notes
     -----
-    Shafts are mirror-symmetric: either bearing takes half of the gear's force.
+    Shafts are mirror-symmetric: each bearing takes half of the gear force.
     """
 
     mesh: GearMesh
@@ -411,7 +411,7 @@ class Machine:
 
 @dataclass(frozen=True)
 class Profile:
-    """A quantity over time: straight lines between given points, held before the first and after the last.
+    """A quantity over time: linear between given points, constant before the first and after the last.
 
     Parameters
     ----------
@@ -434,8 +434,8 @@ class Profile:
         values = frozen_array(self.values, "values of a profile", ndim=1)
         if len(times) != len(values) or len(times) == 0 or np.any(np.diff(times) <= 0):
             raise InputError(
-                f"{len(times)} times for {len(values)} values of a profile, or times that do not rise",
-                allowed="one value per time, times rising",
+                f"{len(times)} times for {len(values)} values of a profile, or times that do not increase",
+                allowed="one value per time, increasing times",
             )
         object.__setattr__(self, "times_s", times)
         object.__setattr__(self, "values", values)
@@ -446,7 +446,7 @@ class Profile:
 
     @classmethod
     def constant(cls, value: float) -> Profile:
-        """Return a quantity that stays the same."""
+        """Return a profile of constant value."""
         return cls(np.zeros(1), np.array([float(value)]))
 
     @classmethod
@@ -456,7 +456,7 @@ class Profile:
 
     @property
     def largest(self) -> float:
-        """Largest magnitude."""
+        """Largest absolute value."""
         return float(np.max(np.abs(self.values)))
 
     def at(self, time_s: FloatArray | float) -> FloatArray:
@@ -473,7 +473,7 @@ class Operation:
     speed_rpm : Profile
         Not below 0.
     torque_nm : Profile
-        Not below 0; the load on the output is this times the ratio. 0 lets the teeth rattle.
+        Not below 0; the load torque at the output is this times the ratio. At 0 the teeth rattle.
     """
 
     speed_rpm: Profile
@@ -495,7 +495,7 @@ class Operation:
 
 @njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
 def profile(points, t):
-    """Value and slope at t: straight between points, held outside; (2, n) times and values."""
+    """Value and slope at t: linear between points, constant outside; `points` is (2, n), times and values."""
     n = points.shape[1]
     if t <= points[0, 0]:
         return points[1, 0], 0.0
@@ -532,7 +532,7 @@ def set_speed(k, speed, t):
 
 @njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
 def torque_ripple(k, theta):
-    """Drive torque over its set value at the rotor's angle."""
+    """Ratio of drive torque to its set value at the rotor angle."""
     factor = 1.0
     for i in range(k.n_ripples):
         factor += k.ripples[i, 1] * cos(k.ripples[i, 0] * theta + k.ripples[i, 2])
@@ -540,24 +540,24 @@ def torque_ripple(k, theta):
 
 
 # --------------------
-# What a rig says of its gear pair, completed by what is usual for its size, and the tolerances of such gears.
+# What a rig states of its gear pair, completed with values usual for its size, and the tolerances of such gears.
 # --------------------
 
 
 USUAL_LOAD_N_PER_MM2 = 50.0
-"""Force per face width and module of a pair whose torque is not known; rated gears carry 20 to 120."""
+"""Tangential force per face width and module, assumed where the torque is unknown; rated gears carry 20 to 120."""
 LARGEST_LOAD_N_PER_MM2 = 500.0
-"""Bends a tooth's root, with a form factor of 3, by 1500 N/mm²: more than hardened steel stands."""
+"""With a form factor of 3 this is a root bending stress of 1500 N/mm², more than hardened steel withstands."""
 USUAL_WIDTH_MODULES = 10.0
 USUAL_MESH_HZ = 540.0
-"""Mesh frequency of a pair whose speed is not known."""
+"""Mesh frequency assumed where the speed is unknown."""
 STIFFNESS_N_PER_MM_UM = 14.0
-"""Usual stiffness of a pair of steel gears per face width."""
+"""Usual mesh stiffness of a steel pair per face width."""
 
 
 @dataclass(frozen=True)
 class Nominal:
-    """What a rig says of its pair, completed by what is usual.
+    """What a rig states of its pair, completed with usual values.
 
     Parameters
     ----------
@@ -566,7 +566,7 @@ class Nominal:
     speed_rpm, torque_nm : float
         Of the driver.
     assumed : tuple of str
-        What the rig does not say.
+        Quantities that the rig does not state.
     """
 
     teeth: tuple[int, int]
@@ -579,32 +579,32 @@ class Nominal:
 
     @property
     def size(self) -> float:
-        """Of the machine, 1 for module 2."""
+        """Size of the machine relative to module 2 mm."""
         return self.module_mm / 2.0
 
     @property
     def pitch_diameters_mm(self) -> tuple[float, float]:
-        """Of driver and driven gear."""
+        """Pitch diameters of driver and driven gear."""
         return self.module_mm * self.teeth[0], self.module_mm * self.teeth[1]
 
     @property
     def mesh_force_n(self) -> float:
-        """Static force between the teeth, tangential."""
+        """Static tangential tooth force."""
         return 2e3 * self.torque_nm / self.pitch_diameters_mm[0]
 
     @property
     def deflection_um(self) -> float:
-        """Of the teeth under the nominal load."""
+        """Deflection of the teeth under the nominal load."""
         return self.mesh_force_n / self.face_width_mm / STIFFNESS_N_PER_MM_UM
 
     @property
     def mesh_hz(self) -> float:
-        """Tooth passings per second."""
+        """Mesh frequency."""
         return self.speed_rpm / 60.0 * self.teeth[0]
 
 
 def nominal_of(rig: Rig) -> Nominal:
-    """Return what a rig says of its only pair.
+    """Return the nominal data of a rig's only pair, with usual values for what it does not state.
 
     Raises
     ------
@@ -628,7 +628,7 @@ def nominal_of(rig: Rig) -> Nominal:
     if torque and abs(torque) > largest_nm:
         raise RefusalError(
             f"{torque:g} N·m on shaft {pair.driver!r} would break teeth of module {module:g} mm, {width:g} mm wide",
-            remedy=f"state the torque in N·m; up to {largest_nm:.3g} can be",
+            remedy=f"state the torque in N·m; up to {largest_nm:.3g} is possible",
         )
     stated = {
         "face_width_mm": pair.face_width_mm,
@@ -648,12 +648,12 @@ def nominal_of(rig: Rig) -> Nominal:
 
 
 def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
-    """Draw with even chance per decade."""
+    """Draw from a log-uniform distribution."""
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
 def pitch_tolerance_um(module_mm: float, diameter_mm: float) -> float:
-    """Single pitch deviation f_pt of class 5, 0.3 (m + 0.4 √d) + 4; each class more is √2 times as much.
+    """Single pitch deviation f_pt of class 5, 0.3 (m + 0.4 √d) + 4; each further class is a factor of √2.
 
     ISO 1328-1:1995, *Cylindrical gears: ISO system of accuracy*.
     """
@@ -671,7 +671,7 @@ def profile_tolerance_um(module_mm: float, diameter_mm: float) -> float:
 
 
 def usual_mass_kg(nominal: Nominal, side: int) -> float:
-    """Of a steel disc of the pitch circle's size, with the bore that the model takes where none is given."""
+    """Mass of a steel disc of the pitch diameter, with the model's default bore."""
     radius = 0.5 * nominal.pitch_diameters_mm[side]
     bore = 0.35 * (radius - 1.25 * nominal.module_mm)
     return 7850e-9 * pi * (radius**2 - bore**2) * nominal.face_width_mm

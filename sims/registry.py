@@ -1,4 +1,4 @@
-"""All simulators, by name, and what one of them is to simulate."""
+"""All simulators by name, and the definition of one simulation."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ if TYPE_CHECKING:
 
 
 def simulators() -> dict[str, CrackedPair | ReducedPair | ForgingManipulator]:
-    """Return every simulator by its name."""
+    """Return all simulators by name."""
     return _simulators(tuple(effects()))
 
 
 @cache
 def _simulators(_: tuple[str, ...]) -> dict[str, CrackedPair | ReducedPair | ForgingManipulator]:
-    """Return the simulators that know these effects: others once a user's own is added."""
+    """Return all simulators; the argument only renews them when a user adds an effect."""
     from sims.cracked import CrackedPair
     from sims.forging import ForgingManipulator
     from sims.reduced_fe import ReducedPair
@@ -44,18 +44,18 @@ def simulator(name: str) -> CrackedPair | ReducedPair | ForgingManipulator:
 
 
 def gap_simulators() -> Mapping[str, GapSimulator | DriveSimulator]:
-    """Return the simulators that take part in the gap diagnosis, by their names: all of them."""
+    """Return the simulators that the gap diagnosis can use, by name: all of them."""
     return simulators()
 
 
 def gap_simulator(name: str) -> GapSimulator | DriveSimulator:
-    """Return the simulator called `name` as the gap diagnosis takes it."""
+    """Return the simulator called `name`, typed as the gap diagnosis's protocol."""
     return simulator(name)
 
 
 @dataclass(frozen=True)
 class Simulation:
-    """All that decides a recording: equal ones give equal recordings.
+    """Everything that determines a recording: equal simulations give equal recordings.
 
     Parameters
     ----------
@@ -63,14 +63,14 @@ class Simulation:
     preset : str
         Its name or its file; empty: the model's first.
     parameters : mapping
-        Name → value; what is not given is the preset's.
+        Name → value; the preset's value for each one not given.
     effects : tuple of EffectSetting
-        Besides the preset's.
+        In addition to the preset's.
     speed_rpm, torque_nm : Profile or None
         Of the input shaft; None: the preset's.
     duration_s, sampling_rate_hz : float
     seed : int
-        Of all that is drawn.
+        Of all random draws.
     """
 
     model: str
@@ -90,7 +90,7 @@ class Simulation:
 
     @property
     def setup(self) -> SimulationSetup:
-        """What the model is set to; of speed and torque, where only one is given, the other is the preset's."""
+        """Setup of the model; where only one of speed and torque is given, the other is the preset's."""
         speed, torque, operation = self.speed_rpm, self.torque_nm, None
         if speed is not None or torque is not None:
             of_preset = preset(self.model, self.preset).operation
@@ -100,7 +100,7 @@ class Simulation:
         return SimulationSetup(self.preset, self.parameters, self.effects, operation)
 
     def run(self) -> Recording:
-        """Make the recording; see `sims.simulate`."""
+        """Simulate the recording; see `sims.simulate`."""
         recording = simulator(self.model).simulate(
             self.setup,
             np.random.default_rng(self.seed),

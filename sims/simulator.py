@@ -1,4 +1,4 @@
-"""The interface of every simulator: parameters with units and ranges, presets, effects, and recordings."""
+"""The interface of every simulator: parameters with units and ranges, presets, effects and recordings."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ if TYPE_CHECKING:
 
 ParameterValue = float | str
 Values = dict[str, ParameterValue | None]
-"""Every parameter of a simulator by name; None where it is derived from the others."""
+"""All parameter values of a simulator by name; None where a value is derived from the others."""
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """A number (or word) that a model is made of.
+    """A parameter of a model: a number or a word.
 
     Parameters
     ----------
     name : str
-        Ends in its unit where it has one.
+        Ends in its unit, if it has one.
     unit, meaning : str
     low, high : float or None
         Range of a number.
     default : float, str or None
-        Where neither preset nor user gives it. None: derived from the others, as `meaning` says.
+        Used where neither preset nor user gives a value. None: derived from the others, as `meaning` says.
     choices : tuple of str
         Allowed words; empty for a number.
     whole : bool
@@ -56,24 +56,24 @@ class Parameter:
 
     @classmethod
     def choice(cls, name: str, meaning: str, choices: tuple[str, ...], default: str) -> Parameter:
-        """Return a word."""
+        """Return a parameter whose value is one of the given words."""
         return cls(name, "", meaning, default=default, choices=choices)
 
 
 @dataclass(frozen=True)
 class SimulationSetup:
-    """What a simulator is to simulate: a preset, and what differs from it.
+    """What to simulate: a preset and the changes to it.
 
     Parameters
     ----------
     preset : str or Preset
         The preset, its name or its file; empty: the simulator's first.
     parameters : mapping
-        Name → value; what is not given is the preset's.
+        Name → value; the preset's value for each one not given.
     effects : sequence of EffectSetting
-        Besides the preset's.
+        In addition to the preset's.
     operation : Operation or None
-        None: the preset's own speed and torque.
+        None: the preset's speed and torque.
     """
 
     preset: str | Preset = ""
@@ -82,13 +82,13 @@ class SimulationSetup:
     operation: Operation | None = None
 
     def preset_of(self, model: str) -> Preset:
-        """Return the preset of that model."""
+        """Return the preset, looked up for that model if it is given by name or file."""
         return self.preset if isinstance(self.preset, Preset) else preset(model, self.preset)
 
 
 @dataclass(frozen=True)
 class SimulationRequest:
-    """What a model is to simulate, complete: a preset's values and effects, and those of a setup.
+    """A complete simulation request: a preset's values and effects, overlaid with those of a setup.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ class SimulationRequest:
     values : mapping
         Every parameter; None where it follows from the others.
     effects : tuple of EffectSetting
-        With every option.
+        Each with all its options.
     """
 
     model: str
@@ -108,12 +108,12 @@ class SimulationRequest:
 
     @classmethod
     def of(cls, model: str, known: Sequence[Parameter], setup: SimulationSetup) -> SimulationRequest:
-        """Complete a preset's values and effects by those of the setup.
+        """Overlay a preset's values and effects with those of the setup.
 
         Raises
         ------
         InputError
-            If a name does not exist, or a value is out of its range.
+            If a name does not exist, or a value is outside its range.
         """
         chosen = setup.preset_of(model)
         return cls(
@@ -125,7 +125,7 @@ class SimulationRequest:
         )
 
     def truth(self) -> dict[str, Any]:
-        """What is put in, as plain values, for `Recording.truth`."""
+        """All inputs as plain values, for `Recording.truth`."""
         return {
             "model": self.model,
             "preset": self.preset,
@@ -147,17 +147,17 @@ class SimulationRequest:
 
 
 class HasText(Protocol):
-    """A result that explains itself."""
+    """A result with a readable summary."""
 
     @property
     def text(self) -> str:
-        """For people."""
+        """Readable summary."""
         ...
 
 
 @dataclass(frozen=True)
 class Simulator(ABC):
-    """A model that makes recordings; each simulator gives these fields values of its own.
+    """A model that makes recordings; each simulator sets these fields.
 
     Parameters
     ----------
@@ -166,13 +166,13 @@ class Simulator(ABC):
     title : str
         One line for people.
     parameters : tuple of Parameter
-        All of them.
+        All parameters.
     effects : tuple of str
-        Names of the effects that have a meaning here.
+        Names of the effects that this model supports.
     meaningless : tuple of str
-        What of these effects has none, and why, one sentence each.
+        Which aspects of these effects have no meaning here, and why, one sentence each.
     usual_sampling_rate_hz : float
-        Taken where no rate is asked for.
+        Default sampling rate.
     """
 
     name: str
@@ -188,12 +188,12 @@ class Simulator(ABC):
         return tuple(presets(self.name))
 
     def rig_name(self, preset_name: str) -> str:
-        """Return the name of a simulated recording's rig."""
+        """Return the rig name for a recording simulated with this preset."""
         return f"simulated: {preset_name}"
 
     def rig_sources(self, preset_name: str) -> list[str]:
-        """Return what such a rig says of where it comes from."""
-        return [f"simulated with the model {self.name!r}, preset {preset_name!r}; the truth stands in the recording"]
+        """Return the sources that such a rig states."""
+        return [f"simulated with the model {self.name!r}, preset {preset_name!r}; the truth is in the recording"]
 
     @abstractmethod
     def simulate(
@@ -204,31 +204,31 @@ class Simulator(ABC):
         Raises
         ------
         InputError
-            If a name does not exist, a value is out of its range, the values do not fit each other, or an effect has no
+            If a name does not exist, a value is outside its range, the values are inconsistent, or an effect has no
             meaning here.
         """
 
     @abstractmethod
     def check_convergence(self, setup: SimulationSetup, rng: np.random.Generator) -> HasText:
-        """Tell how far a smaller step changes the result of the very machine that would be simulated."""
+        """Report how much a smaller integration step changes the result for the machine of this setup."""
 
 
-# Values of a simulator's parameters: from defaults, preset and user, checked.
+# Checked parameter values, from defaults, preset and user.
 
 
 def complete_values(parameters: Sequence[Parameter], *layers: Mapping[str, ParameterValue]) -> Values:
-    """Return a value for every parameter: the defaults, overlaid by each layer in turn.
+    """Return a value for every parameter: the defaults, overlaid with each layer in turn.
 
     Parameters
     ----------
     parameters : sequence of Parameter
     *layers : mappings
-        Name → value; the last one wins.
+        Name → value; later layers win.
 
     Raises
     ------
     InputError
-        If a name does not exist (with the closest that does) or a value does not fit.
+        If a name does not exist (with the closest that does) or a value is not allowed.
     """
     values: Values = {p.name: p.default for p in parameters}
     for layer in layers:
@@ -247,7 +247,7 @@ def parameter(parameters: Sequence[Parameter], name: str) -> Parameter:
 
 
 def _hint(name: str, names: Sequence[str]) -> str:
-    """The closest name, else the names that begin with the closest word."""
+    """Suggest the closest name, or else the names that begin with the closest word."""
     from difflib import get_close_matches
 
     closest = closest_match_hint(name, names)
@@ -258,7 +258,7 @@ def _hint(name: str, names: Sequence[str]) -> str:
 
 
 def checked_value(parameter: Parameter, value: object) -> ParameterValue | None:
-    """Return a value that the parameter may have; a number as float; None or "none" where it may follow from others."""
+    """Return the value if the parameter allows it, numbers as float; None or "none" where it may be derived."""
     if parameter.default is None and (value is None or value == "none"):
         return None
     if parameter.choices:
@@ -273,7 +273,7 @@ def checked_value(parameter: Parameter, value: object) -> ParameterValue | None:
     return number
 
 
-# Complete values of the parameters, read by kind.
+# Typed access to complete parameter values.
 
 
 @dataclass(frozen=True)
@@ -283,25 +283,25 @@ class ParameterValues:
     values: Values
 
     def number(self, name: str) -> float:
-        """Value of a number that always has one."""
+        """Value of a numeric parameter that must have one."""
         value = self.optional(name)
         if value is None:
             raise InputError(f"{name} has no value", remedy="complete the values first")
         return value
 
     def optional(self, name: str) -> float | None:
-        """Value of a number, None where it follows from the others."""
+        """Value of a numeric parameter, None where it is derived from the others."""
         value = self.values[name]
         if isinstance(value, str):
             raise InputError(f"{name} is {value!r}", allowed="a number")
         return value
 
     def whole(self, name: str) -> int:
-        """Value of a whole number."""
+        """Value of an integer parameter."""
         return round(self.number(name))
 
     def word(self, name: str) -> str:
-        """Value of a word."""
+        """Value of a word parameter."""
         return str(self.values[name])
 
     def is_on(self, name: str) -> bool:
@@ -309,11 +309,11 @@ class ParameterValues:
         return self.word(name) == "on"
 
 
-# Speed, torque and effects as people write them, and what was put in as plain values.
+# Speed, torque and effects as users write them.
 
 
 def effect_settings(effects: Mapping[str, float] | Sequence[EffectSetting] | None) -> tuple[EffectSetting, ...]:
-    """Return settings, given as such or as name → severity."""
+    """Return effect settings, given as such or as name → severity."""
     if effects is None:
         return ()
     if isinstance(effects, (str, bytes)):  # type: ignore[unreachable]  # what a caller may give all the same
@@ -324,7 +324,7 @@ def effect_settings(effects: Mapping[str, float] | Sequence[EffectSetting] | Non
 
 
 def as_profile(profile: ProfileLike | None, name: str) -> Profile | None:
-    """Return a profile, given as such, as a number or as (time in s, value) points; None stays."""
+    """Return a profile from a profile, a number or (time in s, value) points; None stays None."""
     if profile is None or isinstance(profile, Profile):
         return profile
     try:
@@ -338,13 +338,13 @@ def as_profile(profile: ProfileLike | None, name: str) -> Profile | None:
         raise InputError(f"{name} is {profile!r}", allowed="a number, or (time in s, value) points") from None
 
 
-# Which state of the simulators' code made a result.
+# The version of the simulators' code that made a result.
 
 _ROOMS = ("cracked", "effects", "forging", "gear_pair", "machine", "measure", "mesh", "reduced_fe")
 
 
 def sources_digest() -> str:
-    """Return a short hash of the code that simulates: kept results of another state are not taken for this one's."""
+    """Return a short hash of the simulators' code, so that cached results of another version are not used."""
     of_users = sha256(b"".join(path.read_bytes() for path in user_files())).hexdigest()[:8] if user_files() else ""
     return _listed_sources() + of_users
 

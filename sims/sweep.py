@@ -25,14 +25,14 @@ from sims.registry import Simulation, simulator
 from sims.simulator import checked_value, parameter
 
 MAX_POINTS = 100_000
-"""Each a file of its own: more is a mistyped number."""
+"""Each point is a file; a larger grid is taken for a typing error."""
 OPERATION_AXES = ("speed_rpm", "torque_nm")
-"""Names of axes that are neither a parameter nor an effect."""
+"""Axes that are neither a parameter nor an effect."""
 
 
 @dataclass(frozen=True)
 class Axis:
-    """What a sweep varies.
+    """A quantity that a sweep varies, with its values.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class Axis:
     values : tuple of float
         In the unit of the parameter or of the effect's severity.
     options : mapping
-        Of an effect: which gear, which tooth.
+        Options of an effect: which gear, which tooth.
     """
 
     name: str
@@ -63,11 +63,11 @@ class SweepPoint:
     Parameters
     ----------
     index : int
-        Place in the grid; the last axis runs fastest.
+        Position in the grid; the last axis runs fastest.
     values : tuple of float
         One per axis.
     seed : int
-        Of all that is drawn.
+        Of all random draws.
     """
 
     index: int
@@ -77,17 +77,17 @@ class SweepPoint:
 
 @dataclass(frozen=True)
 class Sweep(Simulation):
-    """A grid of simulations: what a simulation has, the same at every point but for what an axis varies.
+    """A grid of simulations: the fields of a simulation, the same at every point except for those on an axis.
 
     Parameters
     ----------
     axes : tuple of Axis
     common_seed : bool
-        False: every point draws its own noise, roughness and tolerances, from the seed and its place in the grid. Such
-        points are independent: for statistics and for training. True: all draw the same (common random numbers), so
-        that points differ by what was varied alone: for differences between neighbours.
+        False: every point draws its own noise, roughness and tolerances, from the seed and its position in the grid.
+        Such points are independent, for statistics and training. True: all draw the same (common random numbers), so
+        that points differ only in what was varied, for differences between neighbours.
     extension : str
-        Format of the recordings.
+        File extension of the recordings, which sets their format.
     """
 
     axes: tuple[Axis, ...]
@@ -118,7 +118,7 @@ class Sweep(Simulation):
         return tuple(SweepPoint(i, values, self._seed(i)) for i, values in enumerate(grid))
 
     def definition(self) -> dict[str, Any]:
-        """What decides the results, as plain values."""
+        """Everything that determines the results, as plain values."""
         return {
             "model": self.model,
             "preset": self.preset,
@@ -154,7 +154,7 @@ class Sweep(Simulation):
         return Simulation(**values)
 
     def _check_axes(self) -> None:
-        """Refuse names that do not exist and values out of their ranges; what the machine allows, each point tells."""
+        """Reject unknown names and values outside their ranges; limits of the machine show when a point is run."""
         model = simulator(self.model)
         for axis in self.axes:
             if axis.name in OPERATION_AXES:
@@ -169,7 +169,7 @@ class Sweep(Simulation):
                     checked_value(parameter(model.parameters, axis.name), value)
 
 
-# Runs a sweep on all processors, into a folder, so that it can be stopped and resumed.
+# Running a sweep on all processors into a folder, so that it can be stopped and resumed.
 
 DEFINITION = "sweep.json"
 INDEX = "index.csv"
@@ -179,7 +179,7 @@ Progress = Callable[[int, int, "SweepOutcome"], object]
 
 @dataclass(frozen=True)
 class SweepOutcome:
-    """What became of a point: its recording, or the reason why there is none."""
+    """Outcome of a point: its recording, or the reason why there is none."""
 
     point: SweepPoint
     recording: Path | None
@@ -188,13 +188,13 @@ class SweepOutcome:
 
 @dataclass(frozen=True)
 class SweepResult:
-    """What a run of a sweep did.
+    """Outcome of a run of a sweep.
 
     Parameters
     ----------
     n_points : int
     n_found : int
-        Points that stood in the folder already.
+        Points that were already in the folder.
     outcomes : tuple of Outcome
         Points of this run, in the order of the grid.
     index_path : Path
@@ -208,23 +208,23 @@ class SweepResult:
 
     @property
     def failures(self) -> tuple[SweepOutcome, ...]:
-        """Points that gave no recording."""
+        """Points without a recording."""
         return tuple(o for o in self.outcomes if o.recording is None)
 
 
 def run_sweep(
     sweep: Sweep, folder: str | Path, *, n_processes: int | None = None, on_progress: Progress | None = None
 ) -> SweepResult:
-    """Simulate every point that the folder does not hold yet.
+    """Simulate every point that is not yet in the folder.
 
     Each point becomes a recording, its rig file and its truth, all or none. A point that cannot be simulated does not
-    stop the others. After Ctrl-C, whatever is complete stays, and the same call goes on from there.
+    stop the others. After Ctrl-C, complete points stay, and the same call resumes from there.
 
     Parameters
     ----------
     sweep : Sweep
     folder : str or Path
-        Made if it is not there; empty, or begun by the same sweep.
+        Created if missing; otherwise empty, or begun by the same sweep.
     n_processes : int or None
         None: one per processor. With more than 1 the caller's script needs the usual ``if __name__ == "__main__":``,
         as processes are spawned.
@@ -234,7 +234,7 @@ def run_sweep(
     Raises
     ------
     InputError
-        If the folder cannot be made, holds other things, or another sweep.
+        If the folder cannot be created, or holds other files or another sweep.
     """
     workers = n_processors() if n_processes is None else count(n_processes, "n_processes")
     target = claimed(Path(folder), sweep.definition())
@@ -257,33 +257,33 @@ def run_sweep(
 
 
 def recording_path(sweep: Sweep, folder: Path, point: SweepPoint) -> Path:
-    """Name of a point's recording."""
+    """Path of a point's recording."""
     digits = len(str(max(sweep.n_points - 1, 1)))
     return folder / f"point_{point.index:0{digits}d}{sweep.extension}"
 
 
 def n_complete(sweep: Sweep, folder: str | Path) -> int:
-    """Points that the folder holds."""
+    """Number of points whose recordings are in the folder."""
     return sum(recording_path(sweep, Path(folder), point).exists() for point in sweep.points())
 
 
 def claimed(folder: Path, definition: Mapping[str, Any], name: str = DEFINITION, kind: str = "sweep") -> Path:
-    """Make the folder or accept it; leave the definition in it.
+    """Create the folder or accept an existing one, and write the definition to it.
 
     Parameters
     ----------
     folder : Path
     definition : mapping
-        Plain values that decide the results.
+        Plain values that determine the results.
     name : str
-        Of its file.
+        Of the definition's file.
     kind : str
-        What it defines, for the errors.
+        What it defines, for error messages.
 
     Raises
     ------
     InputError
-        If the folder cannot be made, holds other things, or was begun by another definition.
+        If the folder cannot be created, holds other files, or was begun with another definition.
     """
     text = json.dumps(definition, indent=2, ensure_ascii=False) + "\n"
     try:
@@ -327,7 +327,7 @@ def _killed(job: SweepJob) -> SweepOutcome:
 
 
 def _run_one(job: SweepJob) -> SweepOutcome:
-    """Simulate a point and write it; every error becomes a reason."""
+    """Simulate a point and write it; every error becomes the outcome's reason."""
     sweep, point, folder = job
     try:
         names = file_set(recording_path(sweep, folder, point), replace=True)

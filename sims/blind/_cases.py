@@ -1,4 +1,4 @@
-"""Cases: a rig, where it runs, what is wrong with it, and its twin with nothing wrong."""
+"""Cases: a rig, its operating conditions, its faults, and its healthy twin."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MIN_MESH_HARMONICS = 3
 
 @dataclass(frozen=True)
 class Fault:
-    """One thing wrong: name, severity in its own unit, level in its span (0 weak, 1 strong), seed of its choices."""
+    """A fault: name, severity in its own unit, level in its span (0 weak, 1 strong), and seed of its choices."""
 
     name: str
     severity: float
@@ -35,7 +35,7 @@ class Fault:
 
 @dataclass(frozen=True)
 class BlindCase:
-    """What to record. Conditions and references are paired: reference i runs where condition i does."""
+    """A case to be recorded. Reference i has the operating point of condition i."""
 
     role: str
     kind: str
@@ -47,7 +47,7 @@ class BlindCase:
 
 @dataclass(frozen=True)
 class CaseRecordings:
-    """Recordings of a case, its healthy references (or none), its twins, and where each fault sits."""
+    """Recordings of a case, its healthy references (or none), its twins, and the location of each fault."""
 
     conditions: tuple[Recording, ...]
     references: tuple[Recording, ...]
@@ -65,11 +65,11 @@ def draw_case(
     n_conditions: int | None = None,
     with_reference: bool | None = None,
 ) -> BlindCase:
-    """Draw a case; what is not given is drawn too.
+    """Draw a case; whatever is not given is also drawn.
 
-    The rig, its conditions, lengths and noise come from the generator before and apart from the fault: the same
-    generator state with another kind or effect gives the same rig. Only ``backlash`` chooses where it runs, since it
-    has no meaning without a light load: its first condition is always one.
+    The rig, its conditions, durations and noise are drawn independently of the fault: the same generator state with
+    another kind or effect gives the same rig. Only ``backlash`` affects the conditions, as it shows only under light
+    load: its first condition is always a light load.
 
     Parameters
     ----------
@@ -79,9 +79,9 @@ def draw_case(
     kind : str or None
         "none", "single", "unknown" (outside the catalogue) or "pair" (two of the catalogue).
     effect : str or None
-        Name for "single" or "unknown"; it decides the kind if that is not given.
+        Name for "single" or "unknown"; it determines the kind if that is not given.
     level : float or None
-        0 (barely noticeable) to 1 (strong), for every fault of the case; None: even between.
+        0 (barely noticeable) to 1 (strong), for every fault of the case; None: uniform in between.
     n_conditions : int or None
         1 or 2.
     with_reference : bool or None
@@ -90,7 +90,7 @@ def draw_case(
     Raises
     ------
     InputError
-        If a name does not exist or a value is outside what is allowed.
+        If a name does not exist or a value is outside its range.
     """
     seeds = [int(s) for s in rng.integers(2**62, size=4)]
     drawn = str(np.random.default_rng(seeds[3]).choice(KINDS, p=KIND_SHARES))
@@ -109,9 +109,9 @@ def draw_case(
 def record_case(case: BlindCase, *, encoder_counts: int = 0) -> CaseRecordings:
     """Run a case: recordings, references and twins.
 
-    A twin is the same run from the same seeds without the fault; a case with no fault is its own twin. Noise is set by
-    the quietest twin and a clipping converter's range by the loudest, so that no recording tells by its noise. With
-    `encoder_counts` per revolution each gear carries an encoder.
+    A twin is the same run with the same seeds but without the fault; a case without a fault is its own twin. The noise
+    level is set by the quietest twin and a clipping converter's range by the loudest, so that the noise does not reveal
+    the fault. With `encoder_counts` per revolution each gear carries an encoder.
     """
     runs = [(scene, run(scene)) for scene in (scene_of(case.rig, c) for c in case.conditions)]
     n, gains = len(case.rig.chains), np.array([c.gain for c in case.rig.chains])
@@ -222,20 +222,20 @@ def _draw_conditions(
 
 
 # --------------------
-# Cases on disk: what the diagnosing side may see; and the answers.
+# Cases on disk: what the diagnosing side may see, and the answers.
 # --------------------
 
 
 LAYOUT = "gearsig blind labels 1"
 FILE_TIME = 1_700_000_000
-"""Every file is given the same time: when it was made says what it took to make it."""
+"""Time stamp of every file: the true times would reveal how long each took to make."""
 
 
 def write_visible(made: CaseRecordings, folder: Path) -> None:
     """Write what the diagnosing side may see, and nothing else.
 
     condition_1.h5 (and _2), reference_1.h5 … if there are any, each with a rig file of the same name that states its
-    operating point, and rig.toml, which is condition_1's.
+    operating point, and rig.toml, which is that of condition_1.
     """
     for stem, recordings in (("condition", made.conditions), ("reference", made.references)):
         for i, recording in enumerate(recordings, 1):
@@ -244,7 +244,7 @@ def write_visible(made: CaseRecordings, folder: Path) -> None:
 
 
 def labels(case: BlindCase, made: CaseRecordings) -> dict[str, Any]:
-    """Return the answers; the package's description explains the keys."""
+    """Return the true answers; see the package's docstring for the keys."""
     conditions = [
         {
             "file": f"condition_{i}.h5",

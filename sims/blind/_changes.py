@@ -20,19 +20,19 @@ Apply = Callable[[Scene, float, np.random.Generator], Place]
 
 @dataclass(frozen=True)
 class Change:
-    """One thing that may be wrong.
+    """A possible fault or other change.
 
     Parameters
     ----------
     name, group, unit : str
-        Group "outside" for what the catalogue does not hold.
+        Group "outside" for changes that are not in the catalogue.
     span : function
-        Of the rig: severities from barely noticeable to strong.
+        Rig → severities, barely noticeable and strong.
     apply : function
-        Changes the scene and says where. All choices come from the generator given, in a fixed order, so that every
-        recording of a case has the same fault; what differs from turn to turn comes from the scene's own.
+        Changes the scene and returns the location. All choices come from the given generator, in a fixed order, so that
+        every recording of a case has the same fault; variations within a run come from the scene's generator.
     resembles : str
-        For a change outside the catalogue: the effect it is easily taken for, or empty.
+        For a change outside the catalogue: the effect it is easily mistaken for, or empty.
     """
 
     name: str
@@ -49,11 +49,11 @@ class Change:
 
 
 GEARS = ("pinion", "wheel")
-"""Names of the gears on the input and the output shaft, whichever is larger."""
+"""Names of the gears on the input and the output shaft, regardless of their size."""
 
 
 def steady(low: float, high: float) -> Span:
-    """Give the same span for every rig."""
+    """Return a span that is the same for every rig."""
     return lambda _rig: (low, high)
 
 
@@ -68,11 +68,11 @@ def deflection_um(rig: BlindRig) -> float:
 
 
 EXIT_S = 0.15e-3
-"""Duration of the blow at the far edge of a defect."""
+"""Duration of the impact at the far edge of a defect."""
 
 
 def slipping_angles(scene: Scene, shaft: int, order: float, slip: float) -> FloatArray:
-    """Shaft angles of blows at an order, with the mean slip of the cage and a jitter that adds up."""
+    """Shaft angles of impacts at an order, with mean cage slip and cumulative jitter."""
     n = int(scene.turns[shaft] * order) + 2
     spacing = 2 * pi / (order * (1 - slip)) * (1 + scene.rng.normal(0, 0.008, n))
     return np.asarray(np.cumsum(spacing) - spacing[0] * scene.rng.random())
@@ -84,7 +84,7 @@ def load_direction(scene: Scene, body: int) -> float:
 
 
 def blow_n(scene: Scene, severity_mm: float) -> float:
-    """Force of a blow: grows with the defect and with the bearing's load, which the weight keeps above nothing."""
+    """Force of an impact: increases with the defect and with the bearing load, which the weight keeps above 0."""
     load_n = scene.mesh_force_n / 2 + 9.81 * max(scene.rig.parts.rotor_mass_kg)
     return float(0.3 * severity_mm**0.8 * load_n)
 
@@ -92,7 +92,7 @@ def blow_n(scene: Scene, severity_mm: float) -> float:
 def add_blows(
     scene: Scene, shaft: int, angle: FloatArray, force: FloatArray, turn: FloatArray, *, width_mm: float, race_mm: float
 ) -> None:
-    """Unload as an element drops in, then a short blow at the far edge."""
+    """Add an unloading as an element drops in, then a short impact at the far edge."""
     omega = scene.omega[shaft]
     across = width_mm / race_mm / 2  # rad of cage travel over the defect, in shaft angle about twice that
     scene.trains.append(Train(shaft, shaft, angle, -0.3 * force, turn, max(4 * across / omega, 2 * EXIT_S)))
@@ -141,7 +141,7 @@ def _channels(scene: Scene, choice: np.random.Generator) -> list[int]:
 
 
 def _path(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
-    """Add the response of a sensor on a soft foot: 1 + (g − 1) × band-pass."""
+    """Add the response of a sensor on a soft mount: 1 + (g − 1) × band-pass."""
     channels = _channels(scene, choice)
     f_hz, quality = 10 ** choice.uniform(log10(900), log10(8000)), choice.uniform(4, 15)
     gain = 10 ** (severity / 20) - 1
@@ -174,7 +174,7 @@ def _hum(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
 
 
 def _clip(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
-    """Hold the signal at a limit, a share below the loudest healthy recording's peak."""
+    """Clip the signal at a limit, a percentage below the loudest healthy recording's peak."""
     channels = _channels(scene, choice)
 
     def stage(motion: BlindMotion, signal: FloatArray, rng: np.random.Generator) -> FloatArray:  # noqa: ARG001 - a stage's form
@@ -241,11 +241,11 @@ DRIVE_CHANGES = (
 
 
 SMOOTHED = 0.12
-"""Part of a rough flank's height that is left after averaging over the contact."""
+"""Fraction of a rough flank's height that remains after averaging over the contact."""
 
 
 def wear_shape(pair: SpurPair) -> tuple[FloatArray, FloatArray]:
-    """Depth of wear over the path on both gears, the deepest place 1: pressure times sliding distance, times meshes.
+    """Depth of wear over the path on both gears, maximum 1: pressure × sliding distance × number of meshes.
 
     Source: J. F. Archard, Contact and rubbing of flat surfaces, *J. Appl. Phys.* 24 (1953).
     """
@@ -272,12 +272,12 @@ def _wear(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
 
 
 def _pitch(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
-    """Deviations of one gear's teeth, the largest step from tooth to tooth being the severity."""
+    """Deviations of one gear's teeth; the severity is the largest step between adjacent teeth."""
     gear = int(choice.integers(2))
     n_teeth = len(scene.gap_m[gear])
     if choice.random() < 0.6:
         error = choice.standard_normal(n_teeth)
-    else:  # an indexing error that adds up and is paid back at once
+    else:  # an indexing error that accumulates and is corrected in one step
         error = np.roll(np.linspace(0, 1, n_teeth), int(choice.integers(n_teeth))) + 0.1 * choice.standard_normal(
             n_teeth
         )
@@ -335,7 +335,7 @@ def _unbalance(scene: Scene, severity: float, choice: np.random.Generator) -> Pl
 
 
 def _misalignment(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
-    """A wedge between the flanks, part of it turning with a shaft, and a coupling that is forced twice a turn."""
+    """A wedge between the flanks, partly rotating with a shaft, and coupling forces once and twice per revolution."""
     shaft = int(choice.integers(2))
     standing, turning = choice.uniform(0.4, 0.7), choice.uniform(0.2, 0.4)
     coupling_n_per_m, phases = choice.uniform(0.5e6, 3e6), choice.uniform(0, 2 * pi, 5)
@@ -364,7 +364,7 @@ SHAFT_CHANGES = (
 )
 
 # --------------------
-# One tooth: a crack at its root, a spall on its flank, a tip that broke off.
+# One tooth: a root crack, a spall on the flank, a broken tip.
 # --------------------
 
 
@@ -373,7 +373,7 @@ ROOT_MODULES = 2.0
 """Root chord of a standard tooth in modules."""
 CRACK_ANGLE = radians(60)
 HERTZ_SHARE = 0.3
-"""Part of a pair's compliance that is local to the contact."""
+"""Fraction of a pair's compliance that is local to the contact."""
 
 
 def _tooth(scene: Scene, choice: np.random.Generator) -> tuple[int, int, Place]:
@@ -381,7 +381,7 @@ def _tooth(scene: Scene, choice: np.random.Generator) -> tuple[int, int, Place]:
     n_teeth = (scene.rig.pair.z1, scene.rig.pair.z2)[gear]
     tooth = int(choice.integers(n_teeth))
     place: dict[str, str | int | float] = {"gear": GEARS[gear], "tooth": tooth, "shaft": SHAFTS[gear]}
-    if gear == 0:  # only the input shaft has a tachometer to count from
+    if gear == 0:  # only the input shaft has a tachometer as angle reference
         place["angle_deg"] = round(360 * (tooth + scene.rig.pair.contact_ratio / 2) / n_teeth % 360, 2)
     return gear, tooth, place
 
@@ -390,7 +390,7 @@ def crack_compliance(pair: SpurPair, gear: int, depth_mm: float) -> FloatArray:
     """Deflection per force along the line of action over the path, m/N, from a hinge at the root.
 
     c = 24 S(a/s) / (E b s²), S(x) = (x/(1 − x))² (5.93 − 19.69x + 37.14x² − 35.84x³ + 13.12x⁴), times the lever
-    squared; within 1 % however little of the root is left.
+    squared; accurate to 1 % for any depth.
 
     Source: H. Tada, P. C. Paris and G. R. Irwin, *The Stress Analysis of Cracks Handbook* (2000), single edge crack in
     bending.
@@ -412,7 +412,7 @@ def _crack(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
 
 
 def _spall(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
-    """Width lost to a band of the flank: the contact there is shorter, its edges as wide as the Hertzian band."""
+    """Width lost over a band of the flank: the contact there is shorter; the edges are as wide as the Hertzian band."""
     gear, tooth, place = _tooth(scene, choice)
     pair = scene.rig.pair
     centre, length = pair.pitch_point + choice.uniform(-0.2, 0.2), choice.uniform(0.15, 0.35)
@@ -424,7 +424,7 @@ def _spall(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
 
 
 def _chip(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
-    """Active profile that is gone: the pair's path ends earlier (pinion) or begins later (wheel)."""
+    """Lost active profile: the pair's path ends earlier (pinion) or begins later (wheel)."""
     gear, tooth, place = _tooth(scene, choice)
     pair, loss_m = scene.rig.pair, severity / 1000
     ra, rb = pair.tip_radii_m[gear], pair.base_radii_m[gear]
@@ -455,7 +455,7 @@ TOOTH_CHANGES = (
 )
 
 # --------------------
-# What the catalogue does not hold: some of it easily taken for something that it does.
+# Changes outside the catalogue, some of them easily mistaken for one of its effects.
 # --------------------
 
 
@@ -463,12 +463,12 @@ OUTSIDE = "outside"
 
 
 def _by_load(low: float, high: float) -> Span:
-    """Give a span in parts of the rated mesh force."""
+    """Return a span in fractions of the rated mesh force."""
     return lambda rig: (low * rig.rated_nm / rig.pair.base_radii_m[0], high * rig.rated_nm / rig.pair.base_radii_m[0])
 
 
 def _rub(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
-    """A loose foot or seal that is touched over a few degrees of each turn."""
+    """A loose foot or seal that rubs over a few degrees of each revolution."""
     shaft, at, arc, way = (
         int(choice.integers(2)),
         choice.uniform(0, 2 * pi),
@@ -486,13 +486,13 @@ def _rub(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
 
 
 def _knock(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
-    """A worn coupling that takes up its play once or twice a turn."""
+    """A worn coupling that takes up its play once or twice per revolution."""
     shaft, per_turn, at = int(choice.integers(2)), int(choice.integers(1, 3)), choice.uniform(0, 2 * pi)
     n = int(scene.turns[shaft] * per_turn) + 2
     angle = at + 2 * pi * np.arange(n) / per_turn + scene.rng.normal(0, 0.004, n)
     torque = severity * np.clip(scene.rng.normal(1, 0.12, n), 0.3, 2)
     scene.trains.append(Train(shaft, 2, angle, torque, np.zeros(n), choice.uniform(0.3e-3, 1e-3)))
-    # The drive line's spring keeps most of it from the teeth; the coupling's own bearing does not.
+    # The drive line's compliance keeps most of it from the teeth, but not from the coupling's bearing.
     arm_m = scene.rig.pair.pitch_radii_m[shaft]
     scene.trains.append(
         Train(
@@ -508,7 +508,7 @@ def _knock(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
 
 
 def _ball(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
-    """A damaged rolling element: two blows per spin, strong while the cage holds it in the loaded zone."""
+    """A damaged rolling element: two impacts per spin, strong while the cage has it in the load zone."""
     shaft, slip = int(choice.integers(2)), choice.uniform(0.002, 0.015)
     bearing = scene.rig.bearing(shaft)
     spin, cage = bearing.orders()["BSF"], bearing.orders()["FTF"]
@@ -523,7 +523,7 @@ def _ball(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
 
 
 def _field(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
-    """A motor's field that pulls at twice the line frequency, with slip sidebands; it shakes the whole bed."""
+    """Magnetic pull of a motor at twice the line frequency, with slip sidebands; it shakes the whole bed."""
     slip_hz, depth = choice.uniform(0.3, 2.5), choice.uniform(0.1, 0.6)
 
     def stage(motion: BlindMotion, signal: FloatArray, rng: np.random.Generator) -> FloatArray:
@@ -541,7 +541,7 @@ def _field(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
 
 
 def _cavitation(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
-    """A pump on the same bed: collapsing bubbles in a wide band, a vane tone, swelling with the vanes."""
+    """A pump on the same bed: broadband cavitation noise modulated by the vanes, and a vane tone."""
     vanes, shaft = int(choice.integers(5, 10)), int(choice.integers(2))
     ways = [
         SensorResonance(10 ** choice.uniform(log10(1500), log10(9000)), choice.uniform(0.05, 0.2), 1.0)
@@ -564,17 +564,17 @@ def _cavitation(scene: Scene, severity: float, choice: np.random.Generator) -> P
 
 
 def _belt(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
-    """A belt or fan beside the drive: lines at an order that no part of the gear pair has."""
+    """A belt or fan beside the drive: lines at an order that does not belong to the gear pair."""
     shaft, way, phases = int(choice.integers(2)), choice.uniform(0, 2 * pi), choice.uniform(0, 2 * pi, 4)
     order = float(choice.choice([choice.uniform(0.31, 0.48), choice.uniform(0.53, 0.93), choice.uniform(2.1, 7.9)]))
     for k, part in enumerate((1.0, 0.7, 0.4, 0.25)):
-        # Light masses move with it: the force grows with the harmonic's frequency.
+        # Light masses move with it: the force increases with the harmonic's frequency.
         scene.sway.append((float(shaft), order * (k + 1), severity * part, phases[k], way))
     return {"shaft": SHAFTS[shaft], "order": round(order, 4)}
 
 
 def _cable(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
-    """A loose cable: now and then the signal jumps, fades and comes back."""
+    """A loose cable: at random times the signal jumps, fades and returns."""
     channel = int(choice.integers(len(scene.rig.chains)))
     depth, step = choice.uniform(0.4, 0.95), choice.uniform(1, 10)
 
@@ -595,7 +595,7 @@ def _cable(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
 
 
 def _warm(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
-    """A warm housing: its resonances come down in frequency, their damping goes up."""
+    """A warm housing: its resonance frequencies fall and their damping rises."""
     spread = choice.uniform(0.6, 1.4, (len(scene.paths), 8))
     scene.paths = [
         [
@@ -612,22 +612,22 @@ def _warm(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
 
 
 def _turns_to_tooth(pair: SpurPair, tooth: int) -> int:
-    """Turns of gear 1 after which its tooth 0 meets tooth 0 of gear 2, if now it meets `tooth`."""
+    """Revolutions of gear 1 until its tooth 0 meets tooth 0 of gear 2, if it now meets `tooth`."""
     g = gcd(pair.z1, pair.z2)
     n_mates = pair.z2 // g
     return -tooth // g * pow(pair.z1 // g, -1, n_mates) % n_mates
 
 
 def _stain(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
-    """Teeth that marked each other at standstill and hit the mark whenever they meet again.
+    """Teeth that marked each other at standstill, with an impact whenever the marks meet again.
 
-    Where that is rare, the machine stood still more often: a mark at least every eight turns.
+    Where that is rare, there are several marks, so that marks meet at least every eight revolutions.
     """
     pair = scene.rig.pair
     meeting = lcm(pair.z1, pair.z2) // pair.z1
     period = meeting / -(-meeting // 8)
     n = int(scene.turns[0] / period) + 2
-    # The mark is on the same teeth whichever of them met when the recording began.
+    # The mark is on the same teeth, whichever teeth meet when the recording begins.
     first = (choice.random() * meeting + _turns_to_tooth(pair, scene.offsets[1])) % period
     angle = 2 * pi * (first + period * np.arange(n))
     for shaft, way in ((0, scene.rig.parts.line_angle + pi), (1, scene.rig.parts.line_angle)):
@@ -637,7 +637,7 @@ def _stain(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
 
 
 def _ghost(scene: Scene, severity: float, choice: np.random.Generator) -> Place:
-    """What the index wheel of the machine that cut the gear left on it: a wave with more or fewer cycles than teeth."""
+    """Ghost component from the index wheel of the gear cutter: a wave whose cycles are not a multiple of the teeth."""
     gear = int(choice.integers(2))
     teeth = (scene.rig.pair.z1, scene.rig.pair.z2)
     order = round(teeth[gear] * choice.uniform(1.15, 2.3))
@@ -672,9 +672,9 @@ CATALOGUE: dict[str, Change] = {
     for family in (TOOTH_CHANGES, FLANK_CHANGES, SHAFT_CHANGES, DRIVE_CHANGES, BEARING_CHANGES, CHAIN_CHANGES)
     for change in family
 }
-"""The 19 effects that have a name on the diagnosing side."""
+"""The 19 effects that the diagnosing side can name."""
 OUTSIDE_CATALOGUE: dict[str, Change] = {change.name: change for change in CHANGES}
-"""What has none."""
+"""Changes that it cannot name."""
 CHAIN_GROUP = "measurement chain"
 MECHANICAL: tuple[str, ...] = tuple(name for name, change in CATALOGUE.items() if change.group != CHAIN_GROUP)
 """The 16 effects of the machine itself."""

@@ -1,4 +1,4 @@
-"""The compiled march: exact steps of the modes, the mesh force by Newton's method at each new point."""
+"""Compiled time integration: exact steps of the modes, with the mesh force by Newton's method at each point."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numba import njit
 from sims.blind._rig import REACH
 
 # --------------------
-# The single values that the compiled march takes; those of both gears, or of both shafts' bearings, in pairs.
+# Single values for the compiled integration; those of both gears, or of both shafts' bearings, in pairs.
 # --------------------
 
 NUMBERS = np.dtype(
@@ -39,7 +39,7 @@ Tables = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.nd
 
 @njit(cache=True)
 def soft(x: float, h: float) -> tuple[float, float]:
-    """Compression law √(x² + h²) − h for x > 0 and its slope: soft at first touch, then straight."""
+    """Compression law √(x² + h²) − h for x > 0 and its slope: soft at first touch, then linear."""
     if x <= 0.0:
         return 0.0, 0.0
     root = sqrt(x * x + h * h)
@@ -48,7 +48,7 @@ def soft(x: float, h: float) -> tuple[float, float]:
 
 @njit(cache=True)
 def _at(table: np.ndarray, spot: float) -> float:
-    """Interpolate between the points of a table, its ends held."""
+    """Interpolate linearly in a table, constant beyond its ends."""
     spot = min(max(spot, 0.0), table.shape[0] - 1.001)
     i = int(spot)
     return float(table[i] + (spot - i) * (table[i + 1] - table[i]))
@@ -64,13 +64,13 @@ def pairs_in_reach(
     offsets: np.ndarray,
     tables: Tables,
 ) -> int:
-    """Fill gap, stiffness, friction and curvature radius of all pairs that may touch; return how many there are.
+    """Fill gap, stiffness, friction and radius of curvature of all pairs that may be in contact; return their number.
 
-    `shift` is a separation of all teeth by run-out: gear 2 lags by it, and with gear 2's tips the path's start A; its
-    end E belongs to gear 1. `opening` is a growth of the centre distance, which moves both ends.
+    `shift` is a separation of all teeth by run-out: gear 2 lags by it, and so does the path's start A, which its tips
+    determine; the end E belongs to gear 1. `opening` is an increase of the centre distance, which moves both ends.
 
-    Pair j stands at r_b1 θ1 / p_b − j on the path; a pair whose compliance is 1 + w times the healthy one has 1/(1 + w)
-    of its stiffness.
+    Pair j is at r_b1 θ1 / p_b − j on the path; a pair with 1 + w times the healthy compliance has 1/(1 + w) of the
+    stiffness.
     """
     gap_0, pair_k, slip, gap_1, gap_2, weak_1, weak_2 = tables
     z1, z2, n_path = gap_1.shape[0], gap_2.shape[0], gap_0.shape[0]
@@ -102,10 +102,10 @@ def mesh_force(
     force: float, gamma: float, gamma_v: float, x: float, v: float, h: float, n_pairs: int, pairs: np.ndarray,
     number: Any,
 ) -> float:  # fmt: skip
-    """Solve F = Σ F_i(x − γF, v − γ_v F) by Newton's method from `force`; the pairs receive what they carry.
+    """Solve F = Σ F_i(x − γF, v − γ_v F) by Newton's method from `force`; the loads are stored in the pairs.
 
-    F_i = k_i (s(x − E_i) + c s' v), never a pull; the back flanks carry as one, at mean stiffness. x has the run-out
-    taken off, which moves both flanks of a tooth.
+    F_i = k_i (s(x − E_i) + c s' v), never tensile; the back flanks act as one, at mean stiffness. The run-out, which
+    moves both flanks of a tooth, is subtracted from x.
     """
     damping, back = number.mesh_damping, number.back_stiffness
     for _ in range(8):
@@ -138,7 +138,7 @@ def mesh_force(
 ACROSS = 1.22
 """Angle from the line of action to the line of centres, 70°."""
 TORQUE = 2.0
-"""Kind of a train that twists a shaft's far end; 0 and 1 push the bearing of that number."""
+"""Kind of a train with torques on a shaft's far end; kinds 0 and 1 are forces on the bearing of that number."""
 
 
 @njit(cache=True)
@@ -153,7 +153,7 @@ def waves(rows: np.ndarray, theta_1: float, theta_2: float) -> float:
 
 @njit(cache=True)
 def centre_opening(runout: np.ndarray, theta_1: float, theta_2: float) -> float:
-    """Growth of the centre distance by eccentricity: the run-outs of order 1, seen across the line of action."""
+    """Increase of the centre distance by eccentricity: the run-outs of order 1 along the line of centres."""
     total = 0.0
     for r in range(runout.shape[0]):
         if runout[r, 1] == 1.0:
@@ -167,7 +167,7 @@ def drive(
     push: np.ndarray, number: Any, u: np.ndarray, v: np.ndarray, time: float, behind: float,
     speed: np.ndarray, torque: np.ndarray,
 ) -> float:  # fmt: skip
-    """Add the motor that follows its reference speed and the load that rises with speed; return the speed error."""
+    """Add the torques of the speed-controlled motor and of the load, which rises with speed; return the speed error."""
     at = time / number.grid_s
     cell = min(int(at), speed.shape[0] - 2)
     part = at - cell
@@ -200,8 +200,8 @@ def bearings(
 ) -> None:  # fmt: skip
     """Add clearance and unbalance; `held` receives the forces on the casing.
 
-    Clearance c that opens and shuts with the passing elements leaves k (√(r² + c²) − c) of the linear spring k r. That
-    spring is in the modes, so what clearance takes from it is given back here.
+    Clearance c, which varies with the passing elements, reduces the linear spring force k r to k (√(r² + c²) − c). The
+    linear spring is part of the modes, so the difference is added here.
     """
     for i in range(2):
         theta, omega, sense = (theta_1, number.omega[0], 1.0) if i == 0 else (theta_2, number.omega[1], -1.0)
@@ -220,7 +220,7 @@ def bearings(
 
 @njit(cache=True)
 def sways(push: np.ndarray, rows: np.ndarray, theta_1: float, theta_2: float) -> None:
-    """Add forces on rotors from outside: rows of shaft, order, amplitude, phase, direction."""
+    """Add external forces on rotors, from rows of shaft, order, amplitude, phase, direction."""
     for r in range(rows.shape[0]):
         force = waves(rows[r : r + 1], theta_1, theta_2)
         rotor = 4 + 2 * int(rows[r, 0])
@@ -232,7 +232,7 @@ def sways(push: np.ndarray, rows: np.ndarray, theta_1: float, theta_2: float) ->
 def pulse(
     angle: float, omega: float, width_s: float, starts: np.ndarray, forces: np.ndarray, pointer: int
 ) -> tuple[float, int]:
-    """Half-sine pulses that begin at given shaft angles; returns the force now and the pulse in hand."""
+    """Half-sine pulses that start at given shaft angles; return the present force and the index of the pulse."""
     while pointer + 1 < starts.shape[0] and starts[pointer + 1] <= angle:
         pointer += 1
     since = (angle - starts[pointer]) / omega
@@ -276,7 +276,7 @@ Trains = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 def predict(
     steps: np.ndarray, q: np.ndarray, p: np.ndarray, f: np.ndarray, q_new: np.ndarray, p_new: np.ndarray
 ) -> None:
-    """Step each mode with its force held."""
+    """Step each mode with constant force."""
     for m in range(q.shape[0]):
         q_new[m] = steps[0, m] * q[m] + steps[1, m] * p[m] + (steps[4, m] + steps[5, m]) * f[m]
         p_new[m] = steps[2, m] * q[m] + steps[3, m] * p[m] + (steps[6, m] + steps[7, m]) * f[m]
@@ -284,7 +284,7 @@ def predict(
 
 @njit(cache=True)
 def look(outputs: np.ndarray, q: np.ndarray, p: np.ndarray, u: np.ndarray, v: np.ndarray) -> None:
-    """Displacements and velocities that the forces depend on."""
+    """Fill the displacements and velocities on which the forces depend."""
     for r in range(outputs.shape[0]):
         a, b = 0.0, 0.0
         for m in range(q.shape[0]):
@@ -303,7 +303,7 @@ def add_mesh(
     shapes: np.ndarray,
     outputs: np.ndarray,
 ) -> None:
-    """Add mesh force and friction to the modal forces: friction pushes off the line of action, with its levers."""
+    """Add mesh force and friction to the modal forces; friction acts across the line of action, with its levers."""
     side, torque_1, torque_2 = 0.0, 0.0, 0.0
     for i in range(n_pairs):
         rub = pairs[i, SLIP] * pairs[i, CARRIED]
@@ -340,7 +340,7 @@ def march(
     p: np.ndarray, supports: Supports, tables: Tables, offsets: np.ndarray, lines: Lines, speed: np.ndarray,
     all_trains: Trains,
 ) -> np.ndarray:  # fmt: skip
-    """March from modal state `q`, `p`; every `stride` steps a row of `N_OUT` values, after `n_before` rows unkept.
+    """Integrate from modal state `q`, `p`; return a row of `N_OUT` values every `stride` steps, after `n_before` rows.
 
     `modal`: step coefficients, shapes, outputs, ω, ζ. `supports`: steady forces, bearings, clearance, unbalance.
     `lines`: run-out, wobble, torque, sway, rows of shaft, order, amplitude, phase (and direction). `speed`: reference
@@ -360,7 +360,7 @@ def march(
         if step > 0:
             predict(steps, q, p, f, q_new, p_new)
         look(outputs, q_new, p_new, u, v)
-        # Turned to the tooth it meets with, the driven shaft is turned as a whole, from the gear to the brake.
+        # The offset of the first tooth rotates the driven shaft as a whole, from the gear to the brake.
         u[2] += number.phase_2
         u[8] += number.phase_2
         theta_1, theta_2 = u[1], u[2]
@@ -373,7 +373,7 @@ def march(
         shift, opening = waves(runout, theta_1, theta_2), centre_opening(runout, theta_1, theta_2)
         h = number.soft_m + 0.5 * abs(number.wedge_m + waves(wobble, theta_1, theta_2))
         n_pairs = pairs_in_reach(pairs, number, theta_1, shift, opening, offsets, tables)
-        # Everything but the mesh is known now; its force follows from the compression it leaves.
+        # All other forces are known now; the mesh force follows from the resulting compression.
         x_free, v_free = u[0], v[0]
         for m in range(n):
             a = 0.0

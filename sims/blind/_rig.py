@@ -1,4 +1,4 @@
-"""A drawn test rig: what its maker knows, and what nobody states."""
+"""A random test rig: the data that its maker knows, and those that nobody states."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ N_OUTPUTS = 9
 
 @dataclass(frozen=True)
 class Parts:
-    """Masses, springs and places of one rig, SI units.
+    """Masses, springs and positions of one rig, SI units.
 
-    `seat_x_m` are the bearings' horizontal places from the casing's centre, `height_m` theirs above its rocking axis,
-    `line_angle` the direction of the line of action against the horizontal.
+    `seat_x_m` are the bearings' horizontal positions from the casing's centre, `height_m` their height above its
+    rocking axis, and `line_angle` the angle of the line of action to the horizontal.
     """
 
     inertia_kgm2: tuple[float, float, float, float]
@@ -70,7 +70,7 @@ def mass_matrix(parts: Parts) -> Matrix:
 
 
 def output_rows(parts: Parts) -> Matrix:
-    """Rows that turn displacements into what the forces depend on, (N_OUTPUTS, N_DOF)."""
+    """Matrix from displacements to the quantities on which forces depend, (N_OUTPUTS, N_DOF)."""
     rows = np.zeros((N_OUTPUTS, N_DOF))
     n_x, n_y = np.cos(parts.line_angle), np.sin(parts.line_angle)
     rows[0, [GEAR_1, GEAR_2]] = parts.base_radii_m[0], -parts.base_radii_m[1]
@@ -83,7 +83,7 @@ def output_rows(parts: Parts) -> Matrix:
 
 
 def stiffness_matrix(parts: Parts) -> Matrix:
-    """Springs of shafts, bearings and foundation, (N_DOF, N_DOF); no mesh."""
+    """Stiffness matrix of shafts, bearings and foundation, without the mesh, (N_DOF, N_DOF)."""
     outputs = output_rows(parts)
     k = np.zeros((N_DOF, N_DOF))
     for (a, b), value in zip(((MOTOR, GEAR_1), (GEAR_2, LOAD)), parts.shaft_nm_per_rad, strict=True):
@@ -101,7 +101,7 @@ def stiffness_matrix(parts: Parts) -> Matrix:
 
 
 def modes_of(parts: Parts) -> ModalForm:
-    """Modes without the mesh; the two lowest are the free rotations of either drive line, undamped."""
+    """Modes without the mesh; the two lowest are the undamped free rotations of the two drive lines."""
     m, k = mass_matrix(parts), stiffness_matrix(parts)
     squares, shapes = eigh(k, m)
     omega = np.sqrt(np.maximum(squares, 0.0))
@@ -130,7 +130,7 @@ def step_coefficients(modes: ModalForm, step_s: float) -> Matrix:
 
 
 def static_shape(modes: ModalForm, mesh_n_per_m: float, forces: Matrix) -> Matrix:
-    """Displacements under constant forces that balance over the mesh, (N_DOF,); gear 1 is kept from turning."""
+    """Displacements under constant forces in equilibrium through the mesh, (N_DOF,); gear 1 is kept from rotating."""
     mesh = np.linalg.lstsq(modes.shapes.T, modes.outputs[0], rcond=None)[0]
     k = modes.stiffness + mesh_n_per_m * np.outer(mesh, mesh)
     k[GEAR_1, GEAR_1] += 1e-3 * mesh_n_per_m * mesh[GEAR_1] ** 2
@@ -144,7 +144,7 @@ def static_shape(modes: ModalForm, mesh_n_per_m: float, forces: Matrix) -> Matri
 
 STEEL_DENSITY = 7850.0
 REACH = 0.35
-"""Base pitches beyond either end of the path of contact at which a loaded pair may already or still touch."""
+"""Base pitches beyond either end of the path of contact up to which a loaded pair may be in contact."""
 N_PATH = 384
 """Points of the tables over the path of contact."""
 
@@ -153,7 +153,7 @@ N_PATH = 384
 class SpurPair:
     """A standard spur pair (addendum one module, no profile shift); gear 1 drives.
 
-    Places on the path of contact are counted in base pitches from its start A (tip of the driven gear):
+    Positions on the path of contact are in base pitches from its start A (tip of the driven gear):
     0 at A, the contact ratio at E.
     """
 
@@ -179,60 +179,60 @@ class SpurPair:
 
     @cached_property
     def pitch_radii_m(self) -> tuple[float, float]:
-        """Half of module times teeth."""
+        """Pitch radii, half of module times teeth."""
         return self.module_mm * self.z1 / 2000, self.module_mm * self.z2 / 2000
 
     @cached_property
     def base_radii_m(self) -> tuple[float, float]:
-        """Pitch radius times cos(pressure angle)."""
+        """Base radii, pitch radius times cos(pressure angle)."""
         r1, r2 = self.pitch_radii_m
         return r1 * cos(self.alpha), r2 * cos(self.alpha)
 
     @cached_property
     def tip_radii_m(self) -> tuple[float, float]:
-        """Pitch radius plus module."""
+        """Tip radii, pitch radius plus module."""
         r1, r2 = self.pitch_radii_m
         return r1 + self.module_mm / 1000, r2 + self.module_mm / 1000
 
     @property
     def base_pitch_m(self) -> float:
-        """Distance of equal flanks along the line of action."""
+        """Base pitch, the distance of like flanks along the line of action."""
         return pi * self.module_mm / 1000 * cos(self.alpha)
 
     @property
     def centre_distance_m(self) -> float:
-        """Sum of the pitch radii."""
+        """Centre distance, the sum of the pitch radii."""
         return sum(self.pitch_radii_m)
 
     @property
     def rho_start_m(self) -> float:
-        """Curvature radius of gear 1 at A."""
+        """Radius of curvature of gear 1 at A."""
         rb2, ra2 = self.base_radii_m[1], self.tip_radii_m[1]
         return self.centre_distance_m * sin(self.alpha) - sqrt(ra2**2 - rb2**2)
 
     @cached_property
     def contact_ratio(self) -> float:
-        """Length of the path of contact over the base pitch."""
+        """Contact ratio, the length of the path of contact over the base pitch."""
         rb1, ra1 = self.base_radii_m[0], self.tip_radii_m[0]
         return (sqrt(ra1**2 - rb1**2) - self.rho_start_m) / self.base_pitch_m
 
     @property
     def pitch_point(self) -> float:
-        """Place of the pitch point on the path."""
+        """Position of the pitch point on the path."""
         return (self.base_radii_m[0] * tan(self.alpha) - self.rho_start_m) / self.base_pitch_m
 
     @cached_property
     def path(self) -> FloatArray:
-        """Places of the tables, (N_PATH,)."""
+        """Positions of the table points, (N_PATH,)."""
         return np.linspace(-REACH, self.contact_ratio + REACH, N_PATH)
 
     def rho_m(self, place: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Curvature radii of both flanks at places on the path."""
+        """Radii of curvature of both flanks at positions on the path."""
         rho1 = self.rho_start_m + place * self.base_pitch_m
         return rho1, self.centre_distance_m * sin(self.alpha) - rho1
 
     def mean_stiffness_n_per_m(self) -> float:
-        """Mesh stiffness of the whole width, c_γ b.
+        """Mean mesh stiffness of the whole face width, c_γ b.
 
         c' = 0.8 C_B / q', q' = 0.04723 + 0.15551/z1 + 0.25791/z2, c_γ = c'(0.75 ε + 0.25), per mm and µm.
 
@@ -245,7 +245,7 @@ class SpurPair:
     def pair_stiffness_n_per_m(self) -> FloatArray:
         """Stiffness of one tooth pair over the path, (N_PATH,); its sum over pairs has the mean of ISO 6336.
 
-        A parabola from 0.55 at the ends to 1 in the middle; held at 0.55 beyond.
+        A parabola from 0.55 at the ends to 1 in the middle; constant at 0.55 beyond.
 
         Source: Y. Cai and T. Hayashi, The linear approximated equation of vibration of a pair of spur gears,
         *ASME J. Mech. Des.* 116 (1994).
@@ -255,7 +255,7 @@ class SpurPair:
         return np.asarray(self.mean_stiffness_n_per_m() / (0.85 * self.contact_ratio) * shape)
 
     def end_gap_m(self) -> FloatArray:
-        """Separation of an unloaded pair off the path's ends, (N_PATH,): tip corner against flank."""
+        """Separation of an unloaded pair beyond the path's ends, (N_PATH,): tip corner against flank."""
         pb, place = self.base_pitch_m, self.path
         gap = np.zeros(N_PATH)
         early, late = place < 0, place > self.contact_ratio
@@ -264,21 +264,21 @@ class SpurPair:
         return gap
 
     def end_shift_per_m(self) -> tuple[float, float]:
-        """Base pitches by which the path's ends A and E move per metre of growth in centre distance.
+        """Base pitches by which the path's ends A and E move per metre of increase in centre distance.
 
-        ρ1 grows by 1/sin α at A and not at E; the line of action turns by cot α / a, which gear 1 has to follow.
+        ρ1 grows by 1/sin α at A and not at E; the line of action rotates by cot α / a, which gear 1 follows.
         """
         turn = self.base_radii_m[0] / tan(self.alpha) / self.centre_distance_m
         return (1 / sin(self.alpha) - turn) / self.base_pitch_m, -turn / self.base_pitch_m
 
     def corner_gap_m(self, flank: int, distance_m: FloatArray, tip_loss_m: float = 0.0) -> FloatArray:
-        """Gap along the base circle of gear `flank` to the other's tip corner, that far from the path's end.
+        """Gap along the base circle of gear `flank` to the mate's tip corner, at a distance from the path's end.
 
-        A tip that lost `tip_loss_m` of its height ends the path earlier.
+        A tip that has lost `tip_loss_m` of its height ends the path earlier.
 
-        Own centre at 0, the other at (a, 0). The flank's involute starts at the polar angle β = α − ρ/r_b; the
-        corner at polar angle ψ and radius r touches an involute with β = ψ − inv(r). The gap is r_b times the
-        difference from where conjugate motion has put the flank.
+        The flank's gear centre is at 0, the mate's at (a, 0). The flank's involute starts at the polar angle
+        β = α − ρ/r_b; the corner at polar angle ψ and radius r touches an involute with β = ψ − inv(r). The gap is r_b
+        times the difference from the flank's position in conjugate motion.
         """
         mate = 1 - flank
         rb, rb_mate, ra_mate = self.base_radii_m[flank], self.base_radii_m[mate], self.tip_radii_m[mate]
@@ -319,18 +319,18 @@ BEARING_SERIES = (
     (11, 10.3, 58.6),
     (10, 15.08, 70.1),
 )
-"""Elements, their diameter and the pitch diameter in mm, of usual deep-groove sizes."""
+"""Number of elements, their diameter and the pitch diameter in mm, of usual deep-groove bearings."""
 
 
 def teeth_of(role: str) -> tuple[int, ...]:
-    """Tooth numbers of a role: no number from 17 to 70 serves two roles."""
+    """Tooth numbers of a role, from 17 to 70; no number is used in two roles."""
     place = ROLES.index(one_of(role, "role", ROLES))
     return tuple(z for z in range(17, 71) if (z // 2) % 3 == place)
 
 
 @dataclass(frozen=True)
 class SensorResonance:
-    """One mode of the way from a bearing to a sensor."""
+    """One mode of the path from a bearing to a sensor."""
 
     frequency_hz: float
     damping_ratio: float
@@ -339,7 +339,7 @@ class SensorResonance:
 
 @dataclass(frozen=True)
 class SensorChain:
-    """One accelerometer: where it points, its path and its gain."""
+    """One accelerometer: its direction, path and gain."""
 
     angle: float
     crosstalk: float
@@ -351,7 +351,7 @@ class SensorChain:
 
 @dataclass(frozen=True)
 class Tolerances:
-    """What manufacture left: metres on the line of action, tables (teeth, N_PATH), rows as the kernel takes them."""
+    """Manufacturing errors: in m on the line of action, tables (teeth, N_PATH), rows as in the kernel."""
 
     gap_m: tuple[FloatArray, FloatArray]
     runout: tuple[tuple[float, ...], ...]
@@ -389,16 +389,16 @@ class BlindRig:
     sampling_rate_hz: float
 
     def mesh_stiffness_n_per_m(self) -> float:
-        """Mean mesh stiffness as this pair really has it."""
+        """Actual mean mesh stiffness of this pair."""
         return self.pair.mean_stiffness_n_per_m() * self.stiffness_factor
 
     def bearing(self, place: int) -> Bearing:
-        """Bearing on shaft 0 or 1, as the catalogue has it."""
+        """Bearing on shaft 0 or 1, with catalogue geometry."""
         n, ball, pitch = self.bearings[place]
         return Bearing(f"bearing {2 * place + 1}", SHAFTS[place], n, ball, pitch)
 
     def description(self, speed_rpm: float, torque_nm: float) -> Rig:
-        """The rig file's content: what an engineer at the rig would write down."""
+        """Content of the rig file: what an engineer at the rig would state."""
         pair = self.pair
         places = ("bearing 1, input shaft, radial", "bearing 3, output shaft, radial")
         sensors = [Sensor(f"a{i + 1}", "acceleration", "m/s^2", places[i]) for i in range(len(self.chains))]
@@ -428,7 +428,7 @@ SHAFTS = ("input", "output")
 
 
 def draw_rig(rng: np.random.Generator, role: str) -> BlindRig:
-    """Draw a rig whose tooth numbers and module belong to `role` alone."""
+    """Draw a rig whose tooth numbers and module belong to `role` only."""
     pair = _draw_pair(rng, role)
     rated_nm = rng.uniform(40, 60) * pair.face_mm * pair.module_mm * pair.pitch_radii_m[0]
     force_n = rated_nm / pair.base_radii_m[0]
@@ -467,7 +467,7 @@ def draw_rig(rng: np.random.Generator, role: str) -> BlindRig:
 
 
 def _draw_pair(rng: np.random.Generator, role: str) -> SpurPair:
-    """Draw until the pair fits the bed and the ratio is between 1:2.5 up and 1:3 down."""
+    """Draw until the pair fits the bed and z2/z1 is between 0.4 and 3."""
     teeth, modules = teeth_of(role), MODULES_MM[role]
     while True:
         z1, z2 = (int(z) for z in rng.choice(teeth, 2))
@@ -520,7 +520,7 @@ def texture(rng: np.random.Generator, pair: SpurPair, n_teeth: int, rms_m: float
 
 
 def _draw_tolerances(rng: np.random.Generator, pair: SpurPair, fineness: float) -> Tolerances:
-    """Draw errors of a quality that suits the load: `fineness` scales what stands on the flanks."""
+    """Draw errors of a quality that suits the load: `fineness` scales the flank errors."""
     gaps, runout, wobble = [], [], []
     s = np.clip(pair.path / pair.contact_ratio, 0, 1) - 0.5
     for shaft, z in enumerate((pair.z1, pair.z2)):
@@ -536,7 +536,7 @@ def _draw_tolerances(rng: np.random.Generator, pair: SpurPair, fineness: float) 
         (float(rng.integers(0, 2)), float(order), 10 ** rng.uniform(-3.0, -2.3), rng.uniform(0, 2 * pi))
         for order in (1, 2, int(rng.choice([3, 4, 5, 6])))
     ]
-    # The brake pulls unevenly: without load the teeth may be thrown from flank to flank.
+    # The brake torque is uneven: without load the teeth may rattle between flanks.
     torque.append((1.0, float(rng.integers(1, 3)), 10 ** rng.uniform(-2.1, -1.6), rng.uniform(0, 2 * pi)))
     return Tolerances(
         gap_m=(gaps[0], gaps[1]),

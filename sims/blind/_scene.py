@@ -1,4 +1,4 @@
-"""One run of a rig: everything the march needs, open to be changed before it starts."""
+"""One run of a rig: all inputs of the time integration, which can be changed before it starts."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ from sims.blind._rig import (
 
 WARM_UP_S = 0.5
 LEAD_S = 0.15
-"""The end of the warm-up that is kept for what already rings when a recording begins."""
+"""Last part of the warm-up, kept because paths are already ringing when a recording begins."""
 GRID_S = 1e-3
 SUB_STEPS = 4
-"""Steps per sample; every second one is kept, and the filter before the sampling takes the rest."""
+"""Steps per sample; every second one is kept, and the anti-alias filter removes the rest."""
 Rows = list[tuple[float, ...]]
 Stage = Callable[["BlindMotion", FloatArray, np.random.Generator], FloatArray]
 
 
 @dataclass(frozen=True)
 class RunCondition:
-    """Where a rig runs: as stated, and as it is."""
+    """Operating condition of a run, as stated and in truth."""
 
     stated_rpm: float
     stated_nm: float
@@ -51,7 +51,7 @@ class RunCondition:
 
 @dataclass(frozen=True)
 class BlindMotion:
-    """What a run gave, at twice the sampling rate; `lead_n` are the bearings' forces just before."""
+    """Results of a run at twice the sampling rate; `lead_n` are the bearing forces just before it."""
 
     rate_hz: float
     lead_n: FloatArray
@@ -64,7 +64,7 @@ class BlindMotion:
 
 @dataclass(frozen=True)
 class Train:
-    """Half-sine pulses at angles of a shaft: kind 0 or 1 a bearing's force, 2 a torque at that shaft's end."""
+    """Half-sine pulses at shaft angles: kind 0 or 1 is a force of that bearing, 2 a torque at the shaft's end."""
 
     shaft: int
     kind: int
@@ -76,7 +76,7 @@ class Train:
 
 @dataclass
 class Scene:
-    """A run before it starts; changes act on this. Lists of rows are as `kernel.march` describes them."""
+    """A run before it starts, to which changes are applied. For the lists of rows see `march`."""
 
     rig: BlindRig
     condition: RunCondition
@@ -118,7 +118,7 @@ class Scene:
 
     @property
     def turns(self) -> tuple[float, float]:
-        """Revolutions of both shafts in the run, generously."""
+        """Upper bound of the revolutions of both shafts in the run."""
         n = (self.condition.duration_s + WARM_UP_S + 1) * 1.2 * self.omega[0] / (2 * pi)
         return n, n * self.rig.pair.z1 / self.rig.pair.z2
 
@@ -152,7 +152,7 @@ def relief_gap(rig: BlindRig) -> FloatArray:
 
 
 def scene_of(rig: BlindRig, condition: RunCondition) -> Scene:
-    """The rig in good order at a condition; all chance in it comes from the condition's seed."""
+    """The healthy rig at a condition; all randomness comes from the condition's seed."""
     rng = np.random.default_rng(condition.seed)
     made, pair = rig.tolerances, rig.pair
     omega_1 = condition.true_rpm * pi / 30
@@ -187,16 +187,16 @@ def scene_of(rig: BlindRig, condition: RunCondition) -> Scene:
 
 
 def _meeting_teeth(pair: SpurPair, rng: np.random.Generator) -> tuple[int, int]:
-    """Teeth of either gear that meet first: with a common divisor of the tooth numbers each tooth keeps its partners.
+    """Teeth of the two gears that meet first; if tooth numbers have a common divisor, each tooth keeps its mates.
 
-    Nobody takes the gears out of mesh between two recordings of a rig, so only what turning reaches is drawn.
+    The gears stay in mesh between recordings of a rig, so only positions reachable by rotation are drawn.
     """
     tooth = int(rng.integers(pair.z2))
     return 0, tooth - tooth % gcd(pair.z1, pair.z2)
 
 
 def _mounted_paths(rig: BlindRig, condition: RunCondition) -> list[list[SensorResonance]]:
-    """The paths of this mounting: each time sensors go on, frequencies shift by some 0.3 %, gains by 2 %."""
+    """The paths of this mounting: each time sensors are mounted, frequencies shift by about 0.3 %, gains by 2 %."""
     rng = np.random.default_rng(condition.mount_seed)
     return [
         [
@@ -210,7 +210,7 @@ def _mounted_paths(rig: BlindRig, condition: RunCondition) -> list[list[SensorRe
 
 
 def _speed_profile(rig: BlindRig, condition: RunCondition, omega_1: float, rng: np.random.Generator) -> Matrix:
-    """Reference speed and its rate of change, (n, 2), every GRID_S: a slow wander."""
+    """Slowly wandering reference speed and its rate of change, (n, 2), every GRID_S."""
     t = np.arange(0, condition.duration_s + WARM_UP_S + 1, GRID_S)
     profile, later = np.ones_like(t), rng.uniform(0, 20)
     for frequency_hz, share, phase in rig.wander:
@@ -226,7 +226,7 @@ def with_speed_profile(scene: Scene, factor: Callable[[FloatArray], FloatArray])
 
 
 def run(scene: Scene, *, sub_steps: int = SUB_STEPS) -> BlindMotion:
-    """March the scene through its warm-up and its duration."""
+    """Integrate the scene through its warm-up and its duration."""
     rate_hz = 2 * scene.rig.sampling_rate_hz
     n_lead = round(LEAD_S * rate_hz)
     n_out, n_before, *state = march_arguments(scene, sub_steps)
@@ -236,9 +236,9 @@ def run(scene: Scene, *, sub_steps: int = SUB_STEPS) -> BlindMotion:
 
 
 def march_arguments(scene: Scene, sub_steps: int, **numbers: float) -> tuple[Any, ...]:
-    """Return what `march` takes, in its order; `sub_steps` steps per sample, an even number.
+    """Return the arguments of `march` in order, with `sub_steps` steps per sample, an even number.
 
-    `numbers` take the place of single values of the march by their names there, e.g. `mesh_damping=0.0`.
+    `numbers` replace single values of `NUMBERS` by name, e.g. `mesh_damping=0.0`.
     """
     rig, condition = scene.rig, scene.condition
     rate_hz, step_s = 2 * rig.sampling_rate_hz, 1 / (rig.sampling_rate_hz * sub_steps)
@@ -283,7 +283,7 @@ def _start(scene: Scene, modes: ModalForm) -> tuple[Matrix, Matrix, Matrix]:
 
 
 def _friction_nm(scene: Scene) -> float:
-    """Mean torque that friction takes from the driver: the motor knows it roughly, its controller does the rest."""
+    """Mean friction torque on the driver, by which the motor torque is corrected; its controller does the rest."""
     pair = scene.rig.pair
     inside = (pair.path >= 0) & (pair.path <= pair.contact_ratio)
     rho1, rho2 = pair.rho_m(pair.path)
@@ -354,17 +354,17 @@ def _padded(arrays: list[FloatArray], fill: float) -> Matrix:
 
 
 # --------------------
-# From motion to a recording: the way to the sensor, noise, tachometer, sampling.
+# From motion to a recording: path to the sensor, noise, tachometer, sampling.
 # --------------------
 
 
 TACH_VOLTS = 5.0
 ENCODER_NOISE_REV = 4e-7
-"""Of one reading: half a second of arc."""
+"""Standard deviation of one reading: half a second of arc."""
 
 
 def path_response(force_n: FloatArray, rate_hz: float, path: list[SensorResonance]) -> FloatArray:
-    """Acceleration at the end of parallel oscillators: Σ s²/(s² + 2ζω s + ω²) / m, bilinear with pre-warping."""
+    """Acceleration of parallel oscillators, Σ s²/(s² + 2ζω s + ω²) / m, by the bilinear transform with pre-warping."""
     from scipy.signal import lfilter
 
     total = np.zeros_like(force_n)
@@ -378,7 +378,7 @@ def path_response(force_n: FloatArray, rate_hz: float, path: list[SensorResonanc
 
 
 def accelerations(scene: Scene, motion: BlindMotion) -> FloatArray:
-    """What each sensor's place does, (n_chains, n) at the motion's rate; no noise yet."""
+    """Acceleration at each sensor, without noise, (n_chains, n) at the motion's rate."""
     parts = scene.rig.parts
     n_lead = motion.lead_n.shape[1]
     force = np.hstack([motion.lead_n, motion.bearing_n]) - motion.bearing_n.mean(axis=1, keepdims=True)
@@ -394,7 +394,7 @@ def accelerations(scene: Scene, motion: BlindMotion) -> FloatArray:
 
 
 def coloured_noise(rng: np.random.Generator, n: int, rate_hz: float, colour: float) -> FloatArray:
-    """Noise of unit rms whose power falls as f^-colour from 20 Hz on."""
+    """Noise of unit rms with a power density proportional to f^-colour above 20 Hz."""
     from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
     long = next_fast_len(n, real=True)
@@ -404,7 +404,7 @@ def coloured_noise(rng: np.random.Generator, n: int, rate_hz: float, colour: flo
 
 
 def tachometer(scene: Scene, motion: BlindMotion, rng: np.random.Generator) -> FloatArray:
-    """One pulse per turn of the input shaft, in volts at the sampling rate; edges last two samples and jitter."""
+    """One pulse per revolution of the input shaft, in volts; edges last two samples and have jitter."""
     theta, fs = motion.theta[0], scene.rig.sampling_rate_hz
     n = len(theta) // 2
     turns = np.arange(np.floor(theta[0] / (2 * pi)), np.ceil(theta[-1] / (2 * pi)) + 1)
@@ -427,7 +427,7 @@ def tachometer(scene: Scene, motion: BlindMotion, rng: np.random.Generator) -> F
 
 
 def encoders_deg(scene: Scene, motion: BlindMotion, counts_per_revolution: int) -> FloatArray:
-    """Readings of an encoder at each gear, (2, n) at the sampling rate: the count that was passed last."""
+    """Readings of an encoder at each gear, (2, n) at the sampling rate: the last count passed."""
     n = motion.theta.shape[1] // 2
     turned = motion.theta[:, : 2 * n : 2] / (2 * pi)
     noise = np.random.default_rng([scene.condition.seed, 4]).normal(0, ENCODER_NOISE_REV, turned.shape)
@@ -436,7 +436,7 @@ def encoders_deg(scene: Scene, motion: BlindMotion, counts_per_revolution: int) 
 
 
 def measure(scene: Scene, motion: BlindMotion, *, encoder_counts: int = 0) -> Recording:
-    """Sample sensors, tachometer and, where there are any, an encoder at each gear as the rig's front end would."""
+    """Sample sensors, tachometer and, if `encoder_counts` is given, an encoder at each gear."""
     from scipy.signal import butter, resample_poly, sosfilt
 
     rig = scene.rig

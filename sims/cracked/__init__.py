@@ -1,4 +1,4 @@
-"""The cracked spur pair: 16 degrees of freedom, contact tooth pair by tooth pair, cracks, friction, backlash."""
+"""The cracked spur pair: 16 degrees of freedom, contact per tooth pair, cracks, friction and backlash."""
 
 from sims.cracked._kernels import contact_forces, derivative, integrate, late_entry, place_of_entry, potential_energy
 from sims.cracked._respond import (

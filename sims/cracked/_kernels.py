@@ -1,4 +1,4 @@
-"""Compiled: the classic Runge–Kutta method of fourth order at a fixed step, for the sixteen coordinates."""
+"""Compiled: the classical fourth-order Runge–Kutta method with a fixed step, for the sixteen coordinates."""
 
 # mypy: allow-untyped-defs, allow-untyped-calls
 
@@ -21,31 +21,30 @@ from sims.mesh import (
     pair_force,
 )
 
-# Compiled contact of the gear pair: forces of all tooth pairs that touch, on either flank.
+# Compiled contact of the gear pair: forces of all tooth pairs in contact, on both flanks.
 #
 # Each pair k with progress ζ = c − k, c = z1 θ1/2π, has the energy U = w(ζ) u(d; C(ζ)), d = δ − E(ζ) − Δb(t), and the
-# normal force N = w n(d; C) from d = C n + B(n). Its forces on the coordinates are −∂U/∂q; besides N along the line of
-# action that gives the driver a torque −∂U/∂c · ∂c/∂θ1, as stiffness and flank shape move past under load. Without it a
-# pair would take energy from the drive that appears nowhere (Oh, Grosh, Barber 2005). ∂u/∂C at constant d is −n²/2
-# whatever the contact's law is.
+# normal force N = w n(d; C) from d = C n + B(n). Its forces on the coordinates are −∂U/∂q; in addition to N along the
+# line of action, this gives the driver a torque −∂U/∂c · ∂c/∂θ1, as stiffness and flank shape move past under load.
+# Without it a pair would take energy from the drive that appears nowhere (Oh, Grosh, Barber 2005). ∂u/∂C at constant d
+# is −n²/2 for any contact law.
 #
-# Gears that move apart by Δa stretch the line between their base circles by Δa/sin α_w: a pair enters late by that, as
-# the path of contact begins at the driven gear's tip. The line also turns, by Δx/(a sin α_w) where Δx is how far the
-# driven gear has moved off the line of action, and with it all contacts shift by r_b1 times that. So run-out changes
-# contact ratio and phase once per revolution. The forces −∂U/∂(Δx, Δy) are left out: they would follow from the width
-# that is assumed for the ramp, where the geometry of a corner contact gives a tenth of it, and they work over the
-# run-out alone.
+# Gears that move apart by Δa lengthen the line between their base circles by Δa/sin α_w: a pair enters late by that, as
+# the path of contact begins at the driven gear's tip. The line also rotates, by Δx/(a sin α_w) where Δx is the driven
+# gear's displacement off the line of action, and all contacts shift by r_b1 times that angle. Run-out thus changes
+# contact ratio and phase once per revolution. The forces −∂U/∂(Δx, Δy) are neglected: they would depend on the assumed
+# width of the ramp, while the geometry of a corner contact gives a tenth of it, and they do work over the run-out only.
 #
-# Along the face the flanks are cut into slices: slice s of a pair touches `slice_late` base pitches after the end that
-# enters first and lies `slice_gap` apart (`sims.mesh.Lead`); a straight, even face is one slice.
+# The flanks are divided into slices along the face: slice s of a pair enters `slice_late` base pitches after the first
+# end, with a gap of `slice_gap` (`sims.mesh.Lead`); a spur pair without crowning and misalignment has one slice.
 
 MAX_LATE = 0.12
-"""Base pitches by which an entry may be late or early; the places of gears that move further count as that far."""
+"""Limit in base pitches of the late or early entry that displaced gears cause."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def late_entry(k, dx, dy):
-    """Base pitches by which pairs enter late, from the driver's centre less the driven gear's."""
+    """Base pitches by which pairs enter late, from the position of the driver's centre less the driven gear's."""
     late = -(k.late_x * dx + k.late_y * dy)
     return min(max(late, -MAX_LATE), MAX_LATE)
 
@@ -60,7 +59,7 @@ def contact_forces(
     `slip_x`: ẋ1 − ẋ2. `rough`, `rough_rate`: Δb and its rate.
     """
     normal, along_cycles, friction, moment_1, moment_2 = 0.0, 0.0, 0.0, 0.0, 0.0
-    if not abs(cycles) < MAX_CYCLES:  # a solution that bursts, or NaN, must not be taken for a tooth's number
+    if not abs(cycles) < MAX_CYCLES:  # a diverging solution, or NaN, must not be used as a tooth index
         return np.nan, np.nan, np.nan, np.nan, np.nan
     newest = np.floor(cycles + 0.5 * k.ramp + MAX_LATE)
     z1, z2 = float(k.teeth[0]), float(k.teeth[1])
@@ -72,9 +71,9 @@ def contact_forces(
         weight, weight_slope = engagement_and_slope(progress, late, k.contact_ratio, k.ramp)
         if weight <= 0.0:
             continue
-        # By floats: the remainder of whole numbers takes several times as long.
+        # In floats: the remainder of integers takes several times as long.
         tooth_1, tooth_2 = int(pair - z1 * np.floor(pair / z1)), int(pair - z2 * np.floor(pair / z2))
-        # An early entry lies ahead of the table: its first cubic ends there.
+        # An early entry is before the table's first interval: held at its start.
         place = max((progress - k.table_start) / k.table_step, 1.0)
         i = min(max(int(place), 1), columns - 3)
         t = place - i
@@ -120,14 +119,14 @@ def contact_forces(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _damped_part(k, depth):
-    """Part of its damping that a contact has, which comes in smoothly."""
+    """Effective fraction of a contact's damping, which rises smoothly with depth."""
     u = min(depth / k.damping_ramp, 1.0)
     return u * u * (3.0 - 2.0 * u)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def energy_of_pair(depth, compliance, force, load_dependent):
-    """U = n d − C n²/2 − ∫B, without the engagement weight."""
+    """Energy of a pair, U = n d − C n²/2 − ∫B, without the engagement weight."""
     if load_dependent:
         return force * (0.5 * compliance * force + (depth - compliance * force) * 0.9 / 1.9)
     return 0.5 * force * depth
@@ -159,7 +158,7 @@ def stored_energy(k, curves, rows, pitch, delta, late, cycles, rough):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def back_flank_force(k, depth, rate):
-    """(N', U') of the flanks behind, pressed by `depth`: one constant stiffness, its damping as on the driving side."""
+    """(N', U') of the back flanks, compressed by `depth`: constant stiffness, damping as on the driving side."""
     if depth <= 0.0:
         return 0.0, 0.0
     force = k.back_stiffness * (depth + k.damping_time * _damped_part(k, depth) * rate)
@@ -170,23 +169,23 @@ def back_flank_force(k, depth, rate):
 #
 # Driver (counter-clockwise; c, s of the angle of its centre of mass, ρ its distance from the axis)
 #     ẍ = F_x/m + ρ(θ̈ s + θ̇² c),  ÿ = F_y/m + ρ(−θ̈ c + θ̇² s),  J θ̈ = T + ρ(s F_x − c F_y),
-# where F holds every force but gravity: gravity acts at the centre of mass and has no moment about it. The driven gear
-# turns clockwise: the signs of its y terms are reversed.
-# Its pitch circle's centre lies ε off the axis: y1 + ε1 sin φ1 and y2 − ε2 sin φ2 take the places of y1 and y2 in the
-# compression, and the torque is −N ∂δ/∂θ. Forces on the teeth: `sims.cracked`, and on the flanks behind
-# along their own line of action, 2α_w away from that of the driving flanks.
+# where F includes every force except gravity, which acts at the centre of mass and has no moment about it. The driven
+# gear turns clockwise: the signs of its y terms are reversed.
+# The pitch circle's centre is ε off the axis: y1 + ε1 sin φ1 and y2 − ε2 sin φ2 replace y1 and y2 in the compression,
+# and the torque is −N ∂δ/∂θ. Tooth forces: see above; those of the back flanks act along their own line of action, at
+# 2α_w to that of the driving flanks.
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def tilted(k, q):
-    """Compression of helical flanks as the shafts tilt between their bearings: r_w φ tan β_b of both, from q or v."""
+    """Compression of helical flanks by tilting of the shafts, r_w φ tan β_b of both, from q (or its rate, from v)."""
     first = k.tilt_x[0] * (q[8] - q[10]) + k.tilt_y[0] * (q[9] - q[11])
     return -first - k.tilt_x[1] * (q[12] - q[14]) - k.tilt_y[1] * (q[13] - q[15])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def bearing_force(k, row, theta, x, y):
-    """(F_x, F_y) by which a bearing's spring or elements push back the shaft at (x, y); `theta`: the shaft's angle."""
+    """(F_x, F_y) of a bearing's spring or elements on the shaft at (x, y); `theta`: shaft angle."""
     part = 1.0
     if k.special[row] > 0:
         foot_x, foot_y = foot(k, row, theta, x, y)
@@ -202,7 +201,7 @@ def bearing_force(k, row, theta, x, y):
 def accelerations(  # noqa: PLR0915  one machine, one set of equations
     k, curves, rows, pitch, q, v, torque, set_angle, speed, speed_rate, rough, rough_rate, a, extra
 ):
-    """Fill `a` (16) with the accelerations and `extra` (5) with the signals that follow.
+    """Fill `a` (16) with the accelerations and `extra` (5) with the signals from "transmission_error_m" on.
 
     k, curves, rows, pitch : see `sims.cracked`.
     q, v : (16,).
@@ -210,7 +209,7 @@ def accelerations(  # noqa: PLR0915  one machine, one set of equations
     rough, rough_rate : Δb and its rate.
     """
     rb1, rb2 = k.base_radius[0], k.base_radius[1]
-    # Places of the pitch circles' centres: ε (cos φ1, sin φ1) and ε (cos φ2, −sin φ2).
+    # Positions of the pitch circles' centres: ε (cos φ1, sin φ1) and ε (cos φ2, −sin φ2).
     cx1, cy1, cx2, cy2 = 0.0, 0.0, 0.0, 0.0
     if k.turns:
         cx1, cy1 = k.runout[0] * cos(q[1] + k.runout_angle[0]), k.runout[0] * sin(q[1] + k.runout_angle[0])
@@ -242,8 +241,8 @@ def accelerations(  # noqa: PLR0915  one machine, one set of equations
     back = 0.0
     off, off_slope = out_of_place(cycles, 0.5 * k.contact_ratio, k.teeth, pitch)
     depth = -error - k.cos_back * dy + k.sin_back * dx - k.backlash - rough - tilt + off
-    if depth > 0.0:  # also while the driving flanks touch: run-out may take up all play
-        # Velocities of the pitch circles' centres: θ̇ times their places turned by a quarter.
+    if depth > 0.0:  # also while the driving flanks touch: run-out may take up all backlash
+        # Velocities of the pitch circles' centres: θ̇ times their positions rotated by 90°.
         vx = v[4] - cy1 * v[1] - v[6] - cy2 * v[2]
         vy = v[5] + cx1 * v[1] - v[7] + cx2 * v[2]
         rate = -rb1 * v[1] + rb2 * v[2] - k.cos_back * vy + k.sin_back * vx - rough_rate - tilt_rate
@@ -265,7 +264,7 @@ def accelerations(  # noqa: PLR0915  one machine, one set of equations
         bend_y = ks * (q[g + 1] - 0.5 * (q[b1 + 1] + q[b2 + 1])) + cs * (v[g + 1] - 0.5 * (v[b1 + 1] + v[b2 + 1]))
         theta = q[1] if side == 0 else q[2]
         rotor, rotor_rate = (q[0], v[0]) if side == 0 else (q[3], v[3])
-        up = 1.0 if side == 0 else -1.0  # the driven shaft turns the other way
+        up = 1.0 if side == 0 else -1.0  # the driven shaft turns in the opposite direction
         slope = 1.0
         push_x, push_y = 0.0, 0.0
         if k.hooke[side] > 0.0:
@@ -280,7 +279,7 @@ def accelerations(  # noqa: PLR0915  one machine, one set of equations
             bent = k.coupling_bending[side]
             push_x = k.hooke_force[side] * (carried * (1.0 + c2) - bent * s2)
             push_y = k.hooke_force[side] * up * (carried * s2 + bent * (1.0 + c2))
-        # The axial force acts at the pitch circle: its moment presses the two bearings apart along the line of centres.
+        # The axial force acts at the pitch circle: its moment gives opposite bearing forces along the line of centres.
         push_x += k.tilt_x[side] * (normal - back)
         push_y += k.tilt_y[side] * (normal - back)
         for row, b, sign in ((2 * side, b1, 1.0), (2 * side + 1, b2, -1.0)):
@@ -318,7 +317,7 @@ def accelerations(  # noqa: PLR0915  one machine, one set of equations
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def potential_energy(k, curves, rows, pitch, q, late, turned, rough):
-    """Springs, tooth pairs and weight, in J; `late`, `turned`: see `place_of_entry`."""
+    """Potential energy of springs, tooth pairs and weight, in J; `late`, `turned`: see `place_of_entry`."""
     cx1, cy1 = k.runout[0] * cos(q[1] + k.runout_angle[0]), k.runout[0] * sin(q[1] + k.runout_angle[0])
     cx2, cy2 = k.runout[1] * cos(q[2] + k.runout_angle[1]), -k.runout[1] * sin(q[2] + k.runout_angle[1])
     error = k.base_radius[0] * q[1] - k.base_radius[1] * q[2]
@@ -348,7 +347,7 @@ def potential_energy(k, curves, rows, pitch, q, late, turned, rough):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def place_of_entry(k, q):
-    """Late entry of pairs, and shift of all contacts, in base pitches, at the places q."""
+    """Late entry of pairs, and shift of all contacts, in base pitches, at the coordinates q."""
     dx = q[4] + k.runout[0] * cos(q[1] + k.runout_angle[0]) - q[6] - k.runout[1] * cos(q[2] + k.runout_angle[1])
     dy = q[5] + k.runout[0] * sin(q[1] + k.runout_angle[0]) - q[7] + k.runout[1] * sin(q[2] + k.runout_angle[1])
     return late_entry(k, dx, dy), k.turn_x * dx
@@ -392,14 +391,14 @@ def integrate(  # noqa: PLR0915  four stages written out
     """Run `n_steps` steps from time `start`; fill `output` with the selected signals at every `stride`-th step.
 
     k, curves, rows, pitch : see `sims.cracked`.
-    q, v, set_angle : (16,), (16,), (1,); left at the last step's state, for the next call to go on from.
+    q, v, set_angle : (16,), (16,), (1,); left at the last step's state, where the next call continues.
     speed, torque : (2, n) times and values of the set profiles, in rad/s and N m.
-    rough : phasors of a roughness locked to time at `start`, stepped by half of `step`, left at the end; see
+    rough : phasors at `start` of a roughness locked to time, stepped by half of `step`, left at the end; see
         `TimeLockedRoughness`.
-    select : places of the wanted signals in `sims.cracked.SIGNALS`.
+    select : indices of the requested signals in `sims.cracked.SIGNALS`.
     output : (n_out, n_selected).
-    energies : (n_out,) or (0,): total energy in J, not computed where empty.
-    Returns the number of rows that were filled: fewer where the state is no longer finite.
+    energies : (n_out,) or (0,): total energy in J, not computed if empty.
+    Returns the number of rows filled, fewer if the state is no longer finite.
     """
     re, im, omega, half_cos, half_sin = rough
     a = np.empty(16)
@@ -415,7 +414,7 @@ def integrate(  # noqa: PLR0915  four stages written out
         w0, d0 = set_speed(k, speed, t)
         wh, dh = set_speed(k, speed, t + 0.5 * step)
         w1, d1 = set_speed(k, speed, t + step)
-        # The set angle by Simpson's rule, and by the parabola through the same three speeds half way.
+        # The set angle by Simpson's rule, and halfway by the parabola through the same three speeds.
         angle_h = angle + step / 24.0 * (5.0 * w0 + 8.0 * wh - w1)
         angle_1 = angle + step / 6.0 * (w0 + 4.0 * wh + w1)
         m0, mh, m1 = profile_value(torque, t), profile_value(torque, t + 0.5 * step), profile_value(torque, t + step)
@@ -424,7 +423,7 @@ def integrate(  # noqa: PLR0915  four stages written out
         hh, rh = height_now(re, im, omega)
         advance(re, im, half_cos, half_sin)
         h1, r1 = height_now(re, im, omega)
-        # First stage, at the begin: its accelerations are also those of the kept point.
+        # First stage, at the beginning: its accelerations are also those of the kept point.
         accelerations(k, curves, rows, pitch, q, v, m0, angle, w0, d0, h0, r0, a, extra)
         if step_number % stride == 0:
             for i in range(16):
@@ -473,7 +472,7 @@ def integrate(  # noqa: PLR0915  four stages written out
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def derivative(k, curves, rows, pitch, t, state, speed, torque, first_angle, rough, rate):
-    """Fill `rate` (32) with the derivative of `state` (q, v) at any time t: for other integrators and checks.
+    """Fill `rate` (32) with the derivative of `state` (q, v) at any time t, for other integrators and checks.
 
     first_angle : set angle at time 0; the set speed must be constant.
     rough : (amplitudes, ω, phases) of a roughness locked to time.

@@ -1,4 +1,4 @@
-"""Run the model and return what it does: displacements, velocities, accelerations, mesh force, transmission error."""
+"""Run the model: displacements, velocities, accelerations, mesh force and transmission error."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from sims.gear_pair import (
 from sims.machine import Machine, Operation
 from sims.mesh import MAX_SLICES, TimeLockedRoughness, back_stiffness_n_per_m, mesh_stiffness, mesh_table, share_torque
 
-# Numbers of the sixteen coordinates and of the signals that a run can give.
+# The sixteen coordinates and the signals of a run.
 
 __all__ = ["COORDINATES", "N_COORDINATES", "SIGNALS"]
 
@@ -54,17 +54,17 @@ SIGNALS = (
     "backlash_change_m",
     *DEFLECTIONS,
 )
-"""What a run can give, by the place in the kernel's row.
+"""Signals of a run, in the order of the kernel's row.
 
-transmission_error_m: r_b1 θ1 − r_b2 θ2. compression_m: that plus what the gears' centres add. mesh_force_n: sum of the
-tooth pairs' normal forces, below 0 on the back flank. friction_n: sum of the friction forces. backlash_change_m: Δb
-of a roughness locked to time. For yields see `sims.gear_pair.DEFLECTIONS`.
+transmission_error_m: r_b1 θ1 − r_b2 θ2. compression_m: that plus the contribution of the gears' centres. mesh_force_n:
+sum of the tooth pairs' normal forces, below 0 on the back flank. friction_n: sum of the friction forces.
+backlash_change_m: Δb of a roughness locked to time. For yields see `sims.gear_pair.DEFLECTIONS`.
 """
 
-# The machine as plain numbers, which compiled code reads.
+# The machine as plain numbers for compiled code.
 
 DAMPING_RAMP_M = 2e-7
-"""Depth over which the contact's damping comes in."""
+"""Depth over which the contact's damping rises to its full value."""
 SCALARS = (
     "table_start",
     "table_step",
@@ -109,14 +109,14 @@ RECORD = np.dtype(
     + BEARING_FIELDS,
     align=True,
 )
-"""Numbers in SI units, those of a side in pairs (driver, driven), those of bearings in fours;
-per_… are reciprocals, since compiled code multiplies faster than it divides. A record, since compiled
-code passes one by its address, while it copies every member of a tuple at each call."""
+"""Fields in SI units, those per side in pairs (driver, driven), those of bearings in fours; per_… are reciprocals, as
+multiplication is faster than division. A record, as compiled code passes it by address, while it copies every member
+of a tuple at each call."""
 
 
 @dataclass(frozen=True)
 class PairConstants:
-    """What compiled code reads.
+    """Input of compiled code.
 
     Parameters
     ----------
@@ -124,10 +124,11 @@ class PairConstants:
     curves : array, (n_curves, n)
         Compliance (m/N) and separation (m) of single teeth over the progress of contact, see `MeshTable`.
     rows : int array, (4, z)
-        Which curve holds the compliance of each tooth of the driver, of the driven gear, then their separations.
+        Index of the curve with the compliance of each tooth of the driver and of the driven gear, then those of their
+        separations.
     pitch : array, (2, z)
-        Pitch deviation of each tooth, in m. One array of each kind, since compiled code counts its references to every
-        array in a tuple, which took as long as the mechanics.
+        Pitch deviation of each tooth, in m. There is one array of each kind, as compiled code counts its references to
+        every array in a tuple, which took as long as the mechanics.
     """
 
     record: Any
@@ -137,12 +138,12 @@ class PairConstants:
 
     @property
     def arguments(self) -> tuple[Any, FloatArray, NDArray[np.int64], FloatArray]:
-        """The four, as kernels take them."""
+        """The four fields as arguments of kernels."""
         return self.record, self.curves, self.rows, self.pitch
 
 
 def constants(machine: Machine, operation: Operation, rng: np.random.Generator) -> PairConstants:
-    """Turn a machine into plain numbers; draws the places of rolling elements in bearings with a defect."""
+    """Convert a machine to plain numbers; draws the positions of rolling elements in bearings with a defect."""
     pair, mesh = machine.mesh.pair, machine.mesh
     table = mesh_table(mesh)
     base_radius = np.array(pair.base_radii_m)
@@ -168,7 +169,7 @@ def constants(machine: Machine, operation: Operation, rng: np.random.Generator) 
         "damping_time": 2.0 * machine.mesh_damping_ratio * sqrt(mesh_mass_kg(machine) / mean_stiffness),
         "damping_ramp": DAMPING_RAMP_M,
         "back_stiffness": back_stiffness_n_per_m(mesh),
-        # Base pitches per metre that the gears stand apart along their line of centres, (cos α, sin α).
+        # Base pitches per metre of displacement of the gears along their line of centres, (cos α, sin α).
         "late_x": cos(alpha) / (sin(alpha) * pair.base_pitch_mm * 1e-3),
         "late_y": 1.0 / (pair.base_pitch_mm * 1e-3),
         "turn_x": base_radius[0] / (pair.action_length_mm * pair.base_pitch_mm * 1e-6),
@@ -200,26 +201,26 @@ def _filled(values: FloatArray) -> FloatArray:
 
 
 def mesh_mass_kg(machine: Machine) -> float:
-    """Mass that the two gears put against each other along the line of action, 1/(r_b1²/J1 + r_b2²/J2)."""
+    """Equivalent mass of the two gears along the line of action, 1/(r_b1²/J1 + r_b2²/J2)."""
     radii = machine.mesh.pair.base_radii_m
     return 1.0 / sum(r**2 / w.inertia_kg_m2 for r, w in zip(radii, machine.wheels, strict=True))
 
 
 def mean_stiffness_n_per_m(machine: Machine, force_n: float) -> float:
-    """Mean mesh stiffness over a cycle of healthy teeth, at the set force where contact stiffens with the load."""
+    """Mean mesh stiffness of healthy teeth over a cycle, at the given force if contact stiffens with the load."""
     healthy = machine.mesh.healthy
     if healthy.contact_law == "linear":
         return mesh_stiffness(healthy).mean_n_per_m
     return mesh_stiffness(healthy, force_n=max(force_n, 1.0)).mean_n_per_m
 
 
-# Where a run starts: the static balance at the first torque and speed, so that no blow has to die out.
+# Start of a run: static equilibrium at the initial torque and speed, so that no initial impact has to decay.
 
 
 def start_state(machine: Machine, operation: Operation, start_s: float) -> tuple[FloatArray, FloatArray]:
-    """Coordinates and velocities at `start_s`, (16,) each: driver tooth 0 at its entry, everything turning evenly.
+    """Coordinates and velocities at `start_s`, (16,) each: driver tooth 0 at its entry, steady rotation.
 
-    Friction, roughness, run-out and unbalance are left out of the balance; what they change settles in a few cycles.
+    Friction, roughness, run-out and unbalance are neglected in the equilibrium; their effect settles in a few cycles.
     """
     torque = float(operation.torque_nm.at(start_s))
     omega = float(operation.speed_rpm.at(start_s)) * pi / 30.0
@@ -259,16 +260,16 @@ def start_state(machine: Machine, operation: Operation, start_s: float) -> tuple
 # The linearised machine: mass and stiffness matrices, eigenfrequencies, and the step that follows from them.
 
 STEP_ANGLE_RAD = 0.28
-"""Step times the greatest angular eigenfrequency. RK4 is stable up to 2.8 of it; at 0.28 it misses 3e-4 of the
-accelerations and 1e-6 to 1e-5 of the transmission error's rms, 1e-4 where teeth rattle: `sims.cracked`."""
+"""Step times the maximum angular eigenfrequency. RK4 is stable up to 2.8; at 0.28 the error is 3e-4 of the
+accelerations and 1e-6 to 1e-5 of the transmission error's rms, 1e-4 where teeth rattle."""
 STABLE = 2.0
-"""Step times the fastest rate of the damped machine; RK4 bursts from 2.8 on."""
+"""Step times the fastest rate of the damped machine; RK4 diverges from 2.8 on."""
 STEPS_PER_RAMP = 6
-"""Least number of steps in which a tooth pair takes up its load."""
+"""Minimum number of steps in which a tooth pair takes up its load."""
 
 
 def matrices(machine: Machine, force_n: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """M, K and C of small motions about the loaded state, with the mean mesh stiffness, (16, 16) each."""
+    """M, K and C for small motions about the loaded state, with the mean mesh stiffness, (16, 16) each."""
     wheels, shafts, bearings = machine.wheels, machine.shafts, machine.bearings
     masses = [shafts[0].rotor_inertia_kg_m2, *(w.inertia_kg_m2 for w in wheels), shafts[1].rotor_inertia_kg_m2]
     masses += [w.mass_kg for w in wheels for _ in range(2)] + [b.mass_kg for b in bearings for _ in range(2)]
@@ -297,7 +298,7 @@ def matrices(machine: Machine, force_n: float) -> tuple[FloatArray, FloatArray, 
 def _assembled(
     machine: Machine, mesh: float, torsion: list[float], bending: list[float], bearings: list[float]
 ) -> FloatArray:
-    """Sum of the springs, or of the dampers, each between the coordinates it joins."""
+    """Assemble the springs, or the dampers, between the coordinates that they connect, (16, 16)."""
     pair, total = machine.mesh.pair, np.zeros((N_COORDINATES,) * 2)
 
     def join(places: list[int], signs: list[float], size: float) -> None:
@@ -322,7 +323,7 @@ def _assembled(
 
 
 def eigenfrequencies_hz(machine: Machine, force_n: float = 0.0) -> FloatArray:
-    """Undamped eigenfrequencies in rising order, (16,); the first is the rigid rotation, 0."""
+    """Undamped eigenfrequencies in ascending order, (16,); the first is the rigid rotation, 0."""
     m, k, _ = matrices(machine, force_n)
     return _frequencies_hz(m, k)
 
@@ -335,7 +336,7 @@ def _frequencies_hz(m: FloatArray, k: FloatArray) -> FloatArray:
 
 
 def _eigenvalues_per_s(m: FloatArray, k: FloatArray, c: FloatArray) -> NDArray[np.complex128]:
-    """Of the damped machine: heavy dampers are as stiff as springs to a solver."""
+    """Eigenvalues of the damped machine, (32,): to a solver, strong dampers are as stiff as springs."""
     n, per_mass = N_COORDINATES, 1.0 / np.diag(m)[:, None]
     state = np.zeros((2 * n, 2 * n))
     state[:n, n:] = np.eye(n)
@@ -344,12 +345,12 @@ def _eigenvalues_per_s(m: FloatArray, k: FloatArray, c: FloatArray) -> NDArray[n
 
 
 def mesh_force_n(machine: Machine, operation: Operation) -> float:
-    """Static force of the mesh at the greatest torque."""
+    """Static mesh force at the maximum torque."""
     return operation.torque_nm.largest / machine.mesh.pair.base_radii_m[0]
 
 
 def slowest_decay_s(machine: Machine, operation: Operation) -> float:
-    """Time in which the least damped motion falls to 1/e: of the vibrations, or of the speed that the drive holds."""
+    """Time in which the slowest-decaying motion, of the vibrations or of the controlled speed, falls to 1/e."""
     eigenvalues = _eigenvalues_per_s(*matrices(machine, mesh_force_n(machine, operation)))
     ringing = eigenvalues[np.abs(eigenvalues.imag) > 1.0]
     recovery = 2.0 * total_inertia_kg_m2(machine) / governor_nm_s_per_rad(machine)
@@ -357,7 +358,7 @@ def slowest_decay_s(machine: Machine, operation: Operation) -> float:
 
 
 def default_step_s(machine: Machine, operation: Operation, step_angle_rad: float = STEP_ANGLE_RAD) -> float:
-    """Step that stiffness, damping and tooth passage allow."""
+    """Integration step that stiffness, damping and tooth passage allow."""
     m, k, c = matrices(machine, mesh_force_n(machine, operation))
     fastest = 2.0 * pi * float(_frequencies_hz(m, k)[-1])
     step = min(step_angle_rad / fastest, STABLE / float(np.abs(_eigenvalues_per_s(m, k, c)).max()))
@@ -368,19 +369,19 @@ def default_step_s(machine: Machine, operation: Operation, step_angle_rad: float
 
 
 STEPS_PER_CALL = 200_000
-"""Compiled code cannot be interrupted: it comes back for a look every quarter of a second or so."""
+"""Compiled code cannot be interrupted, so it returns about every quarter of a second."""
 
 
 @dataclass(frozen=True)
 class PairState:
-    """Where a machine is: what a later run needs to go on from there.
+    """State of a machine from which a later run can continue.
 
     Parameters
     ----------
     q, v : array, (16,)
         Coordinates and velocities, see `sims.cracked.COORDINATES`.
     set_angle_rad : float
-        Angle at which the drive wants its rotor to be.
+        Set angle of the drive's rotor.
     """
 
     q: FloatArray
@@ -389,12 +390,12 @@ class PairState:
 
 
 Response = PairResponse[PairState]
-"""Of a run: signals of `SIGNALS`, and where it ended."""
+"""Response of a run: signals of `SIGNALS`, and its last state."""
 
 
 @dataclass(frozen=True)
 class PreparedRun:
-    """A run that is ready to start: numbers, first state, set profiles, roughness."""
+    """A run that is ready to start: constants, initial state, set profiles and roughness."""
 
     constants: PairConstants
     q: FloatArray
@@ -411,8 +412,8 @@ def prepare(
     start_s: float = 0.0,
     first: PairState | None = None,
 ) -> PreparedRun:
-    """Draw what is random, tabulate the machine, find the first state where none is given."""
-    rough_rng, bearing_rng = rng.spawn(2)  # each keeps what it draws, whatever the other does
+    """Draw the random parts, tabulate the machine, and find the initial state if none is given."""
+    rough_rng, bearing_rng = rng.spawn(2)  # the draws of each do not depend on the other
     machine, roughness = draw_roughness(machine, rough_rng)
     q, v = start_state(machine, operation, start_s) if first is None else _checked(first)
     return PreparedRun(
@@ -437,7 +438,7 @@ def respond(
     stride: int = 1,
     first: PairState | None = None,
 ) -> Response:
-    """Integrate the sixteen coordinates from the static balance on, or from where another run ended.
+    """Integrate the sixteen coordinates from static equilibrium, or from the end of another run.
 
     Parameters
     ----------
@@ -446,29 +447,29 @@ def respond(
         Set speed and torque; time 0 of their profiles is time 0 here.
     duration_s : float
     rng : numpy.random.Generator
-        Draws the roughness, then the rolling elements' places.
+        Draws the roughness, then the positions of the rolling elements.
     signals : sequence of str
-        Of `sims.cracked.SIGNALS`.
+        From `sims.cracked.SIGNALS`.
     start_s : float
         First time; below 0 for a lead-in.
     step_s : float or None
         None: `sims.cracked.default_step_s`.
     stride : int
-        Every how many steps a point is kept.
+        Steps per kept point.
     first : PairState or None
-        `Response.last` of another run; None: the static balance at `start_s`.
+        `Response.last` of another run; None: static equilibrium at `start_s`.
 
     Raises
     ------
     InputError
-        On an unknown signal, or a run of too many steps.
+        For an unknown signal, or a run of too many steps.
     RefusalError
-        If the solution grows beyond all bounds: the step is too long.
+        If the solution diverges: the step is too long.
 
     Notes
     -----
-    Classic Runge–Kutta method, fourth order. Where a tooth pair loses contact its force has a kink, and the order drops
-    for that step.
+    Classical fourth-order Runge–Kutta method. Where a tooth pair loses contact its force has a kink, and the order is
+    lower for that step.
     """
     step = default_step_s(machine, operation) if step_s is None else step_s
     plan = RunPlan(start_s, duration_s, step, stride, STEPS_PER_CALL)
@@ -503,17 +504,19 @@ def respond(
         march,
         signals,
         with_energy=False,
-        remedy="look for stiffness, damping and inertia that do not go together, or give a shorter step_s",
+        remedy="check that stiffness, damping and inertia are consistent, or give a shorter step_s",
     )
     last = PairState(q, v, float(set_angle[0]))
     return Response(start_s, step * stride, kept, step, energies, last)
 
 
 def _checked(state: PairState) -> tuple[FloatArray, FloatArray]:
-    """Return the coordinates and velocities of another run's last state."""
+    """Check another run's last state; return its coordinates and velocities."""
     if state.q.shape != (N_COORDINATES,) or state.v.shape != (N_COORDINATES,):
         raise InputError(
-            f"a state of {state.q.size} coordinates", where="first", allowed=f"{N_COORDINATES}: another run's last"
+            f"a state of {state.q.size} coordinates",
+            where="first",
+            allowed=f"{N_COORDINATES}, as in another run's last state",
         )
     return state.q, state.v
 
@@ -530,7 +533,7 @@ def check_convergence(
     duration_s: float = 0.5,
     step_s: float | None = None,
 ) -> StepConvergence:
-    """Compare the step in use, half and a quarter of it on the same machine, with the same roughness.
+    """Compare runs of the same machine and roughness with the step in use, half of it and a quarter of it.
 
     Parameters
     ----------
@@ -538,8 +541,8 @@ def check_convergence(
     operation : Operation
     rng : numpy.random.Generator
     duration_s : float
-        Of each run; its second half is compared. In a chaotic motion (light load, rattle) no step converges, as two
-        runs part however close they start.
+        Of each run; its second half is compared. In chaotic motion (light load, rattle) no step converges, as two runs
+        diverge however close they start.
     step_s : float or None
         None: the default.
     """

@@ -40,7 +40,7 @@ NAME = "cracked"
 
 @dataclass(frozen=True)
 class CrackedPair(PairModel[ReadyPair]):
-    """Spur gear pair on four bearings between two rotors, 16 degrees of freedom; see `sims.cracked`."""
+    """Spur gear pair on four bearings between two rotors, with 16 degrees of freedom; see `sims.cracked`."""
 
     name: str = NAME
     title: str = "spur gear pair with root crack: 16 degrees of freedom, friction, backlash, roughness"
@@ -66,7 +66,7 @@ class CrackedPair(PairModel[ReadyPair]):
 def simulate_with_motion(
     machine: Machine, operation: Operation, run: MeasuredRun[PairState]
 ) -> tuple[Recording, Response]:
-    """Simulate the sixteen coordinates and measure them; return the recording and the motion behind it.
+    """Simulate the sixteen coordinates and measure them; return the recording and the underlying motion.
 
     Parameters
     ----------
@@ -74,15 +74,15 @@ def simulate_with_motion(
     operation : Operation
         Its time 0 is the recording's start.
     run : MeasuredRun
-        Without a step of its own it has `sims.cracked.default_step_s`. "machine" and "solver" are added to its truth;
-        its further signals are of `sims.cracked.SIGNALS`.
+        Its default step is `sims.cracked.default_step_s`. "machine" and "solver" are added to its truth; its further
+        signals are from `sims.cracked.SIGNALS`.
 
     Returns
     -------
     recording : Recording
-        With notes of the model as warnings: where a formula is used outside its range.
+        With warnings where the model uses a formula outside its range.
     motion : Response
-        Lead-in included: it begins before time 0.
+        Including the lead-in, so it begins before time 0.
     """
     longest = default_step_s(machine, operation) if run.step_s is None else run.step_s
     measured = Measurement.of(machine, run, longest)
@@ -95,7 +95,7 @@ def simulate_with_motion(
         response,
         chain_rng,
         known={
-            "machine": plain(replace(machine, chain=None)),  # type: ignore[arg-type]  # it stands under "measurement"
+            "machine": plain(replace(machine, chain=None)),  # type: ignore[arg-type]  # it is under "measurement"
             "solver": {"step_s": response.step_s, "eigenfrequencies_hz": [float(f) for f in frequencies]},
         },
         notes=model_notes(machine, operation),
@@ -106,7 +106,7 @@ def simulate_with_motion(
 
 
 def model_notes(machine: Machine, operation: Operation) -> tuple[str, ...]:
-    """Where formulas are used outside the range they were made for."""
+    """Notes on formulas used outside their range of validity."""
     notes = list(machine.mesh.notes)
     speed, torque = operation.speed_rpm.largest, operation.torque_nm.largest
     if machine.lubrication.friction and speed > 0.0 and torque > 0.0:
@@ -116,15 +116,15 @@ def model_notes(machine: Machine, operation: Operation) -> tuple[str, ...]:
     if mesh_hz > 0.8 * float(eigenfrequencies_hz(machine)[-1]):
         notes.append(
             f"the mesh frequency reaches {mesh_hz:.0f} Hz, near or above the model's highest eigenfrequency: "
-            "modes of gear bodies and teeth, which it lacks, would take part"
+            "modes of gear bodies and teeth, which the model lacks, would contribute"
         )
     return tuple(notes)
 
 
-# The cracked pair set to a rig, for the gap diagnosis: see `gearsig.gap`.
+# The cracked pair adapted to a rig, for the gap diagnosis: see `gearsig.gap`.
 
 STEP_ANGLE_RAD = 0.9
-"""Step times the greatest angular eigenfrequency: three times that of a single simulation, see `_step_s`."""
+"""Step times the maximum angular eigenfrequency: three times that of a single simulation, see `_step_s`."""
 
 
 @dataclass(frozen=True)
@@ -139,10 +139,10 @@ class CrackedTwin(PairTwin):
     def _planned(
         self, point: OperatingCondition, added: Sequence[AddedEffect], seed: int, sampling_rate_hz: float
     ) -> tuple[ReadyPair, MeasuredRun[PairState]]:
-        """Let a tooth be damaged while the healthy specimen runs, whose start is simulated once for all such faults.
+        """Introduce tooth faults while the healthy specimen runs; its start is simulated once for all such faults.
 
-        They last one engagement, and so leave the drive and a body on soft mounts, which settle slowly, as they are.
-        The motion has as many points as the step asks for: the model has no modes that would fold back.
+        A tooth fault acts during one engagement and so does not disturb the drive or a body on soft mounts, which
+        settle slowly. The motion's rate follows from the step: the model has no modes that would alias.
         """
         ready, run = super()._planned(point, added, seed, sampling_rate_hz)
         run = replace(run, min_motion_hz=0.0)
@@ -151,14 +151,14 @@ class CrackedTwin(PairTwin):
         return ready, replace(run, before=_lead_in(self, point, seed, sampling_rate_hz))
 
     def _step_s(self, point: OperatingCondition, seed: int) -> float:
-        """Step of the integrator: that of the healthy machine, so that effects leave the drawn noise as it is.
+        """Integration step of the healthy machine, so that effects do not change the drawn noise.
 
-        It is longer than that of a single simulation; the accelerations miss 2 to 4 parts in a thousand.
+        It is longer than that of a single simulation; the error of the accelerations is 2 to 4 parts in a thousand.
         """
         return _healthy_step_s(self, point, seed)
 
 
-# Of the specimens and operating points of the last diagnosis, whose trials ask for them again and again.
+# Cached for the specimens and operating points of the last diagnosis, whose trials need them repeatedly.
 
 
 @lru_cache(maxsize=4)
@@ -169,7 +169,7 @@ def _healthy_step_s(twin: CrackedTwin, point: OperatingCondition, seed: int) -> 
 
 @lru_cache(maxsize=4)
 def _lead_in(twin: CrackedTwin, point: OperatingCondition, seed: int, sampling_rate_hz: float) -> Response | None:
-    """Return how a healthy specimen comes to its recording's start, some 5 MB; None where it has no lead-in."""
+    """Return the motion of a healthy specimen up to its recording's start, about 5 MB; None without lead-in."""
     healthy, run = twin._planned(point, (), seed, sampling_rate_hz)
     lead_in = Measurement.of(healthy.machine, run, run.step_s or 0.0).lead_in
     return None if lead_in is None else respond(healthy.machine, healthy.operation, rng=run.streams()[0], **lead_in)

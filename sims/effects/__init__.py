@@ -1,9 +1,9 @@
-"""Effects that can be switched on: one file each.
+"""Effects that can be switched on, one file each.
 
-An effect's module holds all of it in its ``EFFECT``: physics for a pair of gears, range and plausible severities, where
-it shows, what it means for a start–stop drive, and how the literature says that it shows. A module that is put beside
-these, or a file of one's own (`add_effect`), is an effect without further ado; the names below and those of
-`sims.effects.textbook` are what such a file is written with.
+An effect's module defines everything in its ``EFFECT``: the physics for a gear pair, the range and plausible
+severities, where it shows, what it means for a start–stop drive, and its signature in the literature. A new module in
+this package, or a file of your own (`add_effect`), is an effect without further steps; such a file uses the names below
+and those of `sims.effects.textbook`.
 """
 
 from sims.effects._effect import (

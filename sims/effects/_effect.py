@@ -1,8 +1,8 @@
-"""An effect: a change to a machine or to its measurement chain, with one severity in physical units.
+"""An effect: a change to a machine or its measurement chain, with one severity in physical units.
 
-An effect's file holds all of it: physics, range and plausible severities, where it shows, what it means for the models
-that are no pair of gears between bearings, and how the literature says that it shows. A module of this package with an
-`EFFECT` is one; so is a file of one's own.
+An effect's file defines everything: physics, range and plausible severities, where it shows, what it means for models
+other than a gear pair between bearings, and its signature in the literature. Every module of this package with an
+`EFFECT` is an effect; so is a user's own file with one.
 """
 
 from __future__ import annotations
@@ -36,15 +36,15 @@ Options = Mapping[str, OptionValue]
 
 @dataclass(frozen=True)
 class Severity:
-    """The one number that says how strong an effect is.
+    """The single number that says how strong an effect is.
 
     Parameters
     ----------
     name, unit, meaning : str
     low, high : float
-        What may be given; a machine may allow less (a crack no deeper than its tooth).
+        Allowed range; a machine may allow less (a crack no deeper than its tooth).
     typical : float
-        A medium case.
+        A moderate case.
     """
 
     name: str
@@ -57,21 +57,21 @@ class Severity:
 
 @dataclass(frozen=True)
 class Option:
-    """A further choice of an effect: which gear, tooth, bearing, order.
+    """A further setting of an effect: which gear, tooth, bearing or order.
 
     Parameters
     ----------
     name : str
     default : float, str or None
-        None: a number that the effect draws from its random stream where it is not given (an angle, a phase).
+        None: a number that the effect draws from its random stream if not given (an angle, a phase).
     meaning : str
     unit : str
     low, high : float or None
         Range of a number.
     choices : tuple of str
-        Allowed words; empty for a number, or for a name that only the machine knows (a bearing).
+        Allowed words; empty for a number, or for a name defined by the machine (a bearing).
     whole : bool
-        A whole number is wanted.
+        Whether the number must be an integer.
     """
 
     name: str
@@ -84,7 +84,7 @@ class Option:
     whole: bool = False
 
     def check(self, value: OptionValue, effect: str) -> OptionValue:
-        """Return the value if it is allowed, a number as float."""
+        """Return the value if it is allowed, numbers as float."""
         where = f"{self.name} of {effect}"
         if isinstance(self.default, str):
             text = str(value)
@@ -97,9 +97,9 @@ class Option:
 
 
 GEAR_OPTION = Option("gear", "driver", "which gear", choices=("driver", "driven"))
-"""Most tooth and wheel effects have it."""
+"""Option of most tooth and gear effects."""
 TOOTH_OPTION = Option("tooth", 1.0, "which tooth, from 1 at the mark", low=1.0, high=5000.0, whole=True)
-"""Tooth-local effects have it."""
+"""Option of tooth-local effects."""
 
 SHOWS_IN = (
     "mesh_harmonics",
@@ -114,29 +114,29 @@ SHOWS_IN = (
     "speed",
     "low_load",
 )
-"""Kinds of places that an effect may say it shows in."""
+"""Kinds of features that an effect may state it shows in."""
 
 Change = Callable[[Machine, float, Options, np.random.Generator], Machine]
 
 # --------------------
-# How strong it may plausibly be on a machine: one source for what a diagnosis tries and for what is drawn.
+# Plausible severities on a machine: the same source for the diagnosis's candidates and for random draws.
 # --------------------
 
 
 @dataclass(frozen=True)
 class MachineFacts:
-    """What plausible severities scale with on a machine.
+    """Quantities of a machine with which plausible severities scale.
 
     Parameters
     ----------
     nominal : Nominal
     gears : (GearGeometry, GearGeometry)
     bearings : tuple of Bearing
-        That the rig names, with geometry.
+        Those named by the rig, with geometry.
     vibration_mps2 : float
-        Rms of the healthy machine at its nominal point.
+        Rms of the healthy machine at its nominal operating point.
     play_um : float
-        Between the flanks, along the line of action.
+        Backlash along the line of action.
     """
 
     nominal: Nominal
@@ -150,7 +150,7 @@ class MachineFacts:
         return self.nominal.pitch_diameters_mm[side]
 
     def bearing(self, options: Options) -> Bearing:
-        """Bearing that the options choose."""
+        """Bearing selected by the options."""
         return next(b for b in self.bearings if b.name == options["bearing"])
 
 
@@ -159,26 +159,26 @@ Scale = Callable[[MachineFacts, Options], float]
 
 @dataclass(frozen=True)
 class PlausibleRange:
-    """From what is barely noticeable on most machines to strong damage that still runs.
+    """Range of severities, from barely noticeable on most machines to severe damage with which they still run.
 
     Parameters
     ----------
     low, high : float
-        Severity over `scale`.
+        Severity relative to `scale`.
     why : str
     scale : callable
-        Something of the machine, in the severity's unit, where that unit does not scale with the machine by itself.
+        A quantity of the machine in the severity's unit, where that unit does not itself scale with the machine.
     choices : callable
-        Option sets worth a try; nothing where the machine lacks what the effect needs.
+        Option sets to try; empty if the machine lacks what the effect needs.
     drawn : callable
         Random options.
     largest : callable
         Largest severity that the machine allows.
     n_severities : int
-        Worth a try, at even ratios.
+        Number of severities to try, with equal ratios.
     further_settings : callable
-        Further option sets, with which the fault of a tooth takes another profile over the engagement, and with which
-        of these severities each is worth a try, counted from 0; 0.5 lies halfway between the first two, in logarithms.
+        Further option sets, for which a tooth fault has another profile over the engagement, each with the indices of
+        the severities to try, counted from 0; 0.5 is halfway between the first two, in logarithms.
     """
 
     low: float
@@ -193,29 +193,29 @@ class PlausibleRange:
 
 
 # --------------------
-# What it means for a start–stop drive.
+# Effects on a start–stop drive.
 # --------------------
 
 
 class DriveParameters(Protocol):
-    """Complete parameters of a start–stop drive as effects read them; see `sims.forging`."""
+    """Access of effects to the complete parameters of a start–stop drive; see `sims.forging`."""
 
     def number(self, name: str) -> float:
         """Value of a parameter."""
         ...
 
     def highest(self, name: str) -> float:
-        """Largest value that the parameter may have."""
+        """Upper limit of a parameter."""
         ...
 
     def gear_pair(self) -> PairGeometry:
-        """Teeth of both gears."""
+        """Geometry of the gear pair."""
         ...
 
 
 @dataclass(frozen=True)
 class DriveEffect:
-    """What an effect makes of a start–stop drive: other values of parameters, and perhaps a weak tooth."""
+    """Changes of a start–stop drive by an effect: new parameter values, and possibly a weak tooth."""
 
     values: Mapping[str, float] = field(default_factory=dict)
     weak_tooth: WeakTooth | None = None
@@ -228,39 +228,39 @@ class Effect:
     Parameters
     ----------
     name : str
-        Canonical, e.g. "root_crack".
+        Identifier, e.g. "root_crack".
     group : str
         One of `GROUPS`.
     title : str
-        For people, e.g. "crack in a tooth root".
+        For readers, e.g. "crack in a tooth root".
     severity : Severity
     changes : str
-        What it changes in the model or in the chain, in one or two sentences.
+        What it changes in the model or in the measurement chain, in one or two sentences.
     signature : str
         Where it is expected to show, from theory.
     shows_in : tuple of str
-        The same for programs: of `SHOWS_IN`.
+        The same for programs: members of `SHOWS_IN`.
     change : callable
-        (machine, severity, options, rng) → machine, for a severity above 0. Its change vanishes with the severity, and
-        what it draws does not depend on it, so that one seed at rising severities shows one fault that grows.
+        (machine, severity, options, rng) → machine, for a severity above 0. The change vanishes with the severity, and
+        random draws do not depend on it, so that one seed with increasing severity shows one growing fault.
     options : tuple of Option
     plausible : PlausibleRange or None
-        None: a third to three times the typical severity, on each gear, shaft or bearing that it may be on, at the
-        first tooth, other options as by default.
+        None: a third to three times the typical severity, on each possible gear, shaft or bearing, at the first tooth,
+        with the defaults of other options.
     on_drive : callable or None
         (parameters, severity, options) → change of a start–stop drive; None: it has no meaning there.
     textbook : Textbook or None
-        How the literature says that it shows.
+        Its signature in the literature.
     moves_pitches : float
-        By how much, either way, its place within a tooth's engagement moves between severities that are tried; 0: it
-        stays where it is.
+        Shift, in either direction, of its position within a tooth's engagement between tried severities, in pitches;
+        0: it does not move.
     is_on_every_tooth : bool
-        Whether it sits on all teeth of a gear, on each by itself.
+        Whether it affects all teeth of a gear, each independently.
     profile_varies_with : str
-        Name of its severity or of an option with which the profile of its change over a tooth's engagement varies
-        steadily; empty: it varies with nothing.
+        Name of the severity or option with which the profile of its change over a tooth's engagement varies
+        continuously; empty: none.
     turns_with_shaft : bool
-        Whether it is a force that turns with a shaft: of a linear machine it makes the first order and no multiple.
+        Whether it is a force rotating with a shaft: in a linear machine it excites the first order and no multiples.
     """
 
     name: str
@@ -281,7 +281,7 @@ class Effect:
     turns_with_shaft: bool = False
 
     def __post_init__(self) -> None:
-        if not self.name.isidentifier():  # it stands in --effect NAME=SEVERITY, in addresses and in tables
+        if not self.name.isidentifier():  # it is used in --effect NAME=SEVERITY, in addresses and in tables
             raise InputError(f"an effect is called {self.name!r}", allowed="letters, digits and underscores")
         one_of(self.group, f"group of {self.name}", GROUPS)
         one_of(
@@ -299,7 +299,7 @@ class Effect:
         options: Options,
         rng: np.random.Generator,
     ) -> Machine:
-        """Return the machine with the effect, after checking severity and options; at severity 0, the machine itself.
+        """Check severity and options, and return the machine with the effect; at severity 0, the machine itself.
 
         Raises
         ------
@@ -317,18 +317,18 @@ class Effect:
 
     @property
     def plausible_range(self) -> PlausibleRange:
-        """`plausible`, or about its typical severity where the effect states none."""
+        """`plausible`, or a range about the typical severity if the effect states none."""
         return self.plausible or _about_typical(self)
 
     def plausible_severities(self, machine: MachineFacts, options: Options) -> tuple[float, float]:
-        """Smallest and largest severity with these options; the range keeps its width where the machine cuts it off."""
+        """Minimum and maximum severity with these options; a machine limit shifts the range but does not narrow it."""
         plausible = self.plausible_range
         scale = plausible.scale(machine, options)
         top = min(plausible.high * scale, plausible.largest(machine, options), self.severity.high)
         return top * plausible.low / plausible.high, top
 
     def complete(self, options: Options) -> dict[str, OptionValue]:
-        """Return the options, checked, with defaults for those not given; those left to be drawn are not in it."""
+        """Return the checked options, with defaults for those not given; those to be drawn are omitted."""
         names = [option.name for option in self.options]
         for name in options:
             known_name(name, names, f"{self.name} has no option {name!r}")
@@ -337,7 +337,7 @@ class Effect:
 
 
 def _about_typical(effect: Effect) -> PlausibleRange:
-    """A third to three times the typical severity, with the option sets that `Effect` tells."""
+    """A third to three times the typical severity, with the option sets described in `Effect`."""
 
     def choices(machine: MachineFacts) -> Sequence[Options]:
         sets: list[Options] = [{}]
@@ -368,9 +368,9 @@ class EffectSetting:
 
 
 # --------------------
-# Effects of one's own: Python files outside this package, each with an `EFFECT`.
+# Users' effects: Python files outside this package, each with an `EFFECT`.
 #
-# Their files stand in the environment variable `GEARSIG_EFFECTS`, so that processes which are started know them, too.
+# Their paths are in the environment variable `GEARSIG_EFFECTS`, so that child processes find them too.
 # --------------------
 
 
@@ -378,12 +378,12 @@ VARIABLE = "GEARSIG_EFFECTS"
 
 
 def user_files() -> tuple[Path, ...]:
-    """Return the files of one's own effects."""
+    """Return the files of the user's effects."""
     return tuple(Path(text) for text in os.environ.get(VARIABLE, "").split(os.pathsep) if text)
 
 
 def loaded(path: Path) -> Effect:
-    """Return the effect of a file.
+    """Return the effect defined by a file.
 
     Raises
     ------
@@ -392,11 +392,11 @@ def loaded(path: Path) -> Effect:
     """
     spec = spec_from_file_location(f"own_effect_{path.stem}", path)
     if spec is None or spec.loader is None or not path.is_file():
-        raise InputError("is no Python file", where=str(path), remedy="give a file NAME.py that defines EFFECT")
+        raise InputError("is not a Python file", where=str(path), remedy="give a file NAME.py that defines EFFECT")
     module = module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
-    except (Exception, SystemExit) as error:  # anything: it is somebody else's program
+    except (Exception, SystemExit) as error:  # anything: it is user code
         raise InputError(f"does not run ({type(error).__name__}: {error})", where=str(path)) from error
     effect_of_file = getattr(module, "EFFECT", None)
     if not isinstance(effect_of_file, Effect):
@@ -416,7 +416,7 @@ def _changed(
     options: Options,
     rng: np.random.Generator,
 ) -> Machine:
-    """Return what somebody's own effect makes of a machine.
+    """Apply a user's effect to a machine.
 
     Raises
     ------
@@ -427,13 +427,13 @@ def _changed(
         changed = user_effect.change(machine, severity, options, rng)
     except GearsigError:
         raise
-    except (Exception, SystemExit) as error:  # anything: it is somebody else's program
+    except (Exception, SystemExit) as error:  # anything: it is user code
         raise InputError(
             f"the effect {user_effect.name!r} fails ({type(error).__name__}: {error})", where=str(path)
         ) from error
     if not isinstance(changed, Machine):
         raise InputError(
-            f"the effect {user_effect.name!r} returns {type(changed).__name__} and no machine",
+            f"the effect {user_effect.name!r} returns {type(changed).__name__} instead of a machine",
             where=str(path),
             remedy="let change return the machine, as sims/effects/tooth_wear.py does",
         )
@@ -442,36 +442,36 @@ def _changed(
 
 @cache
 def effects() -> dict[str, Effect]:
-    """Return every effect by name, in the order of the groups.
+    """Return all effects by name, in the order of the groups.
 
     Raises
     ------
     InputError
-        If a file of one's own effect cannot be used.
+        If a user's effect file cannot be used.
     """
     by_name = dict(_listed())
     for path in user_files():
         further = loaded(path)
         if further.name in by_name:
             raise InputError(
-                f"there is an effect {further.name!r} already", where=str(path), remedy="choose another name"
+                f"there is already an effect {further.name!r}", where=str(path), remedy="choose another name"
             )
         by_name[further.name] = further
     return dict(sorted(by_name.items(), key=lambda item: (GROUPS.index(item[1].group), item[0])))
 
 
 def add_effect(path: str | Path) -> Effect:
-    """Take an effect of one's own from a Python file, in this process and in those that it starts.
+    """Add an effect of your own from a Python file, in this process and its child processes.
 
     Parameters
     ----------
     path : str or Path
-        Of a file with `EFFECT = Effect(…)`.
+        File with `EFFECT = Effect(…)`.
 
     Raises
     ------
     InputError
-        If it cannot be used, or an effect of that name is there already.
+        If it cannot be used, or an effect of that name already exists.
     """
     before = os.environ.get(VARIABLE)
     files = dict.fromkeys([*map(str, user_files()), str(Path(path).resolve())])
@@ -490,7 +490,7 @@ def add_effect(path: str | Path) -> Effect:
 
 
 def is_user_effect(name: str) -> bool:
-    """Whether an effect is none of this package's."""
+    """Whether an effect is a user's and not this package's."""
     return name in effects() and name not in _listed()
 
 
@@ -511,7 +511,7 @@ def effect(name: str) -> Effect:
 
 
 def as_gap_effect(shown: Effect) -> GapEffect:
-    """Return an effect as the gap diagnosis sees it."""
+    """Convert an effect to the gap diagnosis's type."""
     return GapEffect(
         shown.name,
         shown.group,
@@ -530,7 +530,7 @@ def as_gap_effect(shown: Effect) -> GapEffect:
 
 
 def completed(settings: Iterable[EffectSetting]) -> tuple[EffectSetting, ...]:
-    """Return settings with every option, defaults included.
+    """Return the settings with all their options, defaults included.
 
     Raises
     ------
@@ -543,8 +543,8 @@ def completed(settings: Iterable[EffectSetting]) -> tuple[EffectSetting, ...]:
 def with_effects(machine: Machine, settings: Iterable[EffectSetting], rng: np.random.Generator) -> Machine:
     """Return the machine with the effects switched on, mechanical ones first.
 
-    Every effect draws from a stream of its own, made of one number of `rng` and the effect's name: adding an effect
-    leaves what the others draw unchanged, and exactly one number is taken from `rng`.
+    Every effect draws from its own stream, seeded by one number from `rng` and the effect's name: adding an effect does
+    not change the draws of the others, and exactly one number is taken from `rng`.
     """
     seed = int(rng.integers(2**63))
     chosen = sorted(settings, key=lambda s: GROUPS.index(effect(s.name).group))

@@ -1,4 +1,4 @@
-"""Parts of a machine, as effects choose and change them, and option sets worth a try on each."""
+"""Selecting and changing parts of a machine in effects, and the option sets to try on each."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from sims.mesh import GearGeometry, RootCrack, ToothChip, ToothSpall
 
 
 def replaced_item(items: tuple, index: int, **changes: object) -> tuple:  # type: ignore[type-arg]  # any dataclasses
-    """Return a tuple of dataclasses with fields of one of them changed."""
+    """Return the tuple of dataclasses with fields of one item changed."""
     return tuple(replace(item, **changes) if i == index else item for i, item in enumerate(items))
 
 
@@ -30,14 +30,14 @@ def replaced_item(items: tuple, index: int, **changes: object) -> tuple:  # type
 BEARING_OPTION = Option("bearing", "", "name of the bearing; empty: the first of the driver's shaft")
 RACE_OPTIONS = (
     BEARING_OPTION,
-    Option("angle_deg", 0.0, "where the defect lies, see the race", "deg", -360.0, 360.0),
-    Option("jitter_percent", 1.0, "scatter of the rolling elements' places, of their spacing", "%", 0.0, 10.0),
-    Option("slip_percent", 1.0, "part of the cage's turning that is lost", "%", 0.0, 5.0),
+    Option("angle_deg", 0.0, "angle of the defect, see the race", "deg", -360.0, 360.0),
+    Option("jitter_percent", 1.0, "scatter of the rolling elements' positions over their spacing", "%", 0.0, 10.0),
+    Option("slip_percent", 1.0, "part of the cage rotation that is lost", "%", 0.0, 5.0),
 )
 
 
 def chosen_bearing(machine: Machine, options: Options) -> int:
-    """Place of the chosen bearing in the machine."""
+    """Index of the chosen bearing in the machine."""
     name = str(options["bearing"])
     names = [support.bearing.name for support in machine.bearings]
     return names.index(known_name(name, names, f"there is no bearing {name!r}")) if name else 0
@@ -56,11 +56,11 @@ RACE_SHOWS_IN = ("envelope_orders", "resonances", "broadband")
 def with_race_defect(
     race: str, machine: Machine, length_mm: float, options: Options, rng: np.random.Generator
 ) -> Machine:
-    """Return the machine with a defect on a race, which must be free of one and longer than the defect.
+    """Return the machine with a race defect in a bearing that has none; it must not exceed the element spacing.
 
-    Its angle counts from the middle of the load zone on the outer race, from tooth 1 at time 0 on the inner one.
+    Its angle is measured from the middle of the load zone on the outer race, from tooth 1 at time 0 on the inner one.
     """
-    del rng  # the places of the rolling elements are drawn by the simulator
+    del rng  # the positions of the rolling elements are drawn by the simulator
     index = chosen_bearing(machine, options)
     support = machine.bearings[index]
     name = support.bearing.name
@@ -85,12 +85,12 @@ def with_race_defect(
 
 
 def race_range(race: str, why: str) -> PlausibleRange:
-    """Plausible lengths of a defect on a race, over the rolling elements' diameter."""
+    """Plausible lengths of a race defect, relative to the rolling-element diameter."""
     return PlausibleRange(0.01, 0.15, why, _rolling_element_mm, each_bearing, _any_race, _longest_defect_mm(race))
 
 
 def each_bearing(machine: MachineFacts) -> Sequence[Options]:
-    """Every bearing of the machine, for `PlausibleRange.choices`."""
+    """One option set per bearing of the machine, for `PlausibleRange.choices`."""
     return [{"bearing": b.name} for b in machine.bearings]
 
 
@@ -100,7 +100,7 @@ def any_bearing(machine: MachineFacts, rng: np.random.Generator) -> Options:
 
 
 def _any_race(machine: MachineFacts, rng: np.random.Generator) -> Options:
-    """A random bearing, whose cage slips a little."""
+    """A random bearing with a little cage slip."""
     return {**any_bearing(machine, rng), "slip_percent": float(rng.uniform(0.0, 1.5))}
 
 
@@ -110,7 +110,7 @@ def _rolling_element_mm(machine: MachineFacts, options: Options) -> float:
 
 
 def _longest_defect_mm(race: str) -> Scale:
-    """The longest defect that does not hold two elements at once, at 1 % jitter, less a fifth."""
+    """80 % of the longest defect that never holds two elements at the same time, at 1 % jitter."""
 
     def longest(machine: MachineFacts, options: Options) -> float:
         spacing = BearingSupport(machine.bearing(options), 1.0, 1.0, 0.0).element_spacing_mm(race) or 1.0
@@ -120,7 +120,7 @@ def _longest_defect_mm(race: str) -> Scale:
 
 
 # --------------------
-# What the effects on the measurement chain share: the same change to each acceleration channel.
+# Common to effects on the measurement chain: the same change to each acceleration channel.
 # --------------------
 
 
@@ -131,7 +131,7 @@ def with_each_channel(machine: Machine, change: Callable[[MeasuredChannel], Meas
 
 
 # --------------------
-# What the effects on one gear share: which gear, which tooth, and where its faults are kept.
+# Common to effects on one gear: which gear, which tooth, and where its faults are stored.
 # --------------------
 
 
@@ -139,7 +139,7 @@ GEARS = ("driver", "driven")
 
 
 def gear_index(options: Options, option: str = "gear") -> int:
-    """0 for the driver, 1 for the driven side."""
+    """Index of the chosen side: 0 for the driver, 1 for the driven side."""
     return GEARS.index(str(options[option]))
 
 
@@ -149,25 +149,25 @@ def gear_geometry(machine: Machine, index: int) -> GearGeometry:
 
 
 def tooth_number(machine: Machine, options: Options) -> int:
-    """Return the chosen tooth, checked against the number of teeth; people count from 1, the model from 0."""
+    """Return the chosen tooth, counted from 0, checked against the number of teeth; the option counts from 1."""
     index = gear_index(options)
     teeth = gear_geometry(machine, index).teeth
     return int(within(float(options["tooth"]), f"tooth of the {GEARS[index]} gear", 1, teeth)) - 1
 
 
 def part_of_width_mm(machine: Machine, options: Options) -> float | None:
-    """Return the width that `width_percent` stands for, None for the whole face."""
+    """Return the width given by `width_percent` of the gear's face, None for the whole face."""
     percent = float(options["width_percent"])
     return None if percent == 100.0 else percent / 100.0 * gear_geometry(machine, gear_index(options)).face_width_mm
 
 
 def loaded_width_mm(machine: Machine, options: Options) -> float:
-    """Return the width that `width_percent` stands for of the face on which the teeth touch."""
+    """Return the width given by `width_percent` of the face over which the teeth are in contact."""
     return float(options["width_percent"]) / 100.0 * machine.mesh.pair.face_width_mm
 
 
 def mesh_field(machine: Machine, name: str, index: int) -> Any:
-    """Return a field that the mesh has once per gear, by its name without number: `cracks`, `flank`."""
+    """Return a per-gear field of the mesh, by its name without the gear number: `cracks`, `flank`."""
     return getattr(machine.mesh, f"{name}_{index + 1}")
 
 
@@ -178,14 +178,14 @@ def with_mesh_field(machine: Machine, name: str, index: int, value: object) -> M
 
 
 def with_tooth_fault(machine: Machine, faults: str, index: int, fault: RootCrack | ToothSpall | ToothChip) -> Machine:
-    """Return the machine with one more of the mesh's `faults` ("cracks", …) on a gear; a tooth has one of a kind."""
+    """Return the machine with one more of the mesh's `faults` ("cracks", …) on a gear, at most one per tooth."""
     present: tuple[RootCrack | ToothSpall | ToothChip, ...] = mesh_field(machine, faults, index)
     if any(present_fault.tooth == fault.tooth for present_fault in present):
         word = faults.removesuffix("s")
         raise InputError(
             f"tooth {fault.tooth + 1} of the {GEARS[index]} gear already has a {word}",
             allowed=f"one {word} per tooth",
-            remedy="choose another tooth, or take away what the model's own parameters give",
+            remedy="choose another tooth, or remove the one given by the model's parameters",
         )
     return with_mesh_field(machine, faults, index, (*present, fault))
 
@@ -217,29 +217,29 @@ def module_mm(machine: MachineFacts, _options: Options) -> float:
 
 
 def tolerance_of(tolerance_um: Callable[[float, float], float]) -> Scale:
-    """A tolerance of class 5 of ISO 1328 of the chosen gear, as a function of module and diameter in mm."""
+    """Tolerance of the chosen gear in class 5 of ISO 1328; `tolerance_um` takes module and diameter in mm."""
     return lambda machine, options: tolerance_um(machine.nominal.module_mm, machine.diameter_mm(gear_index(options)))
 
 
 # --------------------
-# Sum of two vectors that turn with a shaft: run-outs, unbalances.
+# Sum of two vectors that rotate with a shaft: run-outs, unbalances.
 # --------------------
 
 
 ANGLE_OPTION = Option(
-    "angle_deg", None, "where it lies, from the middle of tooth 1 the way the gear turns", "deg", -360.0, 360.0
+    "angle_deg", None, "its angle from the middle of tooth 1 in the direction of rotation", "deg", -360.0, 360.0
 )
-"""Drawn where it is not given."""
+"""Drawn if not given."""
 
 
 def angle_or_drawn_deg(options: Options, rng: np.random.Generator) -> float:
-    """Return `angle_deg`, or one drawn evenly from the circle."""
+    """Return `angle_deg`, or else an angle drawn uniformly from the circle."""
     drawn = float(rng.uniform(0.0, 360.0))
     return float(options.get("angle_deg", drawn))
 
 
 def vector_sum(length: float, angle_deg: float, second_length: float, second_angle_deg: float) -> tuple[float, float]:
-    """Length and angle of the sum; the angle from 0 to 360°.
+    """Length and angle of the sum of two vectors; the angle from 0 to 360°.
 
     Examples
     --------

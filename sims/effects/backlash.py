@@ -14,23 +14,23 @@ from sims.machine import Machine
 
 
 def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
-    """Return the machine with wider play; half of it lies on either side."""
+    """Return the machine with more backlash, half of it on each side."""
     del options, rng
     return replace(machine, half_backlash_um=machine.half_backlash_um + severity / 2.0)
 
 
 def on_drive(drive: DriveParameters, severity: float, options: Options) -> DriveEffect:
-    """Widen the play by the severity."""
+    """Increase the backlash by the severity."""
     del options
     return DriveEffect({"half_backlash_um": drive.number("half_backlash_um") + 0.5 * severity})
 
 
 def textbook_signature(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
-    """Teeth that part and meet again: blows at the mesh or at its half, scattered in size and time; another mesh."""
+    """Teeth that separate and meet again: impacts at the mesh order or half of it, scattered; other mesh harmonics."""
     order = scene.teeth[0] * float(rng.choice((0.5, 1.0)))
     at = book.passings(scene, order, rng.uniform())
     kept = at[rng.uniform(size=len(at)) < rng.uniform(0.3, 1.0)]
-    if len(kept) > 1:  # hardly loaded teeth meet when they happen to
+    if len(kept) > 1:  # lightly loaded teeth meet at random times
         late = float(rng.choice((0.0, 0.5))) * rng.uniform() * float(np.median(np.diff(at)))
         kept = kept + late * rng.uniform(-1.0, 1.0, len(kept))
     sizes = rng.normal(1.0, rng.uniform(0.1, 0.6), len(kept))
@@ -47,7 +47,7 @@ def textbook_signature(scene: book.SyntheticScene, size: float, rng: np.random.G
 
 
 def _slow_noise(scene: book.SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    """Return noise, of unit size, that changes within a fraction of a turn."""
+    """Return noise of unit size that varies within a fraction of a revolution."""
     turns = scene.revolutions[-1] - scene.revolutions[0]
     n = int(turns * rng.uniform(2.0, 0.5 * scene.teeth[0])) + 2
     nodes = np.linspace(scene.revolutions[0], scene.revolutions[-1], n)
@@ -61,10 +61,10 @@ EFFECT = Effect(
     severity=Severity(
         "added_um", "um", 0.0, 1000.0, 100.0, "play that is added along the line of action, from flank to flank"
     ),
-    changes="The flanks have that much more play. While the mesh force stays above zero nothing changes at all.",
+    changes="The flanks have that much more backlash. While the mesh force stays above zero nothing changes at all.",
     signature="Only where teeth separate: at light load, at a resonance, in reversals and start–stop. There: impacts "
     "on both flanks, a raised floor, subharmonics and chaotic motion, jumps of level over speed. At full steady load "
-    "it cannot be seen, and no method will.",
+    "no method can see it.",
     shows_in=("low_load", "broadband", "mesh_harmonics"),
     change=change,
     plausible=PlausibleRange(25.0, 300.0, "um per mm of module; new gears have some 20 to 50", module_mm),

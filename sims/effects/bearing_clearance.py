@@ -1,4 +1,4 @@
-"""Effect: a bearing with too much play."""
+"""Effect: a bearing with too much clearance."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ def change(machine: Machine, severity: float, options: Options, rng: np.random.G
 
 
 def textbook_signature(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
-    """A shaft that is held less: other paths from the mesh to each sensor, lines of elements passing.
+    """A less rigidly supported shaft: changed paths from the mesh to each sensor, and lines of element passage.
 
-    And what loose parts show: many orders of the shaft's turn, their halves, a mesh that swings with it, noise. A
-    softer support moves the modes that all comes through, and lets less through at the higher mesh harmonics.
+    Also the signs of looseness: many shaft orders, half orders, a mesh modulated by the shaft, and noise. A softer
+    support shifts the modes of the path and transmits less at the higher mesh harmonics.
     """
     bearing = scene.bearings[int(rng.integers(len(scene.bearings)))]
     mesh, passing, turn, loose = book.balance(rng, 4)
-    turn = max(turn, float(rng.uniform(0.1, 0.5)))  # what tells it from another path
+    turn = max(turn, float(rng.uniform(0.1, 0.5)))  # distinguishes it from a changed path
     limited = min(size, 1.0)
     softer = rng.standard_normal() - rng.uniform(0.0, 0.7) * np.arange(book.N_MESH_HARMONICS)
     gains = np.exp(1.4 * mesh * limited * (rng.standard_normal(book.N_MESH_HARMONICS) + softer))
@@ -55,13 +55,13 @@ EFFECT = Effect(
     group="bearing",
     title="clearance in a bearing",
     severity=Severity(
-        "added_um", "um", 0.0, 200.0, 30.0, "radial distance from the middle until it carries: half the play; added"
+        "added_um", "um", 0.0, 200.0, 30.0, "added radial travel before it carries load: half the diametral clearance"
     ),
-    changes="The shaft moves that far before rolling elements carry; fewer of them do, so the support is softer and "
-    "its stiffness changes as they pass.",
+    changes="The shaft moves that much further before rolling elements carry load; fewer of them do, so the support is "
+    "softer and its stiffness varies as they pass.",
     signature="Lines at the order at which elements pass a point, n(1 − d cos α/D)/2 of the bearing's shaft, and its "
-    "multiples, with sums and differences to the mesh; no impacts. Other mesh harmonics, as the support is softer. "
-    "Under a turning load, harmonics of the shaft; impacts and a raised floor where the load lets the shaft lift.",
+    "multiples, with sums and differences to the mesh; no impacts. Changed mesh harmonics, as the support is softer. "
+    "Under a rotating load, harmonics of the shaft; impacts and a raised floor where the load lets the shaft lift.",
     shows_in=("shaft_orders", "envelope_orders", "resonances", "low_load"),
     change=change,
     options=(BEARING_OPTION,),

@@ -12,7 +12,7 @@ from sims.effects.textbook import UP, Signature, SyntheticScene, Textbook, race_
 
 
 def textbook_signature(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
-    """Impacts when elements pass the defect, louder in the load zone, that is once per turn."""
+    """Impacts when elements pass the defect, louder in the load zone, so once per revolution."""
     return race_impacts(scene, size, rng, "BPFI")
 
 
@@ -21,11 +21,10 @@ EFFECT = Effect(
     group="bearing",
     title="spall on an inner race",
     severity=parts.RACE_SEVERITY,
-    changes="Rolling elements sink into a gap of the turning race and strike its far edge, hardest in the load zone.",
+    changes="Rolling elements sink into a gap in the rotating race and strike its far edge, hardest in the load zone.",
     signature="Impacts at n(1 + d cos α/D)/2 per revolution of the bearing's shaft, a little more with slip, strong "
-    "while the defect turns through the load zone and weak outside: envelope lines of that order and its multiples "
-    "with sidebands of one shaft order, and order 1 itself. Slightly random, so that a synchronous average takes it "
-    "away.",
+    "while the defect passes through the load zone and weak outside it: envelope lines at that order and its multiples "
+    "with sidebands of one shaft order, and order 1 itself. Slightly random, so that a synchronous average removes it.",
     shows_in=parts.RACE_SHOWS_IN,
     change=partial(parts.with_race_defect, "inner"),
     options=parts.RACE_OPTIONS,

@@ -12,7 +12,7 @@ from sims.effects.textbook import UP, Signature, SyntheticScene, Textbook, race_
 
 
 def textbook_signature(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
-    """Impacts when elements pass the defect, all alike."""
+    """Impacts of equal size when elements pass the defect."""
     return race_impacts(scene, size, rng, "BPFO")
 
 
@@ -21,17 +21,17 @@ EFFECT = Effect(
     group="bearing",
     title="spall on an outer race",
     severity=parts.RACE_SEVERITY,
-    changes="Rolling elements sink into a gap of the standing race and strike its far edge. From about 0.5 mm on they "
-    "carry nothing there, and the impacts grow no more; they last longer.",
+    changes="Rolling elements sink into a gap in the stationary race and strike its far edge. From about 0.5 mm on "
+    "they carry no load there, and the impacts no longer grow but last longer.",
     signature="An impact for every element that passes, n(1 − d cos α/D)/2 per revolution of the bearing's shaft less "
-    "slip: lines of that order and its multiples in the envelope about a resonance, all nearly as strong as the load "
-    "zone does not move; not a multiple of any shaft order, and slightly random, so that a synchronous average takes "
-    "it away.",
+    "slip: lines at that order and its multiples in the envelope about a resonance, nearly equal in strength as the "
+    "load zone does not move; not a multiple of any shaft order, and slightly random, so that a synchronous average "
+    "removes it.",
     shows_in=parts.RACE_SHOWS_IN,
     change=partial(parts.with_race_defect, "outer"),
     options=parts.RACE_OPTIONS,
     plausible=parts.race_range(
-        "outer", "of the rolling element's diameter; beyond half a millimetre or so the impacts grow no more"
+        "outer", "of the rolling element's diameter; beyond about half a millimetre the impacts no longer grow"
     ),
     textbook=Textbook(
         (("envelope.outer", UP),),

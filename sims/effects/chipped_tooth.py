@@ -21,7 +21,7 @@ def change(machine: Machine, severity: float, options: Options, rng: np.random.G
 
 
 def textbook_signature(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
-    """A missing corner: load is lost, the next tooth takes it with a blow."""
+    """A missing corner: the tooth loses load, and the next tooth takes it over with an impact."""
     side = book.draw_side(rng)
     window, place = book.tooth_window(scene, side, float(rng.uniform(0.5, 1.2)), rng)
     blow = book.tooth_impacts(scene, side, place, 0.08, rng)
@@ -33,23 +33,23 @@ def textbook_signature(scene: book.SyntheticScene, size: float, rng: np.random.G
 
 
 LOW, HIGH = 0.2, 0.9
-"""Of the module, heights that are plausible."""
+"""Plausible heights, in modules."""
 EVEN_HEIGHTS = tuple((2.0 * np.log(np.linspace(LOW, HIGH, 8) / LOW) / log(HIGH / LOW)).tolist())
-"""Eight heights, by how many severities each lies above the least, see `PlausibleRange`."""
+"""Eight equally spaced heights as severity indices above the lowest, see `PlausibleRange`."""
 
 EFFECT = Effect(
     name="chipped_tooth",
     group="tooth-local",
     title="piece broken off a tooth's tip",
     severity=Severity("height_mm", "mm", 0.0, 10.0, 1.0, "radially, from the tip down to the edge of the break"),
-    changes="The outer part of one tooth carries less, or, over the whole face, by the edge that is left: its pair "
-    "lets go early (on the driver) or takes up late (on the driven gear), and the neighbours carry instead.",
+    changes="The outer part of one tooth carries less load, or, with a chip over the whole face, the remaining edge "
+    "carries it: its pair disengages early (driver) or engages late (driven gear), and the neighbours carry instead.",
     signature="One burst per revolution of the gear's shaft, at the tooth's angle and where its tip is in mesh: in "
-    "recess for the driver, in approach for the driven gear. A shock when the next pair takes the load over: wide "
-    "sidebands of that shaft, ringing resonances, envelope lines at multiples of its order. Small chips lie in double "
+    "recess for the driver, in approach for the driven gear. A shock when the next pair takes over the load: wide "
+    "sidebands of that shaft, ringing resonances, envelope lines at multiples of its order. Small chips are in double "
     "contact and show little.",
     shows_in=("tooth_window", "envelope_orders", "mesh_sidebands", "resonances"),
-    # The pair lets go a pitch earlier for each module: half of what lies between the largest two that are tried.
+    # The pair disengages one pitch earlier per module of height: half the step between the largest two heights tried.
     moves_pitches=0.16,
     profile_varies_with="height_mm",
     change=change,
@@ -61,16 +61,17 @@ EFFECT = Effect(
     plausible=PlausibleRange(
         LOW,
         HIGH,
-        "of the module: a broken corner to half of the tooth's height; smaller chips lie in double contact",
+        "of the module: a broken corner to half of the tooth's height; smaller chips are in double contact",
         parts.module_mm,
         lambda machine: parts.first_teeth(machine, width_percent=85.0),
         lambda machine, rng: {
             **parts.any_tooth(machine, rng),
             "width_percent": float(rng.choice((30.0, 60.0, 85.0, 100.0))),
         },
-        # Without its whole tip a tooth carries nothing there; with most of it left, nearly as much as ever. The height
-        # says where in the engagement that is: by steps of a tenth of the module profiles between two of them are their
-        # mixture, correlated by 0.98 and more. One of the eight is next to a candidate.
+        # With the whole width of its tip gone a tooth carries nothing there; with most of it left, nearly as much as
+        # before. The height determines where in the engagement that is: in steps of a tenth of the module, profiles in
+        # between are mixtures of their neighbours, with correlations of at least 0.98. One of the eight is next to a
+        # candidate.
         further_settings=lambda machine: [
             (options, places)
             for percent, places in (

@@ -19,7 +19,7 @@ def change(machine: Machine, severity: float, options: Options, rng: np.random.G
     del options, rng
 
     def with_clipping(channel: MeasuredChannel) -> MeasuredChannel:
-        # Of two limits only the lower one is ever reached.
+        # Of two limits, only the lower one is reached.
         percent = max(channel.accelerometer.clip_percent, severity)
         return replace(channel, accelerometer=replace(channel.accelerometer, clip_percent=percent))
 
@@ -27,7 +27,7 @@ def change(machine: Machine, severity: float, options: Options, rng: np.random.G
 
 
 def textbook_signature(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
-    """Flat tops: from a thousandth to a third of the samples are cut off."""
+    """Clipped peaks: a thousandth to a third of the samples."""
     del scene, rng
     return Signature(cut_share=1e-3 * (size / SIZES[0]) ** (2.5 / log10(SIZES[1] / SIZES[0])))
 
@@ -37,14 +37,14 @@ EFFECT = Effect(
     group="measurement chain",
     title="clipped signal",
     severity=Severity(
-        "clipped_percent", "%", 0.0, 50.0, 2.0, "part of the time that the sensor stands at its limit, per recording"
+        "clipped_percent", "%", 0.0, 50.0, 2.0, "part of the time that the sensor is at its limit, per recording"
     ),
-    changes="Every accelerometer is held at the level that its reading exceeds that part of the time. The level "
-    "follows from each recording's own signal: another speed or load has another one. For one range throughout, set "
-    "the accelerometer's range instead.",
+    changes="Every accelerometer is limited to the level that its reading exceeds for that part of the time. The level "
+    "follows from each recording's own signal, so it differs between speeds and loads. For one fixed range, set the "
+    "accelerometer's range instead.",
     signature="The amplitude distribution is cut off: crest factor and kurtosis fall, extreme values pile up at one "
     "level on both sides, smeared by the anti-alias filter behind the sensor. Odd harmonics and sums of the strongest "
-    "lines appear as far as the filter lets them; impulses lose most, so that a local fault looks smaller.",
+    "lines appear as far as the filter passes them; impulses lose most, so that a local fault looks smaller.",
     shows_in=("amplitude_tail", "mesh_harmonics", "broadband"),
     change=change,
     plausible=PlausibleRange(0.3, 12.0, "percent of the time: rare peaks to a grossly wrong range"),

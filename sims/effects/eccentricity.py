@@ -14,7 +14,7 @@ from sims.machine import Machine, runout_tolerance_um
 
 
 def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
-    """Return the machine with run-out, and the unbalance that goes with it."""
+    """Return the machine with run-out and the resulting unbalance."""
     index, angle = parts.gear_index(options), parts.angle_or_drawn_deg(options, rng)
     wheel = machine.wheels[index]
     runout, runout_angle = parts.vector_sum(wheel.runout_um, wheel.runout_angle_deg, severity, angle)
@@ -34,9 +34,9 @@ def change(machine: Machine, severity: float, options: Options, rng: np.random.G
 
 
 def textbook_signature(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
-    """Run-out: the mesh swings once per turn in size and phase; the shaft's own line, and its second, may show.
+    """Run-out: amplitude and phase modulation of the mesh once per revolution, and possibly shaft orders 1 and 2.
 
-    The gear's mass is off the axis as well, so that the line may be as large as that of an unbalance: the mesh tells.
+    The gear's mass is off the axis as well, so order 1 may be as large as with unbalance; the mesh distinguishes them.
     """
     order = scene.shaft_orders[draw_side(rng)]
     gain, late = 10.0 ** (-rng.uniform(0.0, 0.9, 2))
@@ -46,13 +46,14 @@ def textbook_signature(scene: SyntheticScene, size: float, rng: np.random.Genera
 
 
 MAX_PLAY_SHARE = 0.9
-"""Of the play, that a run-out may take away once a turn: beyond, tolerances and load make the pair jam."""
+"""Maximum share of the backlash that run-out may take: beyond it, tolerances and load make the pair jam."""
 
 
 def largest_um(play_um: float, pressure_angle_deg: float, share: float = MAX_PLAY_SHARE) -> float:
-    """Return the run-out that takes a share of the play, e = s j/(2 sin α): axes nearer by e take 2 e sin α of it.
+    """Return the run-out that takes a share s of the backlash j, e = s j/(2 sin α), in µm.
 
-    From j/(2 sin α) on both flanks of a tooth touch and the pair jams: the whole machine rattles, and nobody runs it.
+    Axes closer by e reduce the backlash by 2 e sin α. From j/(2 sin α) on both flanks of a tooth touch and the pair
+    jams: the whole machine rattles, and nobody runs it.
     """
     return share * play_um / (2.0 * sin(radians(pressure_angle_deg)))
 
@@ -64,11 +65,11 @@ EFFECT = Effect(
     severity=Severity(
         "runout_um", "um", 0.0, 200.0, 20.0, "distance of the pitch circle's centre from the axis: half the run-out"
     ),
-    changes="The pitch circle of one gear turns about a point off its centre; the centre of mass moves along (mass "
-    "times run-out is added to the unbalance). Both add as vectors to what is there.",
-    signature="Order 1 of that gear's shaft in transmission error, by as much as the run-out, at every speed and load; "
+    changes="The pitch circle of one gear turns about a point off its centre, and the centre of mass moves with it "
+    "(mass times run-out is added to the unbalance). Both add as vectors to existing run-out and unbalance.",
+    signature="Order 1 of that gear's shaft in transmission error, as large as the run-out, at every speed and load; "
     "in vibration, order 1, and first sidebands of that shaft about the mesh harmonics (z ± 1, 2z ± 1, …), far above "
-    "those further out: a smooth modulation all round the revolution and no pulse. Weak while the torque is steady.",
+    "those further out: a smooth modulation over the whole revolution, no pulse. Weak while the torque is steady.",
     shows_in=("shaft_orders", "mesh_sidebands"),
     change=change,
     options=(GEAR_OPTION, parts.ANGLE_OPTION),

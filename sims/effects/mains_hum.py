@@ -18,7 +18,7 @@ from sims.measure import MainsHum, MeasuredChannel
 
 
 def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
-    """Return the machine with hum in every channel, in phase with the hum there is."""
+    """Return the machine with hum in every channel, in phase with any existing hum."""
     second = severity * float(options["harmonics_percent"]) / 100.0
     added = MainsHum((severity, second, second), float(options["frequency_hz"]), float(rng.uniform(0.0, 2.0 * pi)))
 
@@ -48,9 +48,9 @@ EFFECT = Effect(
     title="mains hum",
     severity=Severity("amplitude_mps2", "m/s^2", 0.0, 100.0, 1.0, "peak amplitude of the first harmonic, as read"),
     changes="A sine of the mains frequency with its second and third harmonic is added to every acceleration channel, "
-    "behind the sensor; the machine does not move. Its phase is drawn, or that of the hum there is.",
+    "after the sensor; the machine's motion is unchanged. Its phase is drawn, or that of existing hum.",
     signature="Sharp lines at 50 (or 60) Hz and multiples, at the same frequency whatever the speed: in the order "
-    "domain they smear and move, and an average over revolutions takes them away. They stay when the machine stands.",
+    "domain they smear and move, and an average over revolutions removes them. They stay when the machine is stopped.",
     shows_in=("mains_lines",),
     change=change,
     options=(

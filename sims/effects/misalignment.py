@@ -16,7 +16,7 @@ _MAX_DEG = 5.0  # of a ShaftLine
 
 
 def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
-    """Return the machine with the angle added in the plane of the one there is."""
+    """Return the machine with the angle added, in the plane of the existing one."""
     del rng
     index = gear_index(options, "shaft")
     now = machine.shafts[index].coupling_angle_deg
@@ -26,10 +26,10 @@ def change(machine: Machine, severity: float, options: Options, rng: np.random.G
 
 
 def textbook_signature(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
-    """Two stiffness swings per turn, or a load that wanders along the teeth.
+    """Two stiffness cycles per revolution, or a load that moves along the teeth.
 
-    The shaft's second line, mesh harmonics from the second on, sidebands one and two apart: any of them may lead. The
-    contact wanders along the teeth, which are not alike there; forces of a coupling reach one sensor more than another.
+    Shaft order 2, mesh harmonics from the second on, first and second sidebands: any of them may dominate. The contact
+    moves along the teeth, which differ along their width; coupling forces reach some sensors more than others.
     """
     order = scene.shaft_orders[book.draw_side(rng)]
     lines, bands, mesh = book.balance(rng, 3)
@@ -59,18 +59,18 @@ EFFECT = Effect(
     group="shaft",
     title="misaligned coupling",
     severity=Severity("angle_deg", "deg", 0.0, _MAX_DEG, 1.0, "between rotor axis and shaft axis in the coupling"),
-    changes="Rotor and shaft turn as through a universal joint: the twist between them has a part at twice the "
-    "turning speed, and the torque bends the shaft, which loads its bearings.",
+    changes="Rotor and shaft turn as through a universal joint: the twist between them has a component at twice the "
+    "shaft speed, and the torque bends the shaft, which loads its bearings.",
     signature="Order 2 of that shaft in the vibration of its bearings, from the bending moment, in proportion to angle "
-    "and torque; order 2 in mesh force and speed, from the twist of β²/4, which a doubled angle shows fourfold; weak "
-    "sidebands z ± 2 about the mesh harmonics. Order 1 hardly changes.",
+    "and torque; order 2 in mesh force and speed, from the twist of β²/4, which quadruples when the angle doubles; "
+    "weak sidebands z ± 2 about the mesh harmonics. Order 1 hardly changes.",
     shows_in=("shaft_orders", "mesh_sidebands"),
     change=change,
     options=(Option("shaft", "driver", "whose coupling", choices=GEARS),),
     plausible=PlausibleRange(
         0.4,
         4.0,
-        "degrees: elastic couplings bear 1, universal joints more; the model goes to 5",
+        "degrees: elastic couplings tolerate 1, universal joints more; the model allows up to 5",
         choices=lambda _machine: [{"shaft": side} for side in GEARS],
         drawn=lambda _machine, rng: {"shaft": str(rng.choice(GEARS))},
     ),

@@ -1,4 +1,4 @@
-"""Effect: pitch errors of one gear: of all its teeth, or of one that stands ahead or behind."""
+"""Effect: pitch errors of one gear, of all its teeth or of a single one."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from sims.machine import Machine, pitch_tolerance_um
 from sims.mesh import FlankDeviation
 
 ONE_TOOTH_SHARE = 1.0 / 3.0
-"""Of drawn pitch errors: one tooth alone is out of its place, as after a dent, a repair or a slip of the indexing.
+"""Share of drawn pitch errors with a single tooth out of place, as after a dent, a repair or an indexing slip.
 
-ISO 1328-1:2013 judges the single deviation by the worst tooth and the cumulative one by all of them; either occurs."""
+ISO 1328-1:2013 assesses the single deviation by the worst tooth and the cumulative one by all teeth; both occur."""
 
 
 def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
-    """Return the machine with pitch errors added to those it has: of all teeth, or of one."""
+    """Return the machine with further pitch errors, of all teeth or of one."""
     index = parts.gear_index(options)
     flank: FlankDeviation = parts.mesh_field(machine, "flank", index)
     n_teeth = parts.gear_geometry(machine, index).teeth
@@ -46,25 +46,25 @@ def change(machine: Machine, severity: float, options: Options, rng: np.random.G
 def cumulative_pitch(n_teeth: int, rng: np.random.Generator) -> FloatArray:
     """Cumulative pitch deviation of each tooth, from drawn single deviations of standard deviation 1, (n_teeth,).
 
-    F_k = Σ_{i≤k} f_i with f_i normal and Σ f_i = 0 over the revolution, so that the last tooth meets the first. Its
-    mean is taken off: it would only turn the gear.
+    F_k = Σ_{i≤k} f_i with f_i normal and Σ f_i = 0 over the revolution, so that the circle closes. The mean is
+    subtracted, as it would only rotate the gear.
     """
     single = rng.standard_normal(n_teeth)
-    # Closing the circle takes one of n degrees of freedom; the factor gives its variance back.
+    # Closing the circle takes one of n degrees of freedom; the factor restores the variance.
     closed = (single - single.mean()) * np.sqrt(n_teeth / (n_teeth - 1.0))
     cumulative = np.cumsum(closed)
     return np.asarray(cumulative - cumulative.mean())
 
 
 def textbook_signature(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
-    """Each tooth comes early or late by its own amount: lines at all orders of its shaft; or one tooth does."""
+    """Each tooth, or a single one, is early or late by its own amount: lines at all orders of its shaft."""
     if rng.uniform() < ONE_TOOTH_SHARE:
         return _pitch_of_one_tooth(scene, size, rng)
     return pitch_of_all_teeth(scene, size, rng)
 
 
 def _pitch_of_one_tooth(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
-    """One tooth comes early or late, and takes more or less of the load than its neighbours."""
+    """One tooth is early or late, and takes more or less load than its neighbours."""
     side = book.draw_side(rng)
     window, _ = book.tooth_window(scene, side, float(rng.uniform(1.0, 2.5)), rng)
     late, gain, _ = book.balance(rng, 3)
@@ -74,7 +74,7 @@ def _pitch_of_one_tooth(scene: book.SyntheticScene, size: float, rng: np.random.
 
 
 def pitch_of_all_teeth(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
-    """Each tooth comes early or late by its own amount: lines at all orders of its shaft."""
+    """Each tooth is early or late by its own amount: lines at all orders of its shaft."""
     side = book.draw_side(rng)
     errors, gains = (rng.standard_normal(scene.teeth[side]) for _ in range(2))
     at, gain, slow = book.balance(rng, 3)
@@ -89,7 +89,7 @@ def pitch_of_all_teeth(scene: book.SyntheticScene, size: float, rng: np.random.G
 
 
 def _drawn(machine: MachineFacts, rng: np.random.Generator) -> Options:
-    """Return a gear, or one tooth of it."""
+    """Draw a gear, or a single tooth of one."""
     if rng.uniform() >= ONE_TOOTH_SHARE:
         return parts.any_gear(machine, rng)
     return {**parts.any_tooth(machine, rng), "stands": str(rng.choice(STANDS))}
@@ -104,28 +104,28 @@ EFFECT = Effect(
     severity=Severity(
         "deviation_um", "um", 0.0, 50.0, 5.0, "standard deviation of the single pitch deviations, normal and closed"
     ),
-    changes="Every tooth of one gear stands a little ahead or behind: its pairs come into contact early or late, and "
-    "share the load unevenly. The pattern is drawn, closes over the revolution and adds to pitch errors there are.",
-    signature="All orders of that gear's shaft, falling with order, and its sidebands of every number about the mesh "
-    "harmonics, irregular and unlike from left to right; the same pattern every revolution, on no tooth in "
-    "particular, so that the synchronous average changes all round while its kurtosis hardly does. It fades as the "
-    "load rises.",
+    changes="Every tooth of one gear is a little ahead or behind: its pairs come into contact early or late, and share "
+    "the load unevenly. The pattern is drawn, closes over the revolution and adds to existing pitch errors.",
+    signature="All orders of that gear's shaft, decreasing with order, and its sidebands of every number about the "
+    "mesh harmonics, irregular and asymmetric; the same pattern every revolution, on no tooth in particular, so that "
+    "the synchronous average changes over the whole revolution while its kurtosis hardly does. It fades as the load "
+    "rises.",
     shows_in=("shaft_orders", "mesh_sidebands"),
     is_on_every_tooth=True,
     change=change,
     options=(
         GEAR_OPTION,
-        replace(TOOTH_OPTION, default=None, meaning="the only tooth that is out, by that much; none: all are"),
-        Option("stands", "behind", "where that tooth is, seen the way the gear turns", choices=STANDS),
+        replace(TOOTH_OPTION, default=None, meaning="the only tooth with an error, of that size; none: all teeth"),
+        Option("stands", "behind", "position of that tooth, in the gear's direction of rotation", choices=STANDS),
     ),
     plausible=PlausibleRange(
         0.4,
         3.0,
-        "standard deviation over the pitch tolerance of class 5, which is a limit: of classes 5 to 11",
+        "standard deviation over the pitch tolerance (a limit) of class 5: gears of classes 5 to 11",
         parts.tolerance_of(pitch_tolerance_um),
         parts.either_gear,
         _drawn,
-        # The teeth's deviations are drawn; what a small one of them changes, each changes. A large one parts its tooth.
+        # The deviations are drawn; a small one has the same effect on every tooth. A large one separates its tooth.
         further_settings=lambda machine: [
             (options, (0, 2)) for stands in STANDS for options in parts.first_teeth(machine, stands=stands)
         ],

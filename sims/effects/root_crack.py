@@ -34,7 +34,7 @@ def change(machine: Machine, severity: float, options: Options, rng: np.random.G
 def on_drive(drive: DriveParameters, severity: float, options: Options) -> DriveEffect:
     """Weaken a tooth: its pairs lose stiffness in the ratio of their mean stiffness with and without the crack.
 
-    On the drive flank, where the load opens the crack; by the potential energy of the tooth (`sims.mesh`).
+    Applies to the drive flank, where the load opens the crack; from the potential energy of the tooth (`sims.mesh`).
     """
     if severity == 0.0:
         return DriveEffect()
@@ -45,7 +45,7 @@ def on_drive(drive: DriveParameters, severity: float, options: Options) -> Drive
     width = None if percent == 100.0 else percent / 100.0 * pair.face_width_mm
     crack = RootCrack(severity, float(options["angle_deg"]), tooth, width)
     cracked = GearMesh(pair, cracks_1=(crack,) if gear == 0 else (), cracks_2=(crack,) if gear == 1 else ())
-    # Pair `tooth` alone, while it touches from its entry on: its column moves as the next pair enters.
+    # Pair `tooth` alone, over the first pitch from its entry: its column changes when the next pair enters.
     cycles = tooth + np.linspace(0.05, 0.95, 40)
     healthy_n_per_m, weak_n_per_m = (
         mesh_stiffness(mesh, cycles).pairs_n_per_m[:, 0] for mesh in (GearMesh(pair), cracked)
@@ -58,9 +58,9 @@ def _deepest_mm(machine: MachineFacts, options: Options) -> float:
 
 
 def textbook_signature(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
-    """A softer tooth: it comes late and gives way while it carries, slower than the mesh; the mesh swings on.
+    """A softer tooth: late, and deflecting more under load, more slowly than the mesh, which continues.
 
-    A deep crack lets the next tooth strike.
+    With a deep crack the next tooth engages with an impact.
     """
     side = book.draw_side(rng)
     window, place = book.tooth_window(scene, side, float(rng.uniform(0.8, 2.0)), rng)
@@ -81,11 +81,11 @@ EFFECT = Effect(
     group="tooth-local",
     title="crack in a tooth root",
     severity=Severity("depth_mm", "mm", 0.0, 10.0, 2.0, "length of the crack in the cross-section, from mid-fillet"),
-    changes="One tooth loses bending, shear and axial stiffness where sections lie behind the crack; the mean force "
-    "stays, so the tooth yields more while it carries.",
+    changes="One tooth loses bending, shear and axial stiffness in the sections behind the crack; the mean force is "
+    "unchanged, so the tooth deflects more while it carries load.",
     signature="One burst per revolution of the gear's shaft, at the tooth's angle and about a mesh period long, which "
-    "rings on at the natural frequencies; a family of low, wide sidebands of that shaft about the mesh harmonics and "
-    "the resonances. In the shaft's synchronous average the residual's kurtosis rises; a phase lag at the tooth. It "
+    "rings at the natural frequencies; a family of low, wide sidebands of that shaft about the mesh harmonics and the "
+    "resonances. In the shaft's synchronous average the residual's kurtosis rises, and the phase lags at the tooth. It "
     "grows faster than the depth, and with the load.",
     shows_in=("tooth_window", "mesh_sidebands", "envelope_orders"),
     change=change,
@@ -98,7 +98,7 @@ EFFECT = Effect(
     plausible=PlausibleRange(
         0.2,
         0.85,
-        "of the deepest crack that the tooth bears; below a fifth the stiffness hardly changes",
+        "of the deepest crack that the tooth allows; below a fifth the stiffness hardly changes",
         _deepest_mm,
         parts.first_teeth,
         lambda machine, rng: {**parts.any_tooth(machine, rng), "angle_deg": float(rng.uniform(35.0, 75.0))},

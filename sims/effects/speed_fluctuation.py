@@ -13,7 +13,7 @@ from sims.machine import Machine, SpeedSwing, log_uniform
 
 
 def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
-    """Return the machine with one more swing of the set speed."""
+    """Return the machine with a further fluctuation of the set speed."""
     swing = SpeedSwing(severity / 100.0, float(options["frequency_hz"]), float(rng.uniform(0.0, 2.0 * pi)))
     return replace(machine, drive=replace(machine.drive, swings=(*machine.drive.swings, swing)))
 
@@ -22,18 +22,18 @@ EFFECT = Effect(
     name="speed_fluctuation",
     group="drive and load",
     title="hunting of the speed",
-    severity=Severity("amplitude_percent", "%", 0.0, 20.0, 2.0, "amplitude of the swing over the mean speed"),
+    severity=Severity("amplitude_percent", "%", 0.0, 20.0, 2.0, "amplitude relative to the mean speed"),
     changes="The set speed is multiplied by 1 + severity·sin(2πft + φ), φ drawn; the drive follows it.",
-    signature="The speed itself swings at the given frequency, in hertz and whatever the speed. In a spectrum over "
-    "frequency every line is smeared or gets sidebands of that distance, the wider the higher the line; in the order "
-    "domain the lines are sharp again, with a slow change of level.",
+    signature="The speed itself fluctuates at the given frequency, which does not change with the speed. In a "
+    "frequency spectrum every line is smeared or gets sidebands at that spacing, the wider the higher the line; in the "
+    "order domain the lines are sharp again, with a slow change of level.",
     shows_in=("speed", "mesh_sidebands"),
     change=change,
-    options=(Option("frequency_hz", 1.0, "of the swing", "Hz", 0.01, 50.0),),
+    options=(Option("frequency_hz", 1.0, "of the fluctuation", "Hz", 0.01, 50.0),),
     plausible=PlausibleRange(
         0.2,
         5.0,
-        "percent: a controlled drive holds 0.1, a hunting one swings by several",
+        "percent: a controlled drive holds 0.1, a hunting one fluctuates by several",
         choices=lambda _machine: [{"frequency_hz": 1.0}],
         drawn=lambda _machine, rng: {"frequency_hz": log_uniform(rng, 0.3, 8.0)},
     ),

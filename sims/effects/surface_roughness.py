@@ -27,7 +27,7 @@ def change(machine: Machine, severity: float, options: Options, rng: np.random.G
 def _locked_to(now: Roughness, requested: str) -> str:
     if requested in (_AS_IT_IS, now.locked_to):
         return now.locked_to
-    # Otherwise a vanishing severity would change the profile that is already there.
+    # Otherwise a vanishing severity would change the existing profile.
     if now.rms_um > 0:
         raise InputError(
             f"the flanks already have {now.rms_um:g} µm, locked to {now.locked_to!r}, and {requested!r} was asked for",
@@ -39,7 +39,7 @@ def _locked_to(now: Roughness, requested: str) -> str:
 
 
 def textbook_signature(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
-    """Asperities that slide over each other: noise, in bands, more or less with the mesh."""
+    """Asperities sliding over each other: band noise, more or less modulated by the mesh."""
     loose, locked = balance(rng, 2)
     total = sum(
         (at_the_mesh(scene, band_noise(scene, rng), rng) * rng.uniform(0.3, 1.0) for _ in range(3)),
@@ -50,7 +50,7 @@ def textbook_signature(scene: SyntheticScene, size: float, rng: np.random.Genera
 
 
 def _born_with(scene: SyntheticScene, side: int, rng: np.random.Generator) -> FloatArray:
-    """Return a waveform, of unit size, that a gear repeats each turn: lines at all its orders in a broad band."""
+    """Return a waveform of unit size that a gear repeats each revolution: lines at all its orders in a broad band."""
     teeth = scene.teeth[side]
     low, high = teeth * rng.uniform(0.5, 3.0), teeth * rng.uniform(4.0, 9.0)
     n = 2 * int(high) + 2
@@ -69,26 +69,26 @@ EFFECT = Effect(
     group="flank",
     title="rougher flanks",
     severity=Severity(
-        "added_rms_um", "um", 0.0, 3.0, 0.8, "rms roughness that is added; independent finishes add in squares"
+        "added_rms_um", "um", 0.0, 3.0, 0.8, "added rms roughness; the squares of independent finishes add"
     ),
     changes="The composite rms roughness becomes √(R² + severity²): the fractal profile that opens and closes the "
     "contact grows with it, and so does the friction coefficient.",
     signature="Broadband: fractal lines and a raised floor between mesh harmonics, strongest about the resonances; "
-    "mesh harmonics by friction, above all across the line of action. Locked to the flank the lines are orders of "
-    "both shafts and return with the hunting period; locked to time they stand at fixed frequencies and no average "
-    "holds them. Above about 0.8 µm friction rises steeply.",
+    "mesh harmonics from friction, above all across the line of action. Locked to the flank, the lines are orders of "
+    "both shafts and repeat with the hunting-tooth period; locked to time, they are at fixed frequencies and no "
+    "synchronous average retains them. Above about 0.8 µm friction rises steeply.",
     shows_in=("broadband", "mesh_harmonics", "shaft_orders"),
     change=change,
     options=(
         Option(
             "locked_to",
             _AS_IT_IS,
-            "what the profile returns with; 'none': only friction knows the roughness",
+            "what the profile repeats with; 'none': roughness affects friction only",
             choices=(_AS_IT_IS, "time", "flank", "none"),
         ),
     ),
     plausible=PlausibleRange(
-        0.3, 2.5, "um: ground flanks have 0.4, hobbed or run-out ones 1 to 3; it does not grow with the gear"
+        0.3, 2.5, "um: ground flanks have 0.4, hobbed or worn ones 1 to 3; it does not grow with the gear"
     ),
     textbook=Textbook(
         (("floor.band.3", UP), ("floor.band.4", UP), ("tooth.driver.elsewhere", UP)),

@@ -1,9 +1,9 @@
-"""How the literature says that effects show: signs in the features of a diagnosis, and vibration made by hand.
+"""Signatures of effects in the literature: signs in the features of a diagnosis, and synthetic vibration.
 
-The simulators show each effect in one way, with one balance between its lines, sidebands and noise. Machines, and other
-simulators, agree with it on the signature and not on that balance: where a run-out modulates the mesh in one, it shows
-as a line of the shaft in another. So each effect also draws its signature with another balance each time, and whoever
-learns from recordings that have one put into them learns what the balances have in common.
+A simulator shows each effect in one way, with one balance between its lines, sidebands and noise. Machines, and other
+simulators, agree on the signature but not on that balance: where run-out modulates the mesh in one, it shows as a shaft
+line in another. Each effect therefore also draws its signature with a different balance every time, and a classifier
+trained on recordings with added signatures learns what the balances have in common.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ UP, DOWN, EITHER = 1, -1, 0
 
 @dataclass(frozen=True)
 class Textbook:
-    """How an effect shows by the literature.
+    """The signature of an effect in the literature.
 
     Parameters
     ----------
@@ -29,13 +29,13 @@ class Textbook:
         Features of `gearsig.gap` that rise (`UP`), fall (`DOWN`) or change (`EITHER`); ``{side}`` is driver or driven,
         whichever shows more.
     words : str
-        The same as the books say it.
+        The same in the words of the literature.
     draw : callable or None
-        (scene, size, rng) → `Signature`, with its balance drawn; its size is one of `SIZES`. None: no recording is made
-        by hand, the simulators show all there is to it.
+        (scene, size, rng) → `Signature` with a drawn balance; its size is within `SIZES`. None: no synthetic recording
+        is made, as the simulators show the effect completely.
     source : str
-        Beside R. B. Randall, *Vibration-based Condition Monitoring*, 2nd ed., 2021, chapters 2, 5, 6 and 7, and ISO
-        13373-2:2016, annexes, which most of it is from.
+        In addition to R. B. Randall, *Vibration-based Condition Monitoring*, 2nd ed., 2021, chapters 2, 5, 6 and 7, and
+        ISO 13373-2:2016, annexes, the sources of most of it.
     """
 
     signs: tuple[tuple[str, int], ...]
@@ -45,13 +45,13 @@ class Textbook:
 
 
 # --------------------
-# What vibration is made of when it is made by hand: rings, impacts, tones, over the angle of a recording's shafts.
+# Components of synthetic vibration: ringing, impacts and tones over the shaft angles of a recording.
 # --------------------
 
 
 @dataclass(frozen=True)
 class SyntheticScene:
-    """What a vibration is made for.
+    """The recording for which synthetic vibration is made.
 
     Parameters
     ----------
@@ -61,10 +61,10 @@ class SyntheticScene:
     sampling_rate_hz : float
     teeth : (int, int)
     bearings : tuple of mapping
-        Orders BPFO, BPFI, BSF, FTF of each bearing, in cycles per revolution of the driver; and "shaft", that of its
-        own shaft.
+        Orders BPFO, BPFI, BSF, FTF of each bearing, in cycles per revolution of the driver; and "shaft", the order of
+        its shaft.
     n_channels : int
-        Of vibration.
+        Number of vibration channels.
     """
 
     revolutions: FloatArray
@@ -76,12 +76,12 @@ class SyntheticScene:
 
     @property
     def shaft_orders(self) -> tuple[float, float]:
-        """Revolutions of either shaft per revolution of the driver."""
+        """Revolutions of each shaft per revolution of the driver."""
         return 1.0, self.teeth[0] / self.teeth[1]
 
 
 def ring(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    """Return a housing mode's answer to an impact."""
+    """Return the impulse response of a random housing mode."""
     rate = scene.sampling_rate_hz
     frequency, damping = log_uniform(rng, 700.0, 0.4 * rate), float(rng.uniform(0.02, 0.1))
     time = np.arange(int(rate * 6.0 / (2 * np.pi * frequency * damping)) + 2) / rate
@@ -89,7 +89,7 @@ def ring(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
 
 
 def struck(places: FloatArray, sizes: FloatArray, scene: SyntheticScene, answer: FloatArray) -> FloatArray:
-    """Return the answer to impacts at samples `places`."""
+    """Return the response `answer` to impacts of the given sizes at samples `places`."""
     from scipy.signal import oaconvolve
 
     n = len(scene.time_s)
@@ -99,14 +99,14 @@ def struck(places: FloatArray, sizes: FloatArray, scene: SyntheticScene, answer:
 
 
 def passings(scene: SyntheticScene, order: float, phase: float = 0.0) -> FloatArray:
-    """Return the samples at which revolutions · order + phase passes a whole number."""
+    """Return the samples at which revolutions · order + phase passes an integer."""
     return np.flatnonzero(np.diff(np.floor(scene.revolutions * order + phase)) > 0).astype(np.float64)
 
 
 def impact_train(
     order: float, jitter: float, scene: SyntheticScene, rng: np.random.Generator, by: float = 0.0
 ) -> FloatArray:
-    """Return impacts `order` times per revolution, their size swinging at the order `by`."""
+    """Return impacts `order` times per revolution, amplitude-modulated at the order `by`."""
     places = passings(scene, order, rng.uniform())
     if len(places) > 1:
         places += jitter * float(np.median(np.diff(places))) * rng.standard_normal(len(places))
@@ -117,23 +117,23 @@ def impact_train(
 
 
 def tone(order: float, scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    """Return a sine of an order, with any phase."""
+    """Return a sine of an order, with random phase."""
     return np.asarray(np.sin(2 * np.pi * (order * scene.revolutions + rng.uniform())))
 
 
 def band_noise(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    """Return noise through a housing mode."""
+    """Return noise filtered by a random housing mode."""
     from scipy.signal import oaconvolve
 
     return np.asarray(oaconvolve(rng.standard_normal(len(scene.time_s)), ring(scene, rng), mode="same"))
 
 
 # --------------------
-# Paths from the gears to a sensor that have changed: everything that comes through changes with them.
+# Changes of the transfer path from the gears to a sensor.
 #
-# Mesh harmonics, sidebands, teeth and the noise of the machine go through the same path; what the sensor itself adds
-# does not. A fault of the flanks changes the mesh and leaves its neighbourhood. So a path is changed behind all that a
-# machine does, its tolerances included, and before the sensor's own noise.
+# Mesh harmonics, sidebands, single teeth and the noise of the machine pass through the same path; the sensor's own
+# noise does not. A flank fault changes the mesh but not its neighbourhood. A path change therefore applies to
+# everything the machine does, its tolerances included, but not to the sensor's own noise.
 #
 # Source: R. B. Randall, *Vibration-based Condition Monitoring*, 2nd ed., 2021, chapter 3 (separation of force and
 # path).
@@ -142,7 +142,7 @@ def band_noise(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
 
 @dataclass(frozen=True)
 class ModeChange:
-    """A mode that is louder at its frequency by a factor, and moved from there.
+    """A mode whose amplitude changes by a factor and whose frequency shifts.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ class ModeChange:
     factor : float
         At its frequency.
     moved_hz : float
-        Where it is now.
+        Its new frequency.
     """
 
     frequency_hz: float
@@ -159,7 +159,7 @@ class ModeChange:
     moved_hz: float
 
     def answer(self, frequency_hz: FloatArray) -> np.ndarray:
-        """Return by what vibration of each frequency is multiplied, (f0² + 2jAζff0 − f²)/(f1² + 2jζff1 − f²)."""
+        """Return the factor on vibration of each frequency, (f0² + 2jAζff0 − f²)/(f1² + 2jζff1 − f²) · (f1/f0)²."""
         f, old, new, zeta = frequency_hz, self.frequency_hz, self.moved_hz, self.damping_ratio
         above = old**2 - f**2 + 2j * zeta * self.factor * f * old
         below = new**2 - f**2 + 2j * zeta * f * new
@@ -168,13 +168,13 @@ class ModeChange:
 
 @dataclass(frozen=True)
 class PathChange:
-    """What one channel's path is multiplied by."""
+    """Change of one channel's transfer path: a gain and modes."""
 
     gain: float = 1.0
     modes: tuple[ModeChange, ...] = ()
 
     def of(self, values: FloatArray, rate_hz: float) -> FloatArray:
-        """Return a vibration as it comes through the changed path."""
+        """Return a vibration after the changed path."""
         frequency = np.fft.rfftfreq(len(values), 1.0 / rate_hz)
         answer = np.full(len(frequency), self.gain, dtype=np.complex128)
         for mode in self.modes:
@@ -183,17 +183,17 @@ class PathChange:
 
 
 def path_size(strength: float) -> float:
-    """Return the size, 0.16 to 1, of a change of a strength from 0 to 1: as many per decade."""
+    """Return the size, 0.16 to 1, of a change of strength 0 to 1; log-uniform if the strength is uniform."""
     return float(10.0 ** (0.8 * (strength - 1.0)))
 
 
 def draw_path_changes(
     n_channels: int, size: float, rate_hz: float, rng: np.random.Generator, *, everywhere: bool = False
 ) -> Sequence[PathChange]:
-    """Draw each channel's change, of size 0 to 1; modes of a housing are the same for all, their shares are not.
+    """Draw each channel's path change, of size 0 to 1; the housing modes are common to all, their factors are not.
 
-    Logarithms, at size 1: a mode is louder or softer by 3 at most; it moves, and all of a channel is multiplied, with
-    a standard deviation of 0.3. Two changes in five are of one sensor alone, which came loose, unless `everywhere`.
+    In natural logarithms, at size 1: a mode's factor is within ±3; mode frequencies and channel gains change with a
+    standard deviation of 0.3. Unless `everywhere`, two changes in five affect a single sensor, which came loose.
     """
     modes = [
         (log_uniform(rng, 150.0, 0.45 * rate_hz), log_uniform(rng, 0.01, 0.2)) for _ in range(int(rng.integers(1, 4)))
@@ -212,7 +212,7 @@ def draw_path_changes(
 
 
 # --------------------
-# What an effect does to a vibration: modulation, advance, mesh harmonics with what surrounds them, what is added.
+# What an effect does to a vibration: modulation, advance, change of mesh harmonics and their surroundings, additions.
 # --------------------
 
 
@@ -221,7 +221,7 @@ N_MESH_HARMONICS = 6
 
 @dataclass(frozen=True)
 class Signature:
-    """What an effect does to every vibration channel: y(t) = m(t) x(t + τ(t)) + Σ of what is added.
+    """What an effect does to every vibration channel: y(t) = m(t) x(t + τ(t)) + Σ of the added signals.
 
     Parameters
     ----------
@@ -232,18 +232,18 @@ class Signature:
     added : tuple of arrays, (n,)
         In standard deviations of the channel.
     mesh_gains : tuple of float
-        By which the mesh harmonics are multiplied.
+        Factors on the mesh harmonics.
     paths_scatter : float
-        Standard deviation of the logarithm of what each channel's own mesh gains differ by.
+        Standard deviation of the logarithm of each channel's own factors on the mesh harmonics.
     around : float
-        How far sidebands and noise about a mesh harmonic change with it, 0 to 1: a force that grows takes what
-        modulates it along.
+        How far sidebands and noise about a mesh harmonic change with it, 0 to 1: the modulation of a force grows with
+        the force.
     uneven : array, (n,), or None
-        By which share the change of the harmonics is larger at some teeth than at others.
+        Relative variation from tooth to tooth of the change of the harmonics.
     paths : sequence of PathChange
-        Of each channel, for all that was there before; none: they are as ever.
+        For each channel, applied to the original vibration; empty: unchanged.
     cut_share : float
-        Of the samples, beyond a sensor's range.
+        Fraction of the samples that are beyond the sensor's range.
     """
 
     gain: FloatArray | None = None
@@ -259,7 +259,7 @@ class Signature:
     def on(
         self, values: FloatArray, scene: SyntheticScene, rng: np.random.Generator, size: float, channel: int = 0
     ) -> FloatArray:
-        """Return one channel with the signature; what is added is in units of `size`."""
+        """Return one channel with the signature; `size` scales the added signals."""
         if self.paths:
             values = self.paths[channel].of(values, scene.sampling_rate_hz)
         shown = values
@@ -277,7 +277,7 @@ class Signature:
 
 
 def _cut(values: FloatArray, share: float, rng: np.random.Generator) -> FloatArray:
-    """Return a channel without the extreme samples, on either side alike or at one level."""
+    """Return a channel with its extreme samples clipped, at equal shares on both sides or at one level."""
     if rng.uniform() < 0.5:
         low, high = np.quantile(values, (share / 2.0, 1.0 - share / 2.0))
     else:
@@ -293,7 +293,7 @@ def _at(values: FloatArray, advance_samples: FloatArray) -> FloatArray:
 
 
 def _gears_change(values: FloatArray, gains: FloatArray, signature: Signature, scene: SyntheticScene) -> FloatArray:
-    """Return what must be added for the mesh harmonics, and what surrounds them, to be larger."""
+    """Return the change of the mesh harmonics and their surroundings, to be added to the vibration."""
     around = gains**signature.around
     wide = _about_the_mesh(values, around, scene) if signature.around else values
     change = _mesh_change(wide, gains / around, scene)
@@ -301,7 +301,7 @@ def _gears_change(values: FloatArray, gains: FloatArray, signature: Signature, s
 
 
 def _about_the_mesh(values: FloatArray, gains: FloatArray, scene: SyntheticScene) -> FloatArray:
-    """Return a vibration with each segment about a mesh harmonic `gains` times as large; shaft lines as they are."""
+    """Return a vibration with the spectrum about each mesh harmonic multiplied by `gains`, shaft lines unchanged."""
     turns_hz = (scene.revolutions[-1] - scene.revolutions[0]) / (scene.time_s[-1] - scene.time_s[0])
     mesh_orders = np.fft.rfftfreq(len(values), 1.0 / scene.sampling_rate_hz) / (turns_hz * scene.teeth[0])
     logs = np.interp(mesh_orders, [0.3, *range(1, len(gains) + 1)], [0.0, *np.log(gains)])
@@ -309,7 +309,7 @@ def _about_the_mesh(values: FloatArray, gains: FloatArray, scene: SyntheticScene
 
 
 def _mesh_change(values: FloatArray, gains: FloatArray, scene: SyntheticScene) -> FloatArray:
-    """Return what must be added for the mesh harmonics to be `gains` times as large."""
+    """Return the signal that multiplies the mesh harmonics by `gains` when added."""
     change = np.zeros_like(values)
     for k, gain in enumerate(gains, start=1):
         wave = np.exp(2j * np.pi * k * scene.teeth[0] * scene.revolutions)
@@ -318,30 +318,30 @@ def _mesh_change(values: FloatArray, gains: FloatArray, scene: SyntheticScene) -
 
 
 # --------------------
-# What is drawn of a signature: sides, signs, balances, shares; and what several effects have in common.
+# Random parts of a signature (sides, signs, balances, shares), and parts common to several effects.
 # --------------------
 
 
 MAX_ADVANCE = 0.35
-"""Of a mesh period, by which a tooth comes too early or too late."""
+"""Maximum shift of a tooth's engagement, in mesh periods."""
 
 SIZES = (0.06, 2.5)
-"""Of a signature: from what nobody sees to several floors. Effects reach about as far as each other; where one ended
-before its look-alikes do, whatever is large would be one of those."""
+"""Sizes of a signature, from invisible to several times the noise floor. The range is similar for all effects: if one
+ended earlier than its look-alikes, every large change would be attributed to those."""
 
 
 def draw_side(rng: np.random.Generator) -> int:
-    """Return 0, driver, or 1, driven gear."""
+    """Return 0 (driver) or 1 (driven gear) at random."""
     return int(rng.integers(2))
 
 
 def sign(rng: np.random.Generator) -> float:
-    """Return 1 or −1."""
+    """Return 1 or −1 at random."""
     return float(rng.choice((-1.0, 1.0)))
 
 
 def balance(rng: np.random.Generator, n: int) -> FloatArray:
-    """Return n weights, the largest 1, any of the others nearly nothing."""
+    """Return n random weights, the largest 1, each of the others possibly near or at 0."""
     weights = 10.0 ** (-rng.uniform(0.0, 1.5, n))
     weights[rng.uniform(size=n) < 0.25] = 0.0
     weights[int(rng.integers(n))] = 1.0
@@ -349,19 +349,19 @@ def balance(rng: np.random.Generator, n: int) -> FloatArray:
 
 
 def steeply(rng: np.random.Generator) -> FloatArray:
-    """Return shares of the mesh harmonics that fall with their number, from nearly not to steeply."""
+    """Return shares of the mesh harmonics that decrease with their number, slightly to steeply."""
     return np.asarray(np.arange(1.0, N_MESH_HARMONICS + 1.0) ** -rng.uniform(0.2, 2.0))
 
 
 def partly(rng: np.random.Generator) -> float:
-    """Return 0, 1 or anything between."""
+    """Return 0, 1 or a random number between."""
     return float(np.clip(rng.uniform(-0.5, 1.5), 0.0, 1.0))
 
 
 def tooth_window(
     scene: SyntheticScene, side: int, width_teeth: float, rng: np.random.Generator
 ) -> tuple[FloatArray, float]:
-    """Return 1 in the middle of one tooth's mesh, 0 away from it, and that tooth's place in revolutions."""
+    """Return a window, 1 in the middle of a random tooth's mesh and 0 away from it, and its place in revolutions."""
     place, teeth = float(rng.uniform()), scene.teeth[side]
     off = (scene.revolutions * scene.shaft_orders[side] - place + 0.5) % 1.0 - 0.5
     reach = np.clip(off * teeth / width_teeth, -1.0, 1.0)
@@ -372,7 +372,7 @@ def tooth_window(
 def tooth_impacts(
     scene: SyntheticScene, side: int, place: float, scatter: float, rng: np.random.Generator, of: int = 1
 ) -> FloatArray:
-    """Return impacts when a tooth meshes, `of` of them a fraction of a pitch apart, in deviations at most 1."""
+    """Return impacts when a tooth meshes, `of` of them a fraction of a pitch apart, with a peak of 1."""
     answer, order, total = ring(scene, rng), scene.shaft_orders[side], np.zeros(len(scene.time_s))
     for _ in range(of):
         at = passings(scene, order, -place - float(rng.uniform(0.0, 0.7)) / scene.teeth[side])
@@ -381,24 +381,24 @@ def tooth_impacts(
 
 
 def swollen(share: float, window: FloatArray) -> FloatArray:
-    """Return a gain that is larger by a share where a window is 1."""
+    """Return a gain that is increased by `share` where the window is 1."""
     return np.asarray(np.maximum(1.0 + share * window, 0.0))
 
 
 def late_tooth(scene: SyntheticScene, share: float, window: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """Return the advance, in revolutions, of a tooth that comes too late or too early by a share of the most."""
+    """Return the advance, in revolutions, of a tooth that is late or early by a share of `MAX_ADVANCE`."""
     return np.asarray(sign(rng) * MAX_ADVANCE * min(share, 1.0) / scene.teeth[0] * window)
 
 
 def over_teeth(scene: SyntheticScene, side: int, of_teeth: FloatArray) -> FloatArray:
-    """Return what each tooth of a gear has, over the angle: at its mesh its own, in straight lines in between."""
+    """Return values per tooth of a gear over the angle: each tooth's at its mesh, linear in between."""
     teeth = scene.teeth[side]
     place = scene.revolutions * scene.shaft_orders[side] * teeth % teeth
     return np.asarray(np.interp(place, np.arange(teeth + 1), np.append(of_teeth, of_teeth[0])))
 
 
 def uneven(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    """Return what differs from tooth to tooth of both gears, of unit size."""
+    """Return a random variation from tooth to tooth of both gears, of unit size."""
     total = np.zeros(len(scene.time_s))
     for side, weight in zip((0, 1), rng.uniform(0.0, 1.0, 2), strict=True):
         of_teeth = rng.standard_normal(scene.teeth[side])
@@ -407,20 +407,20 @@ def uneven(scene: SyntheticScene, rng: np.random.Generator) -> FloatArray:
 
 
 def at_the_mesh(scene: SyntheticScene, noise: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """Return noise, of unit size, that swells with the mesh more or less."""
+    """Return noise of unit size, more or less modulated by the mesh."""
     swelling = 1.0 + rng.uniform(0.0, 0.9) * np.cos(2 * np.pi * scene.teeth[0] * scene.revolutions)
     return np.asarray(noise / max(float(noise.std()), 1e-12) * swelling)
 
 
 def swing(scene: SyntheticScene, order: float, size: float, rng: np.random.Generator) -> FloatArray:
-    """Return a gain that swings at an order."""
+    """Return a gain modulated at an order."""
     return np.asarray(np.maximum(1.0 + size * tone(order, scene, rng), 0.0))
 
 
 def mesh_louder(
     scene: SyntheticScene, gains: FloatArray, noise: FloatArray, scatter: float, rng: np.random.Generator
 ) -> Signature:
-    """Mesh harmonics grow, on some paths by up to e^`scatter` more, with what surrounds them; noise comes on top."""
+    """Larger mesh harmonics and surroundings, with `scatter` in logarithms between paths, and added noise."""
     return Signature(
         added=(noise,),
         mesh_gains=tuple(gains.tolist()),
@@ -433,7 +433,7 @@ def mesh_louder(
 def modulated(
     scene: SyntheticScene, order: float, swings: tuple[float, float], lines: Sequence[float], rng: np.random.Generator
 ) -> Signature:
-    """The mesh swings in size and in phase at an order, which shows with its multiples as lines as well."""
+    """Amplitude and phase modulation of the mesh at an order, with lines at that order and its multiples."""
     gain, late = swings
     return Signature(
         swing(scene, order, 0.8 * gain, rng),
@@ -443,7 +443,7 @@ def modulated(
 
 
 def race_impacts(scene: SyntheticScene, size: float, rng: np.random.Generator, name: str) -> Signature:
-    """Impacts when elements pass the defect; on the inner race louder in the load zone, that is once per turn."""
+    """Impacts when elements pass the defect; on the inner race louder in the load zone, so once per revolution."""
     bearing = scene.bearings[int(rng.integers(len(scene.bearings)))]
     order = bearing[name] * float(rng.uniform(0.985, 1.0))
     by = bearing["shaft"] if name == "BPFI" else 0.0

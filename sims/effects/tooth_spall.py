@@ -12,7 +12,7 @@ from sims.mesh import ToothSpall
 
 
 def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
-    """Return the machine with the spall, about the pitch point."""
+    """Return the machine with the spall, centred on the pitch point."""
     del rng
     width_mm = severity / 100.0 * machine.mesh.pair.face_width_mm
     length_mm, depth_um = float(options["length_mm"]), float(options["depth_um"])
@@ -21,7 +21,7 @@ def change(machine: Machine, severity: float, options: Options, rng: np.random.G
 
 
 def textbook_signature(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
-    """A pit: short blows when the flank enters and leaves it, different each time; the mesh hardly notices."""
+    """A pit: short impacts on entry and exit, different each time; the mesh hardly changes."""
     side = book.draw_side(rng)
     window, place = book.tooth_window(scene, side, float(rng.uniform(0.3, 0.8)), rng)
     blows = book.tooth_impacts(scene, side, place, float(rng.uniform(0.05, 0.4)), rng, of=2)
@@ -30,14 +30,14 @@ def textbook_signature(scene: book.SyntheticScene, size: float, rng: np.random.G
     )
 
 
-# The severity is the width and not the length: what is left of the face decides how soft the contact gets, and the
-# burst grows with it at any length. By length it does not: the blows at either end cancel at some and add at others.
+# The severity is the width, not the length: the remaining face width determines how soft the contact becomes, so the
+# burst grows with the severity at any length. With length it does not: the impacts at the two ends cancel or add.
 EFFECT = Effect(
     name="tooth_spall",
     group="tooth-local",
     title="spall on a tooth's flank",
-    severity=Severity("width_percent", "%", 0.0, 90.0, 60.0, "part of the loaded face that it takes"),
-    changes="Metal is missing on one flank about the pitch point: the flank beside it carries alone, and the contact "
+    severity=Severity("width_percent", "%", 0.0, 90.0, 60.0, "part of the loaded face that it covers"),
+    changes="Metal is missing on one flank about the pitch point: the rest of the face carries alone, and the contact "
     "is softer.",
     signature="A short burst per revolution of the gear's shaft, at the tooth's angle and while the pitch point is in "
     "mesh: shorter than a crack's, so its low, wide sidebands reach to higher frequencies, and it rings the "
@@ -57,8 +57,8 @@ EFFECT = Effect(
         85.0,
         "percent of the face; a pit of a tenth is lost in ordinary flanks, 90 is the model's limit",
         choices=lambda machine: first_teeth(machine, length_mm=0.45 * machine.nominal.module_mm),
-        # The ends of a spall are two steps: how far they lie apart decides which orders they add up or cancel at. In
-        # steps of a tenth of the module, 0.45 among them, profiles between two are their mixture, correlated by 0.95.
+        # The ends of a spall are two steps; their distance determines at which orders they add or cancel. In steps of
+        # a tenth of the module, 0.45 included, profiles in between are mixtures of their neighbours (correlation 0.95).
         further_settings=lambda machine: [
             (options, (2,))
             for length in (0.2, 0.28, 0.365, 0.55, 0.66, 0.77, 0.88, 1.0)

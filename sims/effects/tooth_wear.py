@@ -22,15 +22,15 @@ def change(machine: Machine, severity: float, options: Options, rng: np.random.G
 
 
 def on_drive(drive: DriveParameters, severity: float, options: Options) -> DriveEffect:
-    """Wear one gear's drive flanks, most at their ends and nothing at the pitch point: pairs touch later."""
+    """Wear one gear's drive flanks, most at their ends and not at the pitch point: pairs come into contact later."""
     name = f"sliding_wear_{options['gear']}_um"
     return DriveEffect({name: drive.number(name) + severity})
 
 
 def textbook_signature(scene: book.SyntheticScene, size: float, rng: np.random.Generator) -> book.Signature:
-    """A profile that is worn away from the pitch line: mesh harmonics grow, the higher the more; rough flanks.
+    """A profile worn away from the pitch line: mesh harmonics grow, the higher ones more, and flanks become rough.
 
-    What modulates the mesh grows less than the mesh does: all alike would be another path.
+    The modulation of the mesh grows less than the mesh itself; equal growth of both would be a changed path.
     """
     gains = 1.0 + 8.0 * size * np.abs(rng.standard_normal(book.N_MESH_HARMONICS)) * book.steeply(rng)[::-1]
     noise = size * rng.uniform() ** 2 * book.at_the_mesh(scene, book.band_noise(scene, rng), rng)
@@ -41,13 +41,13 @@ EFFECT = Effect(
     name="tooth_wear",
     group="flank",
     title="worn flanks",
-    severity=Severity("depth_um", "um", 0.0, 200.0, 15.0, "greatest depth of wear on the flank; adds to wear there is"),
-    changes="Every flank of one gear loses metal where it slides: nothing at the pitch point, most towards root and "
-    "tip, by Archard's law.",
-    signature="Mesh harmonics, alike on every tooth: no sidebands and no pulse, the same shape in every mesh period. "
-    "On teeth without relief the first micrometres act as one and quieten the mesh; beyond, every harmonic grows. "
-    "Strongest at light load, where deflection no longer covers the worn shape. A path that passes other frequencies "
-    "better looks alike: ratios at another load tell.",
+    severity=Severity("depth_um", "um", 0.0, 200.0, 15.0, "maximum depth of wear on the flank; adds to existing wear"),
+    changes="Every flank of one gear loses metal where it slides: none at the pitch point, most towards root and tip, "
+    "by Archard's law.",
+    signature="Mesh harmonics, the same on every tooth: no sidebands and no pulse, the same shape in every mesh "
+    "period. On teeth without relief the first micrometres act as relief and quieten the mesh; beyond that, every "
+    "harmonic grows. Strongest at light load, where deflection no longer covers the worn shape. A path that passes "
+    "other frequencies better looks similar; ratios at another load distinguish them.",
     shows_in=("mesh_harmonics",),
     change=change,
     options=(GEAR_OPTION,),

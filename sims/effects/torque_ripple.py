@@ -13,7 +13,7 @@ from sims.machine import Machine, TorqueRipple, log_uniform
 
 
 def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
-    """Return the machine with one more ripple."""
+    """Return the machine with a further torque ripple."""
     ripple = TorqueRipple(float(options["order"]), severity / 100.0, float(rng.uniform(0.0, 2.0 * pi)))
     return replace(machine, drive=replace(machine.drive, ripples=(*machine.drive.ripples, ripple)))
 
@@ -25,16 +25,16 @@ def on_drive(drive: DriveParameters, severity: float, options: Options) -> Drive
 
 
 def _any_order(rng: np.random.Generator) -> float:
-    """Whole orders of motors and pumps twice as often as any order of something geared or belted to the drive."""
+    """Draw an integer order of a motor or pump, or, half as often, any order of a geared or belted part."""
     if rng.uniform() < 2.0 / 3.0:
         return float(rng.choice((1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0)))
     return float(rng.uniform(1.5, 16.0))
 
 
 def textbook_signature(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
-    """The drive pulls n times per turn: that line, and sidebands of the mesh so far apart."""
+    """The drive torque pulses n times per revolution: a line at that order, and mesh sidebands at that spacing."""
     shaft = scene.shaft_orders[draw_side(rng)]
-    pulls = log_uniform(rng, 1.5, 15.0)  # motors and engines pull twice to six times rather than fifteen times
+    pulls = log_uniform(rng, 1.5, 15.0)  # two to six pulses are more common than fifteen in motors and engines
     order = shaft * (float(round(pulls)) if rng.uniform() < 0.75 else pulls)
     gain, late, line = balance(rng, 3)
     return modulated(scene, order, (gain * size, late * size), (size * max(line, 0.2),), rng)
@@ -44,11 +44,11 @@ EFFECT = Effect(
     name="torque_ripple",
     group="drive and load",
     title="ripple of the drive's torque",
-    severity=Severity("amplitude_percent", "%", 0.0, 50.0, 5.0, "amplitude of the ripple over the torque"),
+    severity=Severity("amplitude_percent", "%", 0.0, 50.0, 5.0, "amplitude relative to the torque"),
     changes="The drive torque is multiplied by 1 + severity·cos(order·θ + φ), θ the angle of the input rotor and φ "
     "drawn.",
     signature="One line at the ripple's order of the input shaft, in torque, speed and vibration, and weak sidebands "
-    "of that distance about the mesh harmonics. Proportional to the torque; at the same order at every speed, highest "
+    "at that spacing about the mesh harmonics. Proportional to the torque; at the same order at every speed, highest "
     "where that order meets a torsional resonance.",
     shows_in=("shaft_orders", "mesh_sidebands", "speed"),
     change=change,
@@ -64,7 +64,7 @@ EFFECT = Effect(
     plausible=PlausibleRange(
         2.0,
         30.0,
-        "percent: inverters give 1 to 5, piston engines and pumps tens",
+        "percent: inverters cause 1 to 5, piston engines and pumps tens",
         choices=lambda _machine: [{"order": order} for order in (1.0, 2.0, 3.0, 4.0, 6.0)],
         drawn=lambda _machine, rng: {"order": _any_order(rng)},
     ),

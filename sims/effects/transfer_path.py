@@ -14,7 +14,7 @@ from sims.measure import MeasuredChannel, ModalPath, PathMode
 
 
 def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
-    """Return the machine with the mode in the path of every channel."""
+    """Return the machine with a further mode in the path of every channel."""
     del rng
     frequency_hz, damping_ratio = float(options["frequency_hz"]), float(options["damping_ratio"])
 
@@ -30,7 +30,7 @@ def change(machine: Machine, severity: float, options: Options, rng: np.random.G
 
 
 def static_gains(path: ModalPath) -> dict[str, float]:
-    """Return what a path passes well below its modes, d + Σ g, by position."""
+    """Return the gain of a path well below its modes, d + Σ g, by position."""
     total = dict(path.direct)
     for mode in path.modes:
         for position, gain in mode.gains.items():
@@ -45,11 +45,11 @@ EFFECT = Effect(
     severity=Severity(
         "amplification", "", 0.0, 50.0, 5.0, "what the mode adds at its frequency, in multiples of the gain far below"
     ),
-    changes="The path from bearings to sensor has one more mode, alike in every channel. As modes add up, it also "
+    changes="The path from bearings to sensor has one more mode, the same in every channel. As modes add up, it also "
     "adds 2ζ times the severity to the gain below its frequency.",
-    signature="Whatever passes the band about its frequency is raised, in hertz and whatever the speed: over several "
-    "speeds a vertical ridge. Mesh harmonics and floor alike, ratios of neighbouring lines hardly; no new order, no "
-    "change of a tooth's share. Levels differ where a gear fault would differ in orders.",
+    signature="Everything in the band about its frequency is raised, at the same frequency whatever the speed: a "
+    "vertical ridge over several speeds. Mesh harmonics and floor rise alike, and ratios of neighbouring lines hardly "
+    "change; no new order, no change of a tooth's share. Levels change where a gear fault would change orders.",
     shows_in=("resonances", "broadband", "mesh_harmonics"),
     change=change,
     options=(
@@ -59,7 +59,7 @@ EFFECT = Effect(
     plausible=PlausibleRange(
         2.0,
         20.0,
-        "amplification: a well damped to a sharp resonance",
+        "amplification: from a well-damped to a sharp resonance",
         choices=lambda _machine: [{"frequency_hz": frequency_hz} for frequency_hz in (1200.0, 3500.0)],
         drawn=lambda _machine, rng: {
             "frequency_hz": log_uniform(rng, 400.0, 7000.0),

@@ -13,7 +13,7 @@ from sims.effects.textbook import UP, Signature, SyntheticScene, Textbook, draw_
 from sims.machine import Machine, usual_mass_kg
 
 _LARGEST_OFFSET = 0.1
-"""Of the centre of mass, in pitch radii; a gear further out of balance has lost a piece."""
+"""Maximum offset of the centre of mass, in pitch radii; beyond it, the gear must have lost a piece."""
 
 
 def change(machine: Machine, severity: float, options: Options, rng: np.random.Generator) -> Machine:
@@ -28,7 +28,7 @@ def change(machine: Machine, severity: float, options: Options, rng: np.random.G
 
 
 def _mesh_force_g_mm(machine: MachineFacts, options: Options) -> float:
-    """Unbalance whose force at the nominal speed is the static mesh force."""
+    """Unbalance whose force at the nominal speed equals the static mesh force."""
     omega = machine.nominal.speed_rpm * np.pi / 30.0
     if parts.gear_index(options) == 1:
         omega *= machine.nominal.teeth[0] / machine.nominal.teeth[1]
@@ -42,7 +42,7 @@ def _largest_g_mm(machine: MachineFacts, options: Options) -> float:
 
 
 def textbook_signature(scene: SyntheticScene, size: float, rng: np.random.Generator) -> Signature:
-    """A force that turns with the shaft: its line, and hardly a sideband; a large one bends what holds the shaft."""
+    """A force rotating with the shaft: order 1 and hardly any sideband; a large one deflects the supports."""
     order = scene.shaft_orders[draw_side(rng)]
     force = size * 10.0 ** rng.uniform(0.0, 0.8)
     lines = force * np.array([1.5, 0.15 * partly(rng), 0.15 * partly(rng)])
@@ -57,19 +57,19 @@ EFFECT = Effect(
     severity=Severity(
         "unbalance_g_mm", "g mm", 0.0, 1e5, 500.0, "mass times distance of the centre of mass from the axis"
     ),
-    changes="A force of unbalance times speed squared turns with the gear; it adds as a vector to the unbalance there "
-    "is.",
-    signature="Order 1 of that gear's shaft, alike in both directions across the shaft; its force grows with the "
+    changes="A force of unbalance times speed squared rotates with the gear; the unbalance adds as a vector to any "
+    "existing one.",
+    signature="Order 1 of that gear's shaft, equal in both directions across the shaft; its force grows with the "
     "square of the speed (the acceleration below resonance with the fourth power) and not with the load. Hardly any "
-    "transmission error, which tells it from eccentricity; weak sidebands z ± 1, as the mesh force acts off the centre "
-    "of mass. Faint at low speed.",
+    "transmission error, which distinguishes it from eccentricity; weak sidebands z ± 1, as the mesh force acts off "
+    "the centre of mass. Faint at low speed.",
     shows_in=("shaft_orders",),
     change=change,
     options=(GEAR_OPTION, parts.ANGLE_OPTION),
     plausible=PlausibleRange(
         0.01,
         0.15,
-        "its force at the nominal speed over the static mesh force; less is lost beside the mesh",
+        "its force at the nominal speed over the static mesh force; less is hidden by the mesh",
         _mesh_force_g_mm,
         parts.either_gear,
         parts.any_gear,

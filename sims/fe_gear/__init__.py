@@ -1,7 +1,7 @@
-"""A spur gear of three-dimensional finite elements: mesh, modes, stress, cracks, reduction to few coordinates.
+"""A spur gear in three-dimensional finite elements: mesh, modes, stress, cracks, and reduction to few coordinates.
 
-A `GearBlank` is meshed sector by sector (`sector_mesh`); `cyclic_modes` and `stress_pa` look at the whole body,
-`open_crack` opens its mesh, `craig_bampton` and `reduce_gear` reduce it. `cached_gear` keeps reduced gears.
+A `GearBlank` is meshed sector by sector (`sector_mesh`). `cyclic_modes` and `stress_pa` analyse the body, `open_crack`
+opens a crack in its mesh, `craig_bampton` and `reduce_gear` reduce it, and `cached_gear` keeps reduced gears.
 """
 
 from sims.fe_gear._blank import (

@@ -38,12 +38,12 @@ from sims.fe_gear._reduced_gear import (
 
 
 class Masters(NamedTuple):
-    """Masters besides the six of the hub, which always come first.
+    """Masters in addition to the six of the hub, which always come first.
 
     Attributes
     ----------
     rows : array, (n_rows, n_own_dof)
-        Different rows over a sector's own degrees of freedom.
+        Distinct rows over a sector's own degrees of freedom.
     row_of : array of int, (n,)
         Row of each master.
     tooth_of : array of int, (n,)
@@ -56,19 +56,19 @@ class Masters(NamedTuple):
 
     @property
     def n_masters(self) -> int:
-        """With the hub's."""
+        """Number of masters, including those of the hub."""
         return N_HUB + len(self.row_of)
 
 
 def contact_masters(gear: CyclicGear, teeth: Sequence[int] = (0, 1, 2, 3), n_slices: int = 5) -> Masters:
-    """Contact patches in the middle of the flanks of some teeth: per slice the motion along the push, the flank and z.
+    """Contact patches in the middle of some teeth's flanks: for each slice the motion along the push, the flank and z.
 
     Parameters
     ----------
     gear : CyclicGear
     teeth : sequence of int
     n_slices : int
-        At most as many as there are layers of nodes along the face: more could not move independently.
+        At most the number of node layers along the face: more could not move independently.
 
     Raises
     ------
@@ -101,10 +101,10 @@ def contact_masters(gear: CyclicGear, teeth: Sequence[int] = (0, 1, 2, 3), n_sli
 
 
 def with_auxiliary(gear: CyclicGear, masters: Masters, modes: CyclicModes, n_nodes: int) -> Masters:
-    """Add the nodes of the whole gear that tell its modes apart best, three degrees of freedom each.
+    """Add the nodes of the whole gear that best distinguish its modes, with three degrees of freedom each.
 
-    One after the other, the node that most increases det(Q), Q = Σ over masters of aᵀa, a a master's motion in the
-    modes (each scaled to its largest motion).
+    Each node in turn is the one that most increases det(Q), Q = Σ over masters of aᵀa, where a is a master's motion in
+    the modes (each scaled to its maximum).
 
     Source: D. C. Kammer, Sensor placement for on-orbit modal identification and correlation of large space structures,
     Journal of Guidance, Control, and Dynamics 14 (1991), for the determinant as the criterion.
@@ -129,7 +129,7 @@ def with_auxiliary(gear: CyclicGear, masters: Masters, modes: CyclicModes, n_nod
 
 
 def phased_rows(masters: Masters, gear: CyclicGear, n: int) -> tuple[ComplexArray, ComplexArray]:
-    """Rows of nodal diameter n and how masters follow from them.
+    """Rows for nodal diameter n, and the matrix that gives the masters from them.
 
     Returns
     -------
@@ -176,10 +176,10 @@ def motion_at(masters: Masters, gear: CyclicGear, modes: CyclicModes) -> FloatAr
     return real_values(np.column_stack(columns), modes.multiplicity(gear.n_sectors))
 
 
-# How well a reduced gear keeps the modes of the full model.
+# Accuracy of a reduced gear's modes against the full model.
 
 SAME_HZ = 1e-3
-"""Relative: modes of the full model this close are one subspace; within it errors of this size turn the vectors."""
+"""Relative distance within which modes of the full model form one subspace; errors of this size rotate its vectors."""
 
 
 @dataclass(frozen=True)
@@ -190,10 +190,10 @@ class ReductionAccuracy:
     ----------
     full_hz, reduced_hz : array, (n,)
     subspace_mac : array, (n,)
-        Least squared cosine, weighted by mass, between the subspace of equal frequencies (to 0.1 %) that a full mode
-        belongs to and the reduced modes of that frequency: 1 where the reduced model holds it.
+        Minimum squared cosine, weighted by mass, between the full mode's subspace of equal frequencies (to 0.1 %) and
+        the reduced modes of that frequency: 1 if the reduced model contains it.
     rigid_hz : array, (6,)
-        Of the reduced model; 0 if nothing holds the gear.
+        Of the reduced model; 0 for a free gear.
     """
 
     full_hz: FloatArray
@@ -208,12 +208,12 @@ class ReductionAccuracy:
 
     @property
     def worst_error(self) -> float:
-        """Largest of them without sign."""
+        """Maximum absolute error."""
         return float(np.abs(self.errors).max())
 
     @property
     def minimum_mac(self) -> float:
-        """Of all modes compared."""
+        """Minimum over all compared modes."""
         return float(self.subspace_mac.min())
 
     def table(self) -> str:
@@ -226,7 +226,7 @@ class ReductionAccuracy:
 def matched(
     full_hz: FloatArray, reduced_hz: FloatArray, products: FloatArray, *, rigid_hz: FloatArray
 ) -> ReductionAccuracy:
-    """Compare modes place by place.
+    """Compare full and reduced modes in order of frequency.
 
     Parameters
     ----------
@@ -259,23 +259,23 @@ def matched(
 # Craig–Bampton reduction of a whole gear with selected masters, by cyclic symmetry.
 
 N_COMPARED = 20
-"""Elastic modes in the table of errors."""
+"""Number of elastic modes in the table of errors."""
 
 
 @dataclass(frozen=True)
 class CraigBamptonPlan:
-    """What is kept.
+    """Size of a Craig–Bampton reduction.
 
     Parameters
     ----------
     n_dof : int
         Of the reduced gear: masters and fixed-interface modes.
     n_teeth, n_slices : int
-        Contact patches, three degrees of freedom each; four teeth and five slices make 60, with the hub 66 masters.
+        Contact patches, three degrees of freedom each; four teeth and five slices give 60, with the hub 66 masters.
     n_auxiliary : int
         Auxiliary nodes, three degrees of freedom each.
     n_shapes : int
-        Shapes of each nodal diameter, from which the fixed-interface modes are built; z times as many in all.
+        Shapes for each nodal diameter from which the fixed-interface modes are built; z times as many in all.
     """
 
     n_dof: int = 229
@@ -293,13 +293,13 @@ class CraigBamptonPlan:
 
     @property
     def n_masters(self) -> int:
-        """Hub, contact patches, auxiliary nodes."""
+        """Masters of hub, contact patches and auxiliary nodes."""
         return N_HUB + 3 * (self.n_teeth * self.n_slices + self.n_auxiliary)
 
 
 @dataclass(frozen=True)
 class CraigBamptonGear:
-    """A gear reduced to master degrees of freedom and fixed-interface modes; free, without damping.
+    """A free, undamped gear reduced to master degrees of freedom and fixed-interface modes.
 
     Parameters
     ----------
@@ -317,7 +317,7 @@ class CraigBamptonGear:
 
 
 class _Space(NamedTuple):
-    """What the whole gear, sprung at its hub, tells of its modes φ and of static answers s_b to forces on the masters.
+    """Modes φ of the whole gear on hub springs, and static responses to forces on the masters.
 
     Attributes
     ----------
@@ -328,9 +328,9 @@ class _Space(NamedTuple):
     compliance : array, (m, m)
         B K⁻¹ Bᵀ.
     inertia : array, (m, m)
-        B K⁻¹ M K⁻¹ Bᵀ, the mass matrix of the static answers.
+        B K⁻¹ M K⁻¹ Bᵀ, the mass matrix of the static responses.
     with_modes, with_static : arrays, (r, p) and (r, m)
-        Mass products of the full model's reference modes with φ and with the static answers.
+        Mass products of the full model's reference modes with φ and with the static responses.
     """
 
     squares: FloatArray
@@ -342,7 +342,7 @@ class _Space(NamedTuple):
 
 
 class _Targets(NamedTuple):
-    """Elastic modes of the free gear that the reduction has to keep: frequencies, and motion of the masters (m, r)."""
+    """Elastic modes of the free gear that the reduction must keep: frequencies, and motion of the masters (m, r)."""
 
     frequencies_hz: FloatArray
     at_masters: FloatArray
@@ -358,12 +358,12 @@ def craig_bampton(
 ) -> CraigBamptonGear:
     """Reduce a gear to masters and fixed-interface modes, and compare its first elastic modes with the full model.
 
-    u = Ψ u_m + Y η;  Ψ: static answers to unit motions of the masters, Y: modes with the masters held.
+    u = Ψ u_m + Y η;  Ψ: static responses to unit motions of the masters, Y: modes with the masters fixed.
 
     Everything follows from solutions of one sector. Ψ is exact. The fixed-interface modes are those of the full model
-    within the space of its lowest z·n_shapes modes (hub on springs, which are taken off afterwards) and Ψ. Those are
-    kept that the first elastic modes of the gear need most, not those of lowest frequency: tooth by tooth there are
-    many of these that do not take part.
+    within the space of its lowest z·n_shapes modes (hub on springs, which are removed afterwards) and Ψ. The modes kept
+    are those that the first elastic modes of the gear need most, not those of lowest frequency, many of which are modes
+    of single teeth that do not contribute.
 
     Parameters
     ----------
@@ -376,7 +376,7 @@ def craig_bampton(
     Raises
     ------
     InputError
-        If there are more slices than layers of nodes, or the memory does not suffice.
+        If there are more slices than node layers, or memory is insufficient.
 
     Source: R. R. Craig, M. C. C. Bampton, Coupling of substructures for dynamic analyses, AIAA Journal 6 (1968).
     """
@@ -398,7 +398,7 @@ def craig_bampton(
 
 
 def _hub_springs(mesh: SectorMesh) -> FloatArray:
-    """Springs about as stiff as the body: they only make the matrices definite."""
+    """Hub springs about as stiff as the body, which only make the matrices definite."""
     b = mesh.blank
     stiffness = 0.1 * b.material.youngs_modulus_pa * b.geometry.face_width_mm * 1e-3
     turning = stiffness * (b.geometry.bore_mm * 1e-3) ** 2
@@ -435,7 +435,7 @@ def _space(gear: CyclicGear, masters: Masters, reference: CyclicModes, n_shapes:
 
 
 def _reduced(space: _Space, masters: Masters, springs: FloatArray, targets: _Targets, n_dof: int) -> CraigBamptonGear:
-    """Matrices in (u_m, η); y = φ − Ψ Bφ are motions with the masters held."""
+    """Matrices in (u_m, η); y = φ − Ψ Bφ are motions with the masters fixed."""
     from scipy.linalg import eigh
 
     c = space.at_masters
@@ -465,10 +465,10 @@ def _reduced(space: _Space, masters: Masters, springs: FloatArray, targets: _Tar
 
 
 def _needed(squares: FloatArray, coupled: FloatArray, targets: _Targets, n_modes: int) -> IntArray:
-    """Places of the fixed-interface modes without which a target would be missed most, ascending.
+    """Indices of the fixed-interface modes whose absence would cause the largest errors of targets, ascending.
 
-    Without mode i, coupled to the masters by c_i, the square of target j's frequency is off by about
-    ω_j⁴ (c_iᵀ x_j)²/|λ_i − ω_j²|, x_j the masters' motion in it.
+    Without mode i, coupled to the masters by c_i, the error of target j's squared frequency is about
+    ω_j⁴ (c_iᵀ x_j)²/|λ_i − ω_j²|, with x_j the masters' motion in it.
     """
     away = np.abs(squares[:, None] - targets.squares)
     missed = (coupled @ targets.at_masters) ** 2 * targets.squares / away
@@ -476,7 +476,7 @@ def _needed(squares: FloatArray, coupled: FloatArray, targets: _Targets, n_modes
 
 
 def _definite_modes(stiffness: FloatArray, mass: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """All modes in the part of the space where the mass is well above rounding."""
+    """All modes in the subspace where the mass is well above rounding."""
     from scipy.linalg import eigh
 
     weights, axes = eigh(mass)
@@ -487,13 +487,13 @@ def _definite_modes(stiffness: FloatArray, mass: FloatArray) -> tuple[FloatArray
 
 
 def _references(modes: CyclicModes, n: int, z: int) -> list[tuple[int, ComplexArray]]:
-    """Place among the real reference modes, and shape, of those of nodal diameter n."""
+    """Index among the real reference modes, and shape, of those with nodal diameter n."""
     starts = np.concatenate(([0], np.cumsum(modes.multiplicity(z))))
     return [(int(starts[k]), modes.shapes[:, k]) for k in np.flatnonzero(modes.nodal_diameters == n)]
 
 
 def _add_products(into: FloatArray, place: int, shape: ComplexArray, moved: ComplexArray, pair: bool) -> None:
-    """Mass products with static answers, whose n-th wave is U/z: Re(VᴴMU) and −Im(VᴴMU)."""
+    """Mass products with static responses, whose n-th wave is U/z: Re(VᴴMU) and −Im(VᴴMU)."""
     product = shape.conj() @ moved
     into[place] = product.real
     if pair:

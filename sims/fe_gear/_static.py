@@ -1,4 +1,4 @@
-"""A gear under a static load: displacement, stress; how far a mesh is from a finer one; files for other programs."""
+"""A gear under a static load: displacement and stress, comparison with a finer mesh, files for other programs."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from sims.fe_gear._cyclic import ComplexArray, CyclicGear, CyclicModes, Held, cy
 from sims.fe_gear._mesh import IntArray, SectorMesh, cell_gradients_at_nodes, lame_pa, sector_mesh
 from sims.fe_gear._reduced_gear import FlankGrid, Spread, flank_rows
 
-# One tooth pushed by a static force: displacement and von Mises stress of the gear.
+# One tooth under a static force: displacement and von Mises stress of the gear.
 
 
 @dataclass(frozen=True)
 class ToothLoad:
-    """A gear, its bore held, with a force on one flank of tooth 0.
+    """A gear with fixed bore and a force on one flank of tooth 0.
 
     Parameters
     ----------
@@ -30,9 +30,9 @@ class ToothLoad:
         Of every sector.
     force_n : float
     roll_rad : float
-        Where on the flank.
+        Roll angle of the loaded point.
     displacement_m : array, (n_teeth, n_nodes, 3)
-        x, y, z in the axes of each sector (x through its tooth's middle).
+        x, y, z in the axes of each sector (x through the middle of its tooth).
     push_m : float
         Motion of the flank point along the force.
     """
@@ -44,14 +44,14 @@ class ToothLoad:
     push_m: float
 
     def von_mises_pa(self, tooth: int = 0) -> FloatArray:
-        """Von Mises stress at the nodes of a sector, (n_nodes,): mean over the cells that meet there."""
+        """Von Mises stress at the nodes of a sector, (n_nodes,): mean over adjacent cells."""
         return von_mises_pa(self.mesh, self.displacement_m[tooth])
 
 
 def load_tooth(
     mesh: SectorMesh, force_n: float, roll_rad: float | None = None, *, flank: int = 0, spread: Spread = "patch"
 ) -> ToothLoad:
-    """Push a tooth along its flank's normal, evenly over the face width, with every node of the bore held.
+    """Load a tooth normal to its flank, uniformly over the face width, with all nodes of the bore fixed.
 
     Parameters
     ----------
@@ -63,13 +63,13 @@ def load_tooth(
     flank : int
         0 or 1.
     spread : str
-        What the force acts on; see `ReducedGear`. A "patch" shows the stress near the contact only roughly: the strip
-        is wider than a Hertzian contact.
+        Distribution of the force; see `ReducedGear`. With a "patch" the stress near the contact is only approximate, as
+        the strip is wider than a Hertzian contact.
     """
     g = mesh.blank.geometry
     force = positive(force_n, "force_n", "N")
     roll = (g.form_roll_rad + g.tip_roll_rad) / 2.0 if roll_rad is None else roll_rad
-    within(roll, "roll_rad", g.form_roll_rad, g.tip_roll_rad, "rad", remedy="take a point of the involute")
+    within(roll, "roll_rad", g.form_roll_rad, g.tip_roll_rad, "rad", remedy="take a point on the involute")
     within(flank, "flank", 0, 1)
     gear = CyclicGear(mesh)
     grid = FlankGrid(np.array([roll]), np.array([0.0]))
@@ -83,7 +83,7 @@ def load_tooth(
 
 
 def stress_pa(mesh: SectorMesh, displacement_m: FloatArray) -> FloatArray:
-    """Stress tensor at the nodes, σ = λ tr(ε) 1 + 2μ ε, mean over the cells that meet there.
+    """Stress tensor at the nodes, σ = λ tr(ε) 1 + 2μ ε, mean over adjacent cells.
 
     Parameters
     ----------
@@ -94,8 +94,8 @@ def stress_pa(mesh: SectorMesh, displacement_m: FloatArray) -> FloatArray:
     Returns
     -------
     array, (n_nodes, 3, 3)
-        Pa, in the axes of the sector. Stresses are taken at the nodes of each cell and averaged there; those of
-        eight-node cells leave out what their incompatible modes add.
+        Pa, in the axes of the sector. Stresses are evaluated at the nodes of each cell and averaged there; those of
+        eight-node cells omit the contribution of their incompatible modes.
     """
     lam, mu = lame_pa(mesh.blank.material)
     nodes = mesh.cells.reshape(len(mesh.cells), -1)
@@ -131,15 +131,15 @@ def polar_stress_pa(mesh: SectorMesh, displacement_m: FloatArray) -> dict[str, F
 
 
 def modal_load(gear: CyclicGear, modes: CyclicModes, load: ToothLoad) -> FloatArray:
-    """Answer to a force on a tooth by modes alone, u = Σ φ (φᵀ f)/ω², at all nodes, (n_teeth, n_nodes, 3).
+    """Displacement under a force on a tooth from modes alone, u = Σ φ (φᵀ f)/ω², at all nodes, (n_teeth, n_nodes, 3).
 
-    What a reduction by its lowest modes without the static rest would give, to be compared with `load_tooth`.
+    This is the result of a reduction to the lowest modes without static residual, for comparison with `load_tooth`.
 
     Parameters
     ----------
     gear : CyclicGear
     modes : CyclicModes
-        With the bore held, as `load` is.
+        With fixed bore, as in `load`.
     load : ToothLoad
         Over a patch.
     """
@@ -155,20 +155,20 @@ def modal_load(gear: CyclicGear, modes: CyclicModes, load: ToothLoad) -> FloatAr
     return total
 
 
-# How far a mesh is from a finer one: natural frequencies and the compliance of a tooth.
+# Discretisation error against a finer mesh: natural frequencies and the compliance of a tooth.
 
 FINER_DOF = 150_000
-"""Of the mesh that coarser ones are compared with; its own first frequency is 0.2 % above that of a million."""
+"""Degrees of freedom of the finer mesh; its first frequency is 0.2 % above that with a million."""
 
 
 class DiscretisationError(NamedTuple):
-    """A mesh against a finer one.
+    """Errors of a mesh relative to a finer one.
 
     Attributes
     ----------
     finer_dof : int
     frequency : array, (n,)
-        Relative error of each frequency, of modes with the same nodal diameters in the same order.
+        Relative error of each frequency; modes are matched by nodal diameter and rank.
     compliance : float
         Relative error of the tooth's compliance under the same force.
     """
@@ -186,9 +186,9 @@ def discretisation_error(
     Parameters
     ----------
     gear : CyclicGear
-        Coarser than that.
+        With a coarser mesh.
     modes : CyclicModes
-        Of it, as `cyclic_modes` found them with `held` and `elastic`.
+        Its modes from `cyclic_modes` with `held` and `elastic`.
     load : ToothLoad
     held : str
     elastic : bool
@@ -205,7 +205,7 @@ def discretisation_error(
 
 
 def _by_diameter(modes: CyclicModes) -> dict[tuple[int, int], float]:
-    """Frequencies by nodal diameters and rank among those with as many; rigid motions left out."""
+    """Frequencies by nodal diameter and rank within it, without rigid motions."""
     counts: Counter[int] = Counter()
     frequencies = {}
     for hertz, n in zip(modes.frequencies_hz, modes.nodal_diameters, strict=True):
@@ -218,7 +218,7 @@ def _by_diameter(modes: CyclicModes) -> dict[tuple[int, int], float]:
 # Meshes, modes and stresses for other finite-element programs, through meshio.
 
 SUFFIXES = (".vtu", ".vtk")
-"""Formats that hold 27-node cells."""
+"""Formats that support 27-node cells."""
 
 _CORNERS = np.array([[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0], [0, 0, 2], [2, 0, 2], [2, 2, 2], [0, 2, 2]])
 _EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
@@ -226,16 +226,16 @@ _FACES = np.array([[0, 1, 1], [2, 1, 1], [1, 0, 1], [1, 2, 1], [1, 1, 0], [1, 1,
 
 
 def write_vtk(path: str | Path, mesh: SectorMesh, values: Mapping[str, FloatArray] | None = None) -> Path:
-    """Write a gear, with values at their nodes, as hexahedra of 27 nodes (VTK type 29) or eight (12).
+    """Write a gear, with values at its nodes, as hexahedra of 27 nodes (VTK type 29) or eight (12).
 
     Parameters
     ----------
     path : path
-        Ends in .vtu or .vtk.
+        With the extension .vtu or .vtk.
     mesh : SectorMesh
     values : mapping or None
         Name → array of (n_teeth, n_nodes) or (n_teeth, n_nodes, 3), e.g. displacement in m, stress in Pa; vectors in
-        the axes of each sector, turned here. Nodes that two sectors share are written once.
+        the axes of each sector, rotated here. Nodes shared by two sectors are written once.
 
     Returns
     -------
@@ -244,7 +244,7 @@ def write_vtk(path: str | Path, mesh: SectorMesh, values: Mapping[str, FloatArra
     Raises
     ------
     InputError
-        If the name has another ending, an array has another shape, or the file cannot be written.
+        If the name has another extension, an array has another shape, or the file cannot be written.
     """
     import meshio
     from scipy.spatial.transform import Rotation
@@ -269,7 +269,7 @@ def write_vtk(path: str | Path, mesh: SectorMesh, values: Mapping[str, FloatArra
 
 
 def _vtk_order() -> IntArray:
-    """Places in `SectorMesh.cells`, raveled, of VTK's nodes: corners, edges, faces, middle."""
+    """Indices in the raveled `SectorMesh.cells` of VTK's nodes: corners, edges, faces, middle."""
     edges = np.array([(_CORNERS[a] + _CORNERS[b]) // 2 for a, b in _EDGES])
     order: IntArray = np.vstack((_CORNERS, edges, _FACES, [[1, 1, 1]])) @ np.array([9, 3, 1])
     return order

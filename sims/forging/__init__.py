@@ -1,4 +1,4 @@
-"""The forging manipulator's rotary drive: starts and stops, backlash, impacts, stick–slip."""
+"""The forging manipulator's rotary drive: starts and stops, backlash, impacts and stick–slip."""
 
 from sims.forging._drive import (
     MODES,

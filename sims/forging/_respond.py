@@ -1,4 +1,4 @@
-"""Run the drive and return what it does: angles, torque, interaction force, every contact; and how it is integrated."""
+"""Run the drive: angles, torque, interaction force, every contact; and the time integration."""
 
 # mypy: allow-untyped-defs, allow-untyped-calls
 
@@ -21,10 +21,10 @@ from gearsig.rig import damping_ratio_s_per_m
 from sims.forging._drive import CONTINUOUS, Cycle, ForgingDrive, Schedule, schedule
 from sims.machine import Profile
 
-# The drive as plain numbers, which compiled code reads.
+# The drive as plain numbers for compiled code.
 
 STATES = ("θ1", "ω1", "q", "q̇", "tooth bristle A", "tooth bristle B", "motor bristle", "load bristle")
-"""What is integrated: angle and speed of the pinion, compression and its rate, four bristles; then three energies."""
+"""Integrated states: angle and speed of the pinion, compression and its rate, four bristles; then three energies."""
 ENERGIES = ("work put in", "lost in contact", "lost in friction")
 N_STATES = len(STATES) + len(ENERGIES)
 
@@ -34,13 +34,13 @@ SIGNALS = (
     "torque", "interaction force", "compression", "compression rate", "pairs in contact", "tooth friction",
     "motor torque", "energy", "work put in", "lost in contact", "lost in friction",
 )  # fmt: skip
-"""What a run returns, in rad, s, N m, N, m, J. "torque" is that of a sensor between motor and pinion."""
+"""Signals of a run, in rad, s, N m, N, m, J. "torque" is that of a sensor between motor and pinion."""
 
 CONTACT_COLUMNS = (
     "start_s", "flank", "start_speed_mps", "pitch", "driver_angle_rad", "end_s", "end_speed_mps", "peak_force_n",
     "lost_j", "is_latched_at_floor",
 )  # fmt: skip
-"""What is kept of every contact: from when its flanks touched to when they parted (nan: still touching)."""
+"""Data of every contact, from the time its flanks touch to the time they separate (nan: still in contact)."""
 
 _FIELDS = (
     "motor_inertia", "pinion_inertia", "wheel_inertia", "rb1", "rb2", "half_backlash", "stiffness", "exponent",
@@ -56,7 +56,7 @@ N_WEAR = 65
 RECORD = np.dtype(
     [(name, np.float64) for name in _FIELDS] + [(name, np.float64, (N_WEAR,)) for name in ("wear", "wear_slope")]
 )
-"""Numbers in SI units by name; compiled code reads them as attributes."""
+"""Fields in SI units; compiled code reads them as attributes."""
 
 
 def drive_numbers(drive: ForgingDrive) -> Any:
@@ -98,17 +98,18 @@ def drive_numbers(drive: ForgingDrive) -> Any:
 
 
 TOLERANCE = 1e-6
-"""Relative error of a step; absolute errors of the states go with it."""
+"""Relative error of a step; the absolute errors of the states scale with it."""
 ABSOLUTE = np.array([1e-8, 1e-6, 1e-10, 1e-7, 1e-4, 1e-4, 1e-4, 1e-4])
-"""At `TOLERANCE`, in rad, rad/s, m, m/s, and bristles in their sliding friction; a loaded flank yields 2e-5 m."""
+"""Absolute errors at `TOLERANCE`, in rad, rad/s, m, m/s, and bristles in units of sliding friction; a loaded flank
+deflects by 2e-5 m."""
 CONTACTS_PER_SECOND = 2000
-"""More than any rattle makes; beyond, the run is stopped."""
+"""More than in any rattle; beyond this rate the run is stopped."""
 MAX_POINTS = 60_000_000
 
 
 @dataclass(frozen=True)
 class FirstState:
-    """Where a run begins: angle and speed of the pinion, compression between the flanks and its rate."""
+    """Initial state of a run: angle and speed of the pinion, compression between the flanks and its rate."""
 
     pinion_angle_rad: float = 0.0
     pinion_speed_rad_s: float = 0.0
@@ -118,17 +119,17 @@ class FirstState:
 
 @dataclass(frozen=True)
 class DriveResponse(Result, columns=("time_s", "signals")):
-    """A run of the drive on an even grid of time from 0, and its contacts.
+    """A run of the drive on an even time grid from 0, and its contacts.
 
     Parameters
     ----------
     interval_s : float
     signals : mapping
-        Name (see `sims.forging.SIGNALS`) → (n,).
+        Name (see `SIGNALS`) → (n,).
     contacts : array, (n_contacts, 10)
-        See `sims.forging.CONTACT_COLUMNS`: exact to the events' accuracy, not to the grid's.
+        See `CONTACT_COLUMNS`: as accurate as the event detection, not limited by the grid.
     n_steps, n_refused : int
-        Of the integrator.
+        Steps of the integrator, and rejected ones.
     """
 
     interval_s: float
@@ -139,7 +140,7 @@ class DriveResponse(Result, columns=("time_s", "signals")):
 
     @property
     def time_s(self) -> FloatArray:
-        """Times of the points."""
+        """Times of the points, (n,)."""
         return self.interval_s * np.arange(len(next(iter(self.signals.values()))))
 
     def __getitem__(self, name: str) -> FloatArray:
@@ -163,8 +164,8 @@ def respond(
 ) -> DriveResponse:
     """Integrate the drive from rest, or from a given state.
 
-    Dormand–Prince 5(4) with error control; a step ends where flanks meet or part, so that the speed at which they meet
-    is latched exactly, and where a profile bends.
+    Dormand–Prince 5(4) with error control. Steps end where flanks meet or separate, so that the impact speed is latched
+    exactly, and at the knots of a profile.
 
     Parameters
     ----------
@@ -173,16 +174,16 @@ def respond(
     duration_s, interval_s : float
         The grid is 0, interval, … below the duration.
     first : FirstState or None
-        None: at rest, the teeth in the middle of the backlash.
+        None: at rest, with the teeth in the middle of the backlash.
     tolerance : float
         1e-12 to 1e-3.
     signals : sequence of str
-        What is kept, of `sims.forging.SIGNALS`. The steps, and so the motion, do not depend on it.
+        Signals to keep, from `SIGNALS`. The steps, and hence the motion, do not depend on them.
 
     Raises
     ------
     RefusalError
-        If flanks touch and part without end, or the state grows without bound.
+        If flanks touch and separate endlessly, or the state diverges.
     """
     positive(duration_s, "duration_s", "s")
     positive(interval_s, "interval_s", "s")
@@ -210,14 +211,14 @@ def respond(
         if status != DONE or not np.isfinite(y).all():
             raise _failure(status, end)
     n_filled, n_contacts, n_steps, n_refused = counts.tolist()
-    output[n_filled:] = output[n_filled - 1]  # rounding may leave the last point just beyond the end
+    output[n_filled:] = output[n_filled - 1]  # rounding may put the last point just beyond the end
     kept = {name: np.ascontiguousarray(output[:, i]) for i, name in enumerate(signals)}
     return DriveResponse(interval_s, kept, contacts[:n_contacts].copy(), n_steps, n_refused)
 
 
 def _failure(status: int, before_s: float) -> RefusalError:
     reasons = {
-        TOO_MANY_CONTACTS: "flanks touch and part more often than any rattle",
+        TOO_MANY_CONTACTS: "flanks touch and separate more often than in any rattle",
         STUCK: "no step is short enough for the motion",
     }
     return RefusalError(
@@ -226,23 +227,23 @@ def _failure(status: int, before_s: float) -> RefusalError:
     )
 
 
-# Are the steps short enough? A cycle at the tolerance in use, beside one at a hundred-thousandth of it.
+# Convergence: a cycle at the tolerance in use, compared with one at a hundred-thousandth of it.
 
 EXACT = 1e-5
-"""Of the tolerance in use."""
+"""Tolerance of the reference run over that in use."""
 ALLOWED_S, ALLOWED = 1e-6, 1e-3
-"""Of the impact's time, and relative of its energy, the force's rms and the balance of energy."""
+"""Allowed error of the impact's time, and relative error of its energy, the rms force and the energy balance."""
 CONTINUOUS_S = 3.0
 
 
 @dataclass(frozen=True)
 class ForgingConvergence:
-    """What a far smaller tolerance changes.
+    """Effect of a far smaller tolerance.
 
     Parameters
     ----------
     impact : str
-        Which one is looked at.
+        The impact that is compared.
     time_s, exact_time_s : float
         Of that impact.
     energy_error : float
@@ -250,7 +251,7 @@ class ForgingConvergence:
     force_error : float
         Relative difference of the interaction force's rms.
     balance_error : float
-        Largest energy that appears or is lost, over the work put in.
+        Maximum energy that appears or is lost, over the work put in.
     n_steps, n_exact_steps : int
     """
 
@@ -265,17 +266,17 @@ class ForgingConvergence:
 
     @property
     def converged(self) -> bool:
-        """Whether all differences are allowed ones."""
+        """Whether all differences are within the allowed ones."""
         errors = (self.energy_error, self.force_error, self.balance_error)
         return abs(self.time_s - self.exact_time_s) <= ALLOWED_S and max(errors) <= ALLOWED
 
     @property
     def text(self) -> str:
-        """For people."""
+        """Readable summary."""
         late_s = abs(self.time_s - self.exact_time_s)
         limits = f"(allowed {ALLOWED_S:.0e} s)", f"(allowed {ALLOWED:g})"
         lines = [
-            f"{self.n_steps} steps beside {self.n_exact_steps} at a tolerance {1 / EXACT:.0e} times as small:",
+            f"{self.n_steps} steps, compared with {self.n_exact_steps} at a tolerance smaller by {1 / EXACT:.0e}:",
             f"  {self.impact} at {self.exact_time_s:.6g} s: off by {late_s:.1e} s {limits[0]}",
             f"  its energy: off by {self.energy_error:.1e} {limits[1]}",
             f"  rms of the interaction force: off by {self.force_error:.1e} {limits[1]}",
@@ -287,10 +288,10 @@ class ForgingConvergence:
 def check_convergence(
     drive: ForgingDrive, cycle: Cycle, torque_nm: Profile, *, tolerance: float = TOLERANCE
 ) -> ForgingConvergence:
-    """Run one cycle twice.
+    """Run one cycle at two tolerances and compare.
 
-    The impact is the first one backwards after the torque has gone, in continuous rotation the first of all. What
-    rattles afterwards may part however close two runs start: it is compared by the force's rms alone.
+    The compared impact is the first one on the back flank after the torque is off; in continuous rotation, the first of
+    all. Rattle after it may diverge however close two runs start, so it is compared only by the rms force.
 
     Raises
     ------
@@ -318,25 +319,25 @@ def check_convergence(
 
 
 def _first(run: DriveResponse, flank: float, after_s: float) -> tuple[float, float]:
-    """Time and speed of the first contact on a flank (0: either) after a time."""
+    """Time and speed of the first contact on a flank (0: any) after a given time."""
     fitting = (run.contact("start_s") > after_s) & ((run.contact("flank") == flank) | (flank == 0.0))
     if not np.any(fitting):
-        raise RefusalError("the flanks never meet there: there is nothing to compare", remedy="give torque, or a brake")
+        raise RefusalError("the flanks never meet, so there is nothing to compare", remedy="give torque, or a brake")
     row = int(np.argmax(fitting))
     return float(run.contact("start_s")[row]), float(run.contact("start_speed_mps")[row])
 
 
 # --------------------
-# Compiled: one segment of straight profiles, in which every contact gained or lost is found.
+# Compiled: integration over one segment of linear profiles, with detection of every gain and loss of contact.
 # --------------------
 
 
-# Compiled: which tooth pairs carry, where worn ones touch, and the force of the flanks that do.
+# Compiled: which tooth pairs carry load, where worn ones touch, and the contact force.
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _step(x):
-    """Rise from 0 to 1 with two continuous derivatives, and its slope."""
+    """Smooth step from 0 to 1 with two continuous derivatives, and its slope."""
     if x <= 0.0:
         return 0.0, 0.0
     if x >= 1.0:
@@ -346,7 +347,7 @@ def _step(x):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def weight(k, p):
-    """Part of its full stiffness that a pair has p base pitches behind its entry, and the slope over p."""
+    """Fraction of its full stiffness that a pair has p base pitches after its entry, and its slope over p."""
     rise, up = _step(p / k.ramp + 0.5)
     stay, down = _step((k.contact_ratio - p) / k.ramp + 0.5)
     return rise * stay, (up * stay - rise * down) / k.ramp
@@ -354,10 +355,10 @@ def weight(k, p):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def later_pair(k, angle, flank):
-    """Number of the younger of the two pairs that may touch.
+    """Number of the younger of the two pairs that may be in contact.
 
-    Pairs change hands half-way through single contact, where the pair that goes has left and the one that comes has not
-    arrived: no jump whatever the direction.
+    The pairs are renumbered halfway through single contact, after the old pair has left and before the new one arrives,
+    so that nothing jumps in either direction.
     """
     x = angle * k.cycles_per_rad - k.phase
     if flank < 0:
@@ -367,7 +368,7 @@ def later_pair(k, angle, flank):
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def position(k, angle, flank, younger):
-    """Base pitches of the younger pair behind its entry, and its slope over the pinion's angle."""
+    """Base pitches of the younger pair from its entry, and the slope over the pinion's angle."""
     x = angle * k.cycles_per_rad - k.phase
     if flank < 0:
         return k.mirror - x - younger, -k.cycles_per_rad
@@ -376,7 +377,7 @@ def position(k, angle, flank, younger):
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def stiffness_share(k, number, flank):
-    """Part of its stiffness that a pair has: less than 1 for a weak tooth on its drive flank."""
+    """Fraction of a pair's stiffness that remains: less than 1 for a weak tooth on its drive flank."""
     if flank > 0 and k.weak_loss > 0.0 and number - floor(number / k.weak_teeth) * k.weak_teeth == k.weak_tooth:
         return 1.0 - k.weak_loss
     return 1.0
@@ -384,9 +385,9 @@ def stiffness_share(k, number, flank):
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def worn_off(k, p, flank):
-    """What wear has taken off a pair p base pitches behind its entry, drive flanks alone, and its slope over p.
+    """Wear depth of a pair p base pitches after its entry, on drive flanks only, and its slope over p.
 
-    Cubic between the points of the table, with their slopes; beyond the path of contact as at its end.
+    Cubic between the points of the table, with their slopes; constant beyond the path of contact.
     """
     if flank < 0 or k.is_worn == 0.0:
         return 0.0, 0.0
@@ -405,7 +406,7 @@ def worn_off(k, p, flank):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def reach(k, angle, flank):
-    """Compression at which the first pair touches a flank, in the flank's direction; and its slope over the angle."""
+    """Compression in a flank's direction at which its first pair touches, and its slope over the angle."""
     if flank < 0 or k.is_worn == 0.0:
         return k.half_backlash, 0.0
     p, slope = position(k, angle, flank, later_pair(k, angle, flank))
@@ -420,7 +421,7 @@ def reach(k, angle, flank):
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def one_pair(k, depth, closing, damping):
-    """Force of one tooth pair at full stiffness: elastic, and with damping; never tension."""
+    """Force of one tooth pair at full stiffness, elastic and with damping; never tensile."""
     if depth <= 0.0:
         return 0.0, 0.0
     elastic = k.stiffness * (depth * depth**0.5 if k.exponent == 1.5 else depth**k.exponent)
@@ -429,7 +430,7 @@ def one_pair(k, depth, closing, damping):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def stored_energy(k, angle, q, flank, younger):
-    """Energy in the teeth that touch: Σ n_i(θ1) k g_i^(λ+1)/(λ+1)."""
+    """Energy in the teeth in contact, Σ n_i(θ1) k g_i^(λ+1)/(λ+1)."""
     if flank == 0 or flank * q <= k.half_backlash:
         return 0.0
     p, _ = position(k, angle, flank, younger)
@@ -442,7 +443,7 @@ def stored_energy(k, angle, q, flank, younger):
     return total
 
 
-# Compiled: LuGre friction of a shaft, and of tooth flanks whose normal force varies.
+# Compiled: LuGre friction of a shaft, and of tooth flanks with varying normal force.
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
@@ -458,9 +459,9 @@ def bristle(v, z, static_ratio, stribeck, presliding, bristle_time):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def tooth_friction(k, n, p, z, w1, w2, flank):
-    """Friction force of a pair with normal force n, its moment arms times it, loss, and its bristle's rate.
+    """Friction force of a pair with normal force n, its moments about both axes, power loss, and its bristle's rate.
 
-    v_s = −ω1 ρ1 + ω2 ρ2 on the drive flank, mirrored on the back flank; the bristle z runs to ±μ.
+    v_s = −ω1 ρ1 + ω2 ρ2 on the drive flank, mirrored on the back flank; the bristle z tends to ±μ.
     """
     rho_1 = k.start + p * k.base_pitch
     rho_2 = k.length - rho_1
@@ -473,12 +474,12 @@ def tooth_friction(k, n, p, z, w1, w2, flank):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def rates(k, y, flank, younger, damping, torque, brake, press, dy, out):
-    """Fill `dy` with the rates of the states; `out` with the rest of what is wanted of a moment.
+    """Fill `dy` with the rates of the states and `out` with the other signals at this time.
 
     J1 ω̇1 = T_m − T_1 − rb1 F + Σ f ρ1 − ∂V/∂θ1,  J2 ω̇2 = rb2 F − Σ f ρ2 − T_2 + T_press − T_weight.
-    ∂V/∂θ1 is the work that the changing number of pairs does on the rotation (J.-J. Oh, K. Grosh, J. R. Barber, Energy
-    conserving equations of motion for gear systems, 2005): without it the mesh would feed or brake the motor. Worn
-    flanks give way to the rotation in the same way: δ_i = ±q − a − h(p_i), so that N_i h'(p_i) dp/dθ1 turns the pinion.
+    ∂V/∂θ1 is the torque due to the changing number of pairs (J.-J. Oh, K. Grosh, J. R. Barber, Energy conserving
+    equations of motion for gear systems, 2005): without it the mesh would drive or brake the motor. Worn flanks act in
+    the same way: δ_i = ±q − a − h(p_i), so that N_i h'(p_i) dp/dθ1 acts on the pinion.
     """
     w1, q, q_rate = y[1], y[2], y[3]
     w2 = (k.rb1 * w1 - q_rate) / k.rb2
@@ -531,13 +532,13 @@ def rates(k, y, flank, younger, damping, torque, brake, press, dy, out):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def energy(k, y, flank, younger):
-    """Kinetic energy and what is stored in the teeth."""
+    """Kinetic energy plus the energy stored in the teeth."""
     w2 = (k.rb1 * y[1] - y[3]) / k.rb2
     kinetic = 0.5 * (k.motor_inertia + k.pinion_inertia) * y[1] ** 2 + 0.5 * k.wheel_inertia * w2**2
     return kinetic + stored_energy(k, y[0], y[2], flank, younger)
 
 
-# Compiled: one step of the Dormand–Prince pair 5(4), its error, and the motion within the step.
+# Compiled: one step of the Dormand–Prince pair 5(4), its error, and its dense output.
 #
 # Source of the coefficients: `scipy.integrate.RK45` (J. R. Dormand, P. J. Prince, A family of embedded Runge-Kutta
 # formulae, 1980; dense output by L. F. Shampine, Some practical Runge-Kutta formulas, 1986).
@@ -553,7 +554,7 @@ DENSE = np.asarray(RK45.P)
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def step(k, y, t, h, mode, profile, stages, end, out):
-    """Step from y (first stage already in `stages[0]`) to `end`; `out` is that of the step's end.
+    """Step from y (first stage already in `stages[0]`) to `end`; `out` holds the signals at the step's end.
 
     mode : flank, younger pair, damping.
     profile : time 0 and values of torque, brake, press with their slopes.
@@ -570,7 +571,7 @@ def step(k, y, t, h, mode, profile, stages, end, out):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def evaluate(k, y, t, mode, profile, dy, out):
-    """Fill the rates at time t."""
+    """Fill `dy` with the rates, and `out`, at time t."""
     since = t - profile[0]
     rates(
         k, y, mode[0], mode[1], mode[2],
@@ -580,7 +581,7 @@ def evaluate(k, y, t, mode, profile, dy, out):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def error_norm(y, end, h, stages, absolute, relative):
-    """Largest error of a state over what it may have."""
+    """Maximum ratio of a state's error to the allowed error."""
     worst = 0.0
     for i in range(absolute.shape[0]):
         error = 0.0
@@ -593,7 +594,7 @@ def error_norm(y, end, h, stages, absolute, relative):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def within_step(y, h, stages, x, i):
-    """State i at the part x of a step, 0 to 1, of fourth order."""
+    """State i at the fraction x of a step, 0 to 1, to fourth order."""
     total = 0.0
     for j in range(N_STAGES):
         total += stages[j, i] * (x * (DENSE[j, 0] + x * (DENSE[j, 1] + x * (DENSE[j, 2] + x * DENSE[j, 3]))))
@@ -605,7 +606,7 @@ N_SIGNALS = 17
 LONGEST_STEP_S = 1e-3
 SHORTEST_STEP_S = 1e-12
 MAX_TURN = 0.03
-"""Base pitches in one step: pairs then change hands within single contact."""
+"""Maximum base pitches in one step, so that pairs are renumbered within single contact."""
 ROOT_M = 1e-16
 DONE, TOO_MANY_CONTACTS, STUCK = 0, 1, 2
 
@@ -616,12 +617,12 @@ def integrate(
 ):
     """Run from t to `t_end`; fill rows of `output` at multiples of `interval` and rows of `contacts`.
 
-    y : states, left at the end's.
-    mode : flank (−1, 0, 1), younger pair, damping of the contact; left at the end's.
+    y : states, left at their final values.
+    mode : flank (−1, 0, 1), younger pair, damping of the contact; left at their final values.
     profile : start time, then value and slope of torque, brake and press.
-    select : places of the wanted signals in `sims.forging.SIGNALS`.
+    select : indices of the requested signals in `SIGNALS`.
     counts : rows filled so far in `output` and in `contacts` (an unfinished contact is the last row), steps taken,
-        steps refused; continued.
+        steps rejected; updated.
     Returns the last step's length and a status.
     """
     n = y.shape[0]
@@ -670,7 +671,7 @@ def integrate(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _fill_rows(k, y, t, h, mode, profile, stages, interval, select, counts, output, spare):
-    """Fill the rows of `output` whose times lie within a step."""
+    """Fill the rows of `output` whose times are within a step."""
     extra, row = np.empty(N_OUT), np.empty(N_SIGNALS)
     at = spare[0]
     while counts[0] < output.shape[0] and counts[0] * interval <= t + h:
@@ -688,7 +689,7 @@ def _fill_rows(k, y, t, h, mode, profile, stages, interval, select, counts, outp
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _change_contact(k, y, t, next_flank, mode, counts, contacts):
-    """End the contact there is, begin the next; false where no row is left for it."""
+    """End the present contact and begin the next; false if no row is left for it."""
     if mode[0] != 0.0:
         row = contacts[counts[1] - 1]
         row[5], row[6], row[8] = t, abs(y[3]), y[9] - row[8]
@@ -703,7 +704,7 @@ def _change_contact(k, y, t, next_flank, mode, counts, contacts):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def open_contact(k, y, t, flank, mode, row):
-    """Latch the speed at which flanks meet and the damping that follows; the bristles of the flanks begin straight."""
+    """Latch the impact speed and the resulting damping; the bristles of the flanks start undeflected."""
     mode[0] = flank
     mode[1] = later_pair(k, y[0], flank)
     speed = abs(flank * y[3] - reach(k, y[0], flank)[1] * y[1])
@@ -717,7 +718,7 @@ def open_contact(k, y, t, flank, mode, row):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _hand_over(k, y, mode):
-    """Give the bristles to the next slot where the younger pair is another; say whether it is."""
+    """Move the bristles to the next slot if the younger pair has changed; return whether it has."""
     younger = later_pair(k, y[0], mode[0])
     if younger == mode[1]:
         return False
@@ -731,14 +732,14 @@ def _hand_over(k, y, mode):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _flank_after(k, y, end, h, stages, flank):
-    """Flank that touches when the step ends, or that it touches on the way."""
+    """Flank in contact at the end of the step, or first touched during it."""
     if flank != 0.0:
         return 0.0 if flank * end[2] < reach(k, end[0], flank)[0] else flank
     if abs(end[2]) > k.half_backlash:
         side = 1.0 if end[2] > 0.0 else -1.0
         if side * end[2] > reach(k, end[0], side)[0]:
             return side
-    if y[3] * end[3] < 0.0:  # it turned round on the way, maybe beyond the flank
+    if y[3] * end[3] < 0.0:  # the motion reversed during the step, possibly beyond the flank
         x = y[3] / (y[3] - end[3])
         q = within_step(y, h, stages, x, 2)
         side = 1.0 if q > 0.0 else -1.0
@@ -749,9 +750,9 @@ def _flank_after(k, y, end, h, stages, flank):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _to_event(k, y, t, h, mode, profile, stages, end, out, next_flank):
-    """Shorten the step to the moment at which the flanks meet or part; return its length.
+    """Shorten the step to the time at which the flanks meet or separate; return its length.
 
-    First on the interpolant by bisection, then with true steps by Newton's rule.
+    First by bisection on the interpolant, then by Newton's method with actual steps.
     """
     flank = next_flank if next_flank != 0.0 else mode[0]
     entering = next_flank != 0.0

@@ -1,4 +1,4 @@
-"""The forging manipulator's drive as a simulator: preset and values → drive → its motion, measured → recording."""
+"""The forging manipulator's drive as a simulator: preset and values → drive → measured motion → recording."""
 
 from __future__ import annotations
 
@@ -57,16 +57,16 @@ from sims.simulator import (
 )
 
 # --------------------
-# From the drive's motion to a recording: encoders, torque sensor, and an accelerometer where the rate allows.
+# From the drive's motion to a recording: encoders, torque sensor, and an accelerometer if the rate allows.
 # --------------------
 
 
-# Slow channels as a data logger stores them: through an anti-alias filter, not at instants.
+# Slow channels as stored by a data logger: through an anti-alias filter, not as instantaneous values.
 
 SLOW_FINE_POINTS = 8
-"""Points of the motion per sample: what the teeth do above seven times the sampling rate is below a millinewton."""
+"""Points of the motion per sample: tooth forces above seven times the sampling rate are below a millinewton."""
 MAX_VALUES = 40_000_000
-"""Of the fine motion at a time: a third of a gigabyte."""
+"""Maximum number of values of the fine motion held at a time: a third of a gigabyte."""
 
 
 def filtered_signals(
@@ -74,15 +74,15 @@ def filtered_signals(
 ) -> dict[str, FloatArray]:
     """Return signals of the drive, low-pass filtered and sampled, each (n_samples,).
 
-    The filter has no delay: a sine up to 0.4 of the sampling rate keeps amplitude and phase, one above half of it is
-    down by 90 dB. Ahead of the run everything stands as it does at its begin. The profiles must last 30 samples longer.
+    The filter has no delay: a sine up to 0.4 of the sampling rate keeps its amplitude and phase, one above half of it
+    is attenuated by 90 dB. Before the run, all values are those at its start. The profiles must last 30 samples longer.
 
     Parameters
     ----------
     drive : ForgingDrive
     profiles : Schedule
     names : sequence of str
-        Of `sims.forging.SIGNALS`.
+        From `SIGNALS`.
     sampling_rate_hz : float
     n_samples : int
     """
@@ -101,13 +101,13 @@ def filtered_signals(
 
 
 MIN_VIBRATION_HZ = 5000.0
-"""Sampling rate from which on vibration is recorded: flanks in contact ring at some 400 Hz, housings above."""
+"""Minimum sampling rate for recording vibration: flanks in contact ring at about 400 Hz, housings above that."""
 FINE_POINTS = 4
 """Points of the motion per sample of the accelerometer."""
 PLACE = "pinion bearing"
 FOLDS = (
-    "torque, force, speeds and accelerations are samples of instants: what happens above {:g} Hz folds back, so lines "
-    "of their spectra may be none of the machine (slow_channels=filtered keeps them out)"
+    "torque, force, speeds and accelerations are instantaneous samples: content above {:g} Hz is aliased, so lines in "
+    "their spectra may not be from the machine (slow_channels=filtered avoids this)"
 )
 
 CHANNELS = (
@@ -118,17 +118,17 @@ CHANNELS = (
     Channel("wheel speed", "rotational_speed", "rad/s", "wheel"),
     Channel("pinion acceleration", "angular_acceleration", "rad/s^2", "pinion"),
     Channel("wheel acceleration", "angular_acceleration", "rad/s^2", "wheel"),
-    Channel("interaction force", "force", "N", "tooth flanks, of the model: no sensor measures it"),
+    Channel("interaction force", "force", "N", "tooth flanks, from the model: no sensor measures it"),
 )
-"""What a recording of the motion holds."""
+"""Channels of a recording of the motion."""
 FILTERED = SAMPLINGS[1]
-FILTERED_SLOW = "torque, force, speeds and accelerations filtered below {:g} Hz before they were sampled"
-INSTANTS = "torque, force, speeds and accelerations sampled at instants, without a filter"
+FILTERED_SLOW = "torque, force, speeds and accelerations low-pass filtered below {:g} Hz before sampling"
+INSTANTS = "torque, force, speeds and accelerations sampled as instantaneous values, without a filter"
 VIBRATION = Channel("vibration", "acceleration", "m/s^2", "pinion bearing, along the line of action")
 
 
 def sensors(sampling_rate_hz: float) -> tuple[Sensor, ...]:
-    """Return the sensors of a recording at that rate, for its rig file."""
+    """Return the sensors of a recording at a sampling rate, for its rig file."""
     channels = (*CHANNELS, VIBRATION) if sampling_rate_hz >= MIN_VIBRATION_HZ else CHANNELS
     return tuple(Sensor(c.name, c.quantity, c.unit, c.position) for c in channels)
 
@@ -146,10 +146,10 @@ def record(
 ) -> Recording:
     """Run the drive and measure it.
 
-    Angles are rounded down to their encoder's counts after noise was added: counters store instants. Speeds and
-    accelerations have noise of their own, as from sensors of their own. With torque and force they are instants as
-    well, or filtered (`slow_channels`). Instants of a machine that runs on carry a warning at slow rates: their spectra
-    hold lines from above half the sampling rate.
+    Angles are rounded down to encoder counts after noise is added, as counters store instantaneous values. Speeds and
+    accelerations have independent noise, as from separate sensors. Like torque and force they are instantaneous values,
+    or filtered (`slow_channels`). Instantaneous values in continuous rotation carry a warning at slow rates: their
+    spectra contain lines from above half the sampling rate.
     """
     motion_rng, vibration_rng = rng.spawn(2)
     motion = respond(drive, profiles, duration_s=duration_s, interval_s=1.0 / sampling_rate_hz)
@@ -212,7 +212,7 @@ def _vibration(
     rate_hz: float,
     n_samples: int,
 ) -> FloatArray:
-    """Acceleration of the housing's mass, which the force of the teeth shakes; the drive does not feel it."""
+    """Acceleration of the housing's mass under the tooth force, without reaction on the drive."""
     fine_s = 1.0 / (FINE_POINTS * rate_hz)
     chain = MeasurementChain(rate_hz, (_channel(values),), AntiAlias())
     lead = ceil(chain.lead_in_s * rate_hz) * FINE_POINTS
@@ -225,7 +225,7 @@ def _vibration(
 
 
 def _housing(force_n: FloatArray, values: ParameterValues, step_s: float) -> FloatArray:
-    """Apply s²/(s² + 2ζωs + ω²)/m, exact for a force that runs straight between steps."""
+    """Apply s²/(s² + 2ζωs + ω²)/m, exact for a force that is linear between steps."""
     w, zeta = 2.0 * pi * values.number("housing_frequency_hz"), values.number("housing_damping_ratio")
     section = discrete((1.0, 0.0, 0.0), (1.0, 2.0 * zeta * w, w * w), step_s)
     return apply(section, force_n / values.number("housing_mass_kg"))
@@ -252,11 +252,11 @@ def _truth(motion: DriveResponse) -> dict[str, Any]:
 
 
 WITH_MEANING = tuple(name for name, each in effects().items() if each.on_drive)
-"""Effects that the drive can have; a wrong load inertia is `piece_mass_kg` or `wheel_inertia_kg_m2`."""
+"""Effects that the drive supports; for a changed load inertia set `piece_mass_kg` or `wheel_inertia_kg_m2`."""
 
 
 class _DriveValues(ParameterValues):
-    """Complete parameters as effects read them: see `sims.effects.DriveParameters`."""
+    """Complete parameters in the form that effects read: see `sims.effects.DriveParameters`."""
 
     def highest(self, name: str) -> float:
         return float(parameter(PARAMETERS, name).high or 0.0)
@@ -266,12 +266,12 @@ class _DriveValues(ParameterValues):
 
 
 def with_effects(values: Values, settings: Sequence[EffectSetting]) -> tuple[Values, WeakTooth | None]:
-    """Return the parameters with the effects in them, and the tooth that a crack makes weak.
+    """Return the parameters with the effects applied, and the tooth weakened by a crack, if any.
 
     Raises
     ------
     InputError
-        If an effect has no meaning here, is given twice, or its severity or options do not fit.
+        If an effect has no meaning here, is given twice, or its severity or options are not allowed.
     """
     changed = dict(values)
     weak_tooth: WeakTooth | None = None
@@ -303,7 +303,7 @@ TORQUE_RANGE_NM = (0.0, 1e6)
 
 @dataclass(frozen=True)
 class PreparedDrive(SimulationRequest):
-    """A drive with its cycle, ready to run; its `values` are the healthy drive's.
+    """A drive with its cycle, ready to run; its `values` are those of the healthy drive.
 
     Parameters
     ----------
@@ -311,7 +311,7 @@ class PreparedDrive(SimulationRequest):
         With its effects.
     cycle : Cycle
     changed : mapping
-        Every parameter, with the effects.
+        Every parameter, with the effects applied.
     """
 
     drive: ForgingDrive
@@ -319,11 +319,11 @@ class PreparedDrive(SimulationRequest):
     changed: Values
 
     def profiles(self, duration_s: float) -> Schedule:
-        """Torque, brake and press over a run."""
+        """Profiles of torque, brake and press over a run."""
         return schedule(self.cycle, self.operation.torque_nm, duration_s)
 
     def truth(self) -> dict[str, Any]:
-        """What was put in, as plain values."""
+        """All inputs as plain values."""
         return {
             **super().truth(),
             "backlash_um": 2.0 * self.drive.contact.half_backlash_um,
@@ -334,7 +334,7 @@ class PreparedDrive(SimulationRequest):
 
 @dataclass(frozen=True)
 class ForgingManipulator(Simulator):
-    """Pinion and wheel of a forging manipulator: start–stop, backlash, impact; see `sims.forging`."""
+    """Pinion and wheel of a forging manipulator: start–stop, backlash, impacts; see `sims.forging`."""
 
     name: str = NAME
     title: str = "forging manipulator's drive: start–stop, backlash, impact on both flanks, stick–slip"
@@ -343,7 +343,7 @@ class ForgingManipulator(Simulator):
     usual_sampling_rate_hz: float = field(default=1000.0, repr=False)  # a motion controller's, 1 ms
 
     def prepare(self, setup: SimulationSetup) -> PreparedDrive:
-        """Build the drive and its cycle, with its effects."""
+        """Build the drive with its effects, and its cycle."""
         request = SimulationRequest.of(NAME, PARAMETERS, setup)
         changed, weak = with_effects(request.values, request.effects)
         within(request.operation.torque_nm.largest, "torque_nm", *TORQUE_RANGE_NM, "N m")
@@ -354,10 +354,10 @@ class ForgingManipulator(Simulator):
     def simulate(
         self, setup: SimulationSetup, rng: np.random.Generator, *, sampling_rate_hz: float, duration_s: float
     ) -> Recording:
-        """Make a recording with rig and truth, from rest on; see `sims.simulator.Simulator.simulate`.
+        """Make a recording with rig and truth, starting at rest; see `sims.simulator.Simulator.simulate`.
 
-        The operation's torque is that of the open valve, its speed the pinion's that the flow allows (0: no limit).
-        Vibration is recorded from 5 kHz on. A stop that is longer than the record is an error.
+        The operation's torque is that with the open valve, its speed the pinion speed that the flow allows (0: no
+        limit). Vibration is recorded at sampling rates from 5 kHz. A stop longer than the record is an error.
         """
         within(duration_s, "duration_s", *DURATION_RANGE_S, "s")
         within(sampling_rate_hz, "sampling_rate_hz", *SAMPLING_RATE_RANGE_HZ, "Hz")
@@ -374,7 +374,7 @@ class ForgingManipulator(Simulator):
             name=self.rig_name(ready.preset),
             sources=self.rig_sources(ready.preset),
         )
-        ready.profiles(duration_s)  # says so where a stop does not fit, before anything is run
+        ready.profiles(duration_s)  # raises if a stop does not fit, before anything is run
         return record(
             ready.drive,
             ready.profiles(duration_s + 1.0),
@@ -387,12 +387,12 @@ class ForgingManipulator(Simulator):
         )
 
     def check_convergence(self, setup: SimulationSetup, rng: np.random.Generator) -> ForgingConvergence:
-        """Tell how far shorter steps change the motion of this very drive, which nothing random enters."""
+        """Report how much shorter steps change the motion of this drive, which has no random parts."""
         del rng
         ready = self.prepare(setup)
         return check_convergence(ready.drive, ready.cycle, ready.operation.torque_nm)
 
-    # As the gap diagnosis takes it, see `gearsig.gap.DriveSimulator`.
+    # The interface of the gap diagnosis, see `gearsig.gap.DriveSimulator`.
 
     def gap_effects(self) -> dict[str, GapEffect]:
         """Return the effects that have a meaning for this model."""
@@ -410,7 +410,7 @@ class ForgingManipulator(Simulator):
         } | _WRONG_VALUES
 
     def drive_twin_of(self, facts: DriveFacts) -> ForgingTwin:
-        """Return the drive by the rig's contact; what neither rig nor recording tells is usual for its size."""
+        """Return the drive with the rig's contact; what neither rig nor recording states is usual for its size."""
         contact, path = facts.contact, facts.path
         ratio = path.teeth[1] / path.teeth[0]
         torque_nm, friction_nm, top_rad_s = facts.motor_torque_nm, facts.load_friction_nm, facts.top_speed_rad_s
@@ -452,14 +452,14 @@ class ForgingManipulator(Simulator):
 
 
 def _constant(speed_rpm: Profile) -> float:
-    """Return the speed limit: one number, as a valve is set once."""
+    """Return the speed limit, a single number, as a valve is set once."""
     if len(speed_rpm.values) > 1 and float(speed_rpm.values.max() - speed_rpm.values.min()) > 0.0:
         raise InputError("speed_rpm varies", allowed="one speed that the flow allows", remedy="vary --torque instead")
     return within(float(speed_rpm.values[0]), "speed_rpm", *SPEED_RANGE_RPM, "rpm")
 
 
 # --------------------
-# What the gap diagnosis of start–stop machines asks of this model: a drive set to a rig and to how it is driven.
+# The twin for the gap diagnosis of start–stop machines: a drive adapted to a rig and its operation.
 # --------------------
 
 
@@ -474,7 +474,7 @@ NOISE_FREE: dict[str, ParameterValue] = {
     "acceleration_noise_rad_per_s2": 0.0,
     "torque_noise_nm": 0.0,
 }
-"""What an effect changes is asked for, not what noise does to it."""
+"""The change due to an effect is needed without noise."""
 
 Parameters = Mapping[str, ParameterValue]
 
@@ -485,8 +485,8 @@ _SHOWS_IN = {
     "root_crack": ("tooth",),
     "torque_ripple": ("ripple",),
 }
-"""Of the catalogue's effects: changes of starts and stops (`gearsig.gap.start_stop.NAMES`); those of `sims.effects` are
-of vibration."""
+"""Where effects of the catalogue show in starts and stops (`gearsig.gap.start_stop.NAMES`); `shows_in` of an effect
+refers to vibration."""
 
 _WRONG_VALUES = {
     name: GapEffect(name, group, title, "added_percent", "%", signature, shows_in)
@@ -494,39 +494,39 @@ _WRONG_VALUES = {
         (
             "load_inertia",
             "drive and load",
-            "another inertia of the load",
+            "changed inertia of the load",
             "torque against acceleration of the driven gear, in starts and stops",
             ("inertia",),
         ),
         (
             "load_friction",
             "drive and load",
-            "more friction of the load's bearings",
+            "more friction in the load's bearings",
             "torque that turns the load without accelerating it",
             ("load_friction",),
         ),
         (
             "torque_gain",
             "measurement",
-            "a torque sensor that reads too much or too little",
-            "inertia and friction of the load seem to change alike",
+            "a torque sensor that reads too high or too low",
+            "inertia and friction of the load seem to change by the same factor",
             ("inertia", "load_friction", "deflection"),
         ),
     )
 }
-"""Effects that are a parameter's wrong value and no effect of the catalogue."""
+"""Effects that are a wrong value of a parameter and not in the catalogue."""
 
 
 @dataclass(frozen=True)
 class ForgingTwin:
-    """A simulated drive by a rig's drawing, driven as a recording shows it; see `gearsig.gap.DriveTwin`.
+    """A simulated drive built from a rig and operated as in a recording; see `gearsig.gap.DriveTwin`.
 
     Parameters
     ----------
     parameters : mapping
         Of `sims.forging`.
     point : OperatingCondition
-        Torque of the motor's open valve; the speed that the flow allows.
+        Motor torque with the open valve; the speed that the flow allows.
     """
 
     parameters: Parameters
@@ -546,22 +546,22 @@ class ForgingTwin:
         )
 
     def at_torque(self, factor: float) -> ForgingTwin:
-        """Return the drive with another torque of the motor, and so another top speed."""
+        """Return the drive with the motor torque multiplied by `factor`, which also changes its top speed."""
         return replace(self, point=replace(self.point, torque_nm=self.point.torque_nm * factor))
 
     def worn_curve_um(self, deflection_um: float, depth_um: float, n_places: int) -> FloatArray:
-        """Return how much further the driver turns, at each place of the mesh cycle, with worn teeth, (n_places,).
+        """Return how much further the driver turns with worn teeth over the mesh cycle, in µm, (n_places,).
 
-        A pair whose flank has lost h touches later: Σ (δ − h_i)₊^λ = n g^λ at an equal load, g the deflection of n
-        healthy pairs. Where two pairs share the load, the less worn one decides. Wear is that of the driver's teeth,
-        by Archard's law (`sims.mesh.wear_profile`).
+        A pair whose flank has lost h comes into contact later: Σ (δ − h_i)₊^λ = n g^λ at equal load, g the deflection
+        of n healthy pairs. Where two pairs share the load, the less worn one dominates. Wear is that of the driver's
+        teeth, by Archard's law (`sims.mesh.wear_profile`).
 
         Parameters
         ----------
         deflection_um : float
-            Of one pair under the ordinary load; 20 µm where it is not known.
+            Of one pair under the usual load; 20 µm if unknown.
         depth_um : float
-            Where the wear is greatest.
+            Maximum depth of wear.
         n_places : int
         """
         module = float(self.parameters["module_mm"])
@@ -576,7 +576,7 @@ class ForgingTwin:
         exponent = float(self.parameters["exponent"])
         g = deflection_um if np.isfinite(deflection_um) and deflection_um > 0.0 else 20.0
         n = np.sum(touches, axis=0)
-        load = g**exponent  # of one pair: with two the compression is less
+        load = g**exponent  # of one pair; with two the compression is less
         healthy = g / n ** (1.0 / exponent)
         low, high = np.zeros(n_places), healthy + depth_um
         for _ in range(40):  # bisections: 1e-12 of the first interval
@@ -587,7 +587,7 @@ class ForgingTwin:
         return curve
 
     def crack_stiffness_loss(self, crack: AddedEffect) -> float:
-        """Return which part of its stiffness a cracked tooth loses."""
+        """Return the fraction of its stiffness that a cracked tooth loses."""
         _, weak = with_effects(complete_values(PARAMETERS, self.parameters), _settings((crack,)))
         assert weak is not None  # noqa: S101 - a crack of some depth makes a tooth weak
         return float(weak.loss)
@@ -595,14 +595,14 @@ class ForgingTwin:
     def preset_toml(self, added: AddedEffect, notes: Sequence[str]) -> str:
         """Return the drive as a preset file that `gearsig simulate forging --preset FILE` runs."""
         torque_nm = self.point.torque_nm
-        if added.name == "torque_gain":  # the motor's torque was read with the same wrong gain
+        if added.name == "torque_gain":  # the motor torque was measured with the same wrong gain
             torque_nm /= 1.0 + 0.01 * added.severity
         preset = Preset(
             "",
             NAME,
-            "Forging drive set to a rig and to its starts and stops",
-            ("the rig file, and the recording's own torque and motion",),
-            ("times of valve and brake, friction of the load, noise: read off the recording or usual",),
+            "Forging drive adapted to a rig and to its starts and stops",
+            ("the rig file, and the torque and motion of the recording",),
+            ("times of valve and brake, friction of the load, noise: from the recording, or usual values",),
             ("press blows, elastic shafts, pitch errors",),
             dict(_with_wrong_value(added, self.parameters)),  # type: ignore[arg-type]  # read only
             round(self.point.speed_rpm, 2),
@@ -613,7 +613,7 @@ class ForgingTwin:
 
 
 def _settings(added: Sequence[AddedEffect]) -> tuple[EffectSetting, ...]:
-    """Return the catalogue's settings; none of what is a parameter's wrong value."""
+    """Return the settings of catalogue effects, without those that are a wrong value of a parameter."""
     return tuple(
         EffectSetting(setting.name, setting.severity, dict(setting.options))
         for setting in added
@@ -622,14 +622,14 @@ def _settings(added: Sequence[AddedEffect]) -> tuple[EffectSetting, ...]:
 
 
 def _with_wrong_value(added: AddedEffect, parameters: Parameters) -> Parameters:
-    """Return the parameters with the wrong value of one; effects of the catalogue leave them as they are."""
+    """Return the parameters with one wrong value; effects of the catalogue leave them unchanged."""
     factor = 1.0 + 0.01 * added.severity
     if added.name == "load_inertia":
         return {**parameters, "wheel_inertia_kg_m2": float(parameters["wheel_inertia_kg_m2"]) * factor}
     if added.name == "load_friction":
         names = ("load_friction_nm", "load_viscous_nm_s_per_rad")
         return {**parameters, **{key: float(parameters[key]) * factor for key in names}}
-    if added.name == "torque_gain":  # what was read off the recording was misread as well
+    if added.name == "torque_gain":  # values taken from the recording are wrong as well
         read = ("brake_nm", "drag_nm", "drag_viscous_nm_s_per_rad")
         return {**parameters, **{key: float(parameters[key]) / factor for key in read}, "torque_gain": factor}
     return parameters

@@ -1,4 +1,4 @@
-"""Both models of a gear pair: parameters, bearings, drive, measurement, and the twin of a rig, which they share."""
+"""Common to both models of a gear pair: parameters, bearings, drive, measurement, and the twin of a rig."""
 
 from sims.gear_pair._bearing import (
     BEARING_FIELDS,

@@ -1,15 +1,15 @@
-"""The four bearings as arrays: springs, clearance, and what rolling elements do as they pass.
+"""The four bearings as arrays: springs, clearance, and the effects of passing rolling elements.
 
-A rolling element over a spall carries less, and the shaft sinks towards it. Between the edges an element of radius R
-that follows them is h = x²/2R deep, x its distance from the nearer edge. It can lose no more than its own load: with Q
-its load at this time and k the bearing's stiffness, the shaft sinks by s (1 − exp(−h/s)), s = Q/k. Impacts grow with
-the load, and with the spall only up to half a millimetre or so. Q falls off with the angle ψ from the load's direction
-as cos^1.5 ψ (Stribeck's distribution for a bearing without clearance). The sinking is a displacement of the spring's
-foot, (x_b − d).
+A rolling element over a spall carries less load, and the shaft sinks towards it. An element of radius R that follows
+the edges is h = x²/2R deep at a distance x from the nearer edge. It cannot lose more than its own load: with its
+present load Q and the bearing's stiffness k, the shaft sinks by s (1 − exp(−h/s)), s = Q/k. Impacts grow with the load,
+and with the spall only up to about half a millimetre. Q decreases with the angle ψ from the load's direction as
+cos^1.5 ψ (Stribeck's distribution for a bearing without clearance). The sinking is a displacement of the spring's foot,
+(x_b − d).
 
-With clearance, fewer elements share the load, and the shaft falls and rises as they pass: the difference from the
-bearing without clearance is found from the static balance of all elements (F = K δ^1.5) at 32 places of the cage. A
-bearing of law "hertzian" has no spring at all: the contacts of its elements carry one by one.
+With clearance, fewer elements share the load, and the shaft falls and rises as they pass: the difference from a bearing
+without clearance follows from the static equilibrium of all elements (F = K δ^1.5) at 32 cage positions. A bearing of
+law "hertzian" has no spring: each element carries through its own contact.
 """
 
 # mypy: allow-untyped-defs, allow-untyped-calls
@@ -28,11 +28,11 @@ from gearsig.rig import Bearing
 from sims.machine import RACE_EDGE_MM, BearingSupport, Machine
 
 # --------------------
-# Rolling elements that carry one by one: Hertzian contacts with clearance, whose number changes as they pass.
+# Individual rolling elements: Hertzian contacts with clearance, whose number changes as the elements pass.
 #
-# An element at the angle ψ from the load is pressed by δ = x cos ψ + y sin ψ − c, c the radial clearance, and carries
-# Q = K δ^1.5 along the radius. The force on the shaft, −Σ Q (cos ψ, sin ψ), depends on where the cage stands: at the
-# elements' passing the stiffness changes, and the shaft rises and falls with it (variable compliance).
+# An element at the angle ψ is compressed by δ = x cos ψ + y sin ψ − c, c the radial clearance, and carries Q = K δ^1.5
+# along the radius. The force on the shaft, −Σ Q (cos ψ, sin ψ), depends on the cage position: as the elements pass, the
+# stiffness changes, and the shaft rises and falls with it (variable compliance).
 #
 # Sources: A. Palmgren, *Ball and Roller Bearing Engineering* (1959); T. A. Harris, M. N. Kotzalas, *Rolling Bearing
 # Analysis*, 5th ed. (2006), ch. 7; C. S. Sunnersjö, Varying compliance vibrations of rolling bearings, Journal of Sound
@@ -41,21 +41,21 @@ from sims.machine import RACE_EDGE_MM, BearingSupport, Machine
 
 
 LEFT_OVER = 1e-7
-"""Part of the load that may be out of balance, at a clearance of the size of what the load presses in; the rounding of
-the energy leaves up to 3e-8, and more as the place lies further out."""
+"""Allowed unbalanced part of the load, growing with clearance over contact approach; rounding of the energy leaves up
+to 3e-8, and more for larger displacements."""
 PALMGREN_MM = 4.36e-4
 """δ = 4.36e-4 (Q²/d)^⅓, mm, N: approach of both races to a steel ball in grooves of usual curvature."""
 
 
 def contact_n_per_m15(bearing: Bearing) -> float:
-    """K of one ball between its races along the bearing's radius, Q_r = K δ_r^1.5, by Palmgren's formula.
+    """Stiffness K of one ball between its races, in radial direction, Q_r = K δ_r^1.5, by Palmgren's formula.
 
     δ_r = 4.36e-4 Q^⅔/(d^⅓ cos α), Q = Q_r/cos α, in mm and N; here in N/m^1.5.
 
     Parameters
     ----------
     bearing : Bearing
-        With its geometry; steel balls.
+        With geometry; steel balls.
     """
     alpha = radians(bearing.contact_angle_deg or 0.0)
     ball_mm = bearing.rolling_element_diameter_mm or 1.0
@@ -64,17 +64,17 @@ def contact_n_per_m15(bearing: Bearing) -> float:
 
 
 def element_angles_rad(n: int, cage_rad: float) -> FloatArray:
-    """ψ of the elements, counter-clockwise from +x, (n,)."""
+    """Angles ψ of the elements, counter-clockwise from +x, (n,)."""
     return cage_rad + 2.0 * pi * np.arange(n) / n
 
 
 def shaft_place_m(support: BearingSupport, load_n: FloatArray, cage_rad: float = 0.0) -> FloatArray:
-    """Where a load holds the shaft in the bearing, x and y, (2,); elements carry one by one.
+    """Static position of the shaft in the bearing under a load, x and y, (2,), with individual element contacts.
 
     Raises
     ------
     RefusalError
-        If no balance is found.
+        If no equilibrium is found.
     """
     n, size, clearance = support.bearing.n_rolling_elements or 1, float(np.hypot(*load_n)), support.clearance_um * 1e-6
     if size == 0.0:
@@ -85,9 +85,9 @@ def shaft_place_m(support: BearingSupport, load_n: FloatArray, cage_rad: float =
 
 
 def element_loads_n(support: BearingSupport, load_n: FloatArray, cage_rad: float = 0.0) -> FloatArray:
-    """Load of each element along the bearing's radius, (n,).
+    """Radial load of each element, (n,).
 
-    Without clearance the greatest tends to 4.37 F/n as n grows (Stribeck); with usual clearance it is near 5 F/n.
+    Without clearance the maximum tends to 4.37 F/n as n grows (Stribeck); with usual clearance it is near 5 F/n.
     """
     angles = element_angles_rad(support.bearing.n_rolling_elements or 1, cage_rad)
     place = shaft_place_m(support, load_n, cage_rad)
@@ -97,7 +97,7 @@ def element_loads_n(support: BearingSupport, load_n: FloatArray, cage_rad: float
 
 
 def stiffness_under_load_n_per_m(support: BearingSupport, load_n: FloatArray) -> float:
-    """Stiffness along its load, mean over 16 places of the cage, ΣK 1.5 √δ cos²; of a spring, its own."""
+    """Stiffness in the load direction, ΣK 1.5 √δ cos², mean over 16 cage positions; for a spring, its own stiffness."""
     if support.law == "linear" or float(np.hypot(*load_n)) == 0.0:
         return support.stiffness_n_per_m
     n, toward = support.bearing.n_rolling_elements or 1, float(np.arctan2(load_n[1], load_n[0]))
@@ -113,9 +113,9 @@ def stiffness_under_load_n_per_m(support: BearingSupport, load_n: FloatArray) ->
 def balanced(
     radial: FloatArray, contact: float, clearance_m: float, load_n: FloatArray, guess: FloatArray
 ) -> FloatArray:
-    """Least of the energy Σ K δ^2.5/2.5 − W·p, which is convex: Newton's method, its steps halved until it falls.
+    """Position p that minimises the convex energy Σ K δ^2.5/2.5 − W·p, by Newton's method with step halving.
 
-    radial : (n, 2) directions of the elements. Lengths are scaled so that the curvature is about 1.
+    radial : (n, 2), directions of the elements. Lengths are scaled so that the curvature is about 1.
     """
     load = float(np.hypot(*load_n))
     unit = (load / contact) ** (2.0 / 3.0)
@@ -138,14 +138,14 @@ def balanced(
             part /= 2.0
         p = p - part * step
     raise RefusalError(
-        f"the static balance of a bearing's elements does not converge (out of balance by {np.hypot(*slope):.1g})",
+        f"the static equilibrium of a bearing's elements does not converge (imbalance {np.hypot(*slope):.1g})",
         remedy="take another clearance or load",
     )
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def element_forces(k, row, theta, x, y):
-    """(F_x, F_y) by which the elements of a bearing push back the shaft at (x, y); `theta`: the shaft's angle."""
+    """(F_x, F_y) of the elements of a bearing on the shaft at (x, y); `theta`: shaft angle."""
     n = k.balls[row]
     # The driven shaft turns clockwise, and its cage with it.
     cage = k.pass_order[row] * theta / n * (1.0 if row < 2 else -1.0)
@@ -168,11 +168,11 @@ def element_forces(k, row, theta, x, y):
 
 
 N_HARMONICS = 4
-"""Of the motion at the rolling elements' passing."""
+"""Harmonics of the element-passing motion."""
 N_ANGLES = 32
-"""Of the cage over one element spacing, at which the shaft's place is found."""
+"""Cage angles over one element spacing at which the shaft position is computed."""
 N_PLACES = 1024
-"""Rolling elements whose place in the cage is drawn; then they repeat (the cage's own ones, spread by skidding)."""
+"""Element passages for which a position in the cage is drawn before they repeat (skidding varies the positions)."""
 
 
 BEARING_FIELDS: list[tuple[str, type, tuple[int, ...]]] = [
@@ -190,17 +190,17 @@ BEARING_FIELDS: list[tuple[str, type, tuple[int, ...]]] = [
     ("race_share", np.float64, (4,)),  # share of the heaviest loaded element in the load
     ("race_angle", np.float64, (4,)),
     ("load_angle", np.float64, (4,)),  # from +x counter-clockwise
-    ("places", np.float64, (4, N_PLACES)),  # of the elements in the cage, off their even spacing
-    ("pass_order", np.float64, (4,)),  # of the elements past a standing point
-    ("balls", np.int64, (4,)),  # whose contacts carry one by one; 0 where a spring stands for all
+    ("places", np.float64, (4, N_PLACES)),  # deviation of the elements from even spacing in the cage
+    ("pass_order", np.float64, (4,)),  # of the elements past a stationary point
+    ("balls", np.int64, (4,)),  # with individual contacts; 0 where one spring represents all
     ("ball_contact", np.float64, (4,)),  # K of Q = K δ^1.5, N/m^1.5
-    ("sway", np.float64, (4, 2, N_HARMONICS, 2)),  # cosine and sine parts in m of x and y at the passing
+    ("sway", np.float64, (4, 2, N_HARMONICS, 2)),  # cosine and sine parts in m of the passing motion in x and y
 ]
-"""Of the kernel's record, one entry per bearing; angles in rad."""
+"""Fields of the kernel's record, one entry per bearing; angles in rad."""
 
 
 def bearing_fields(machine: Machine, mesh_force_n: float, rng: np.random.Generator) -> dict[str, Any]:
-    """Values of `BEARING_FIELDS` at the set mesh force; draws the elements' places."""
+    """Values of `BEARING_FIELDS` at the set mesh force; draws the elements' positions in the cage."""
     supports = machine.bearings
     loads = bearing_loads_n(machine, mesh_force_n)
     defects = [_defect(b) for b in supports]
@@ -234,7 +234,7 @@ def bearing_fields(machine: Machine, mesh_force_n: float, rng: np.random.Generat
 
 
 def bearing_loads_n(machine: Machine, mesh_force_n: float) -> FloatArray:
-    """Static force on each bearing, x and y in N, (4, 2): half of its gear's load and weight, and its own weight."""
+    """Static force on each bearing, x and y in N, (4, 2): half of its gear's load and weight, plus its own weight."""
     beta = np.radians(machine.line_of_action_deg)
     down = -machine.gravity_mps2 * np.array([np.sin(beta), np.cos(beta)])
     loads = np.empty((4, 2))
@@ -251,8 +251,8 @@ def bearing_loads_n(machine: Machine, mesh_force_n: float) -> FloatArray:
 def tilting_shares(machine: Machine) -> FloatArray:
     """Force on the first bearing of each shaft along the line of centres, over the mesh force, (2,).
 
-    F_a = N tan β_b acts on the driver along z and on the driven gear against it, at the pitch radius r_w on either side
-    of the mesh: its moment F_a r_w is taken by ±F_a r_w/L on the two bearings, L apart. The first bearing stands at −z.
+    F_a = N tan β_b acts on the driver along z, on the driven gear opposite to it, at the pitch radius r_w: its moment
+    F_a r_w is supported by ±F_a r_w/L on the two bearings, L apart. The first bearing is at −z.
     """
     pair = machine.mesh.pair
     radii = np.array(pair.base_radii_m) / cos(pair.working_pressure_angle_rad)
@@ -276,13 +276,13 @@ def _defect(support: BearingSupport) -> tuple[int, float, float, float]:
             allowed=f"at most {longest:.3g} mm with this scatter of the elements",
         )
     order = bearing.orders()["BPFO" if outer else "BPFI"]
-    # A cage that slips falls behind: fewer passings outside, more inside, as n = BPFO + BPFI.
+    # A slipping cage lags: fewer passages on the outer race, more on the inner, as n = BPFO + BPFI.
     order += -defect.slip * order if outer else defect.slip * ((bearing.n_rolling_elements or 1) - order)
     return (1 if outer else 2), order, defect.length_mm / spacing, 1e-3 * spacing
 
 
 def _sway(support: BearingSupport, load_n: FloatArray) -> FloatArray:
-    """Fourier parts of the shaft's motion that clearance adds at the rolling elements' passing, (2, N_HARMONICS, 2)."""
+    """Fourier parts of the element-passing motion added by clearance, x and y, (2, N_HARMONICS, 2)."""
     if support.law == "hertzian" or support.clearance_um == 0 or np.hypot(*load_n) == 0:
         return np.zeros((2, N_HARMONICS, 2))
     motion = _carried_place(support, load_n, support.clearance_um * 1e-6) - _carried_place(support, load_n, 0.0)
@@ -291,11 +291,11 @@ def _sway(support: BearingSupport, load_n: FloatArray) -> FloatArray:
 
 
 def _carried_place(support: BearingSupport, load_n: FloatArray, clearance_m: float) -> FloatArray:
-    """Where the shaft stands, x and y in m, at even places of the cage over one element spacing, (N_ANGLES, 2)."""
+    """Shaft position less its mean, x and y in m, at even cage angles over one element spacing, (N_ANGLES, 2)."""
     n, load = support.bearing.n_rolling_elements or 1, float(np.hypot(*load_n))
     toward = np.array(load_n) / load
     deflection = load / support.stiffness_n_per_m
-    # Mean over the cage of Σ cos^2.5 ψ for a load in the middle of its zone: K follows from the bearing's stiffness.
+    # Mean over the cage of Σ cos^2.5 ψ for a load in the middle of its zone; K follows from the bearing's stiffness.
     psi = np.linspace(-pi / 2, pi / 2, 2001)
     contact = load / (deflection**1.5 * n * np.trapezoid(np.cos(psi) ** 2.5, psi) / (2 * pi))
     places = np.empty((N_ANGLES, 2))
@@ -308,35 +308,35 @@ def _carried_place(support: BearingSupport, load_n: FloatArray, clearance_m: flo
     return swing
 
 
-# Compiled: where the foot of a bearing's spring stands, and the spring's force with clearance.
+# Compiled: position of the foot of a bearing's spring, and the spring's force with clearance.
 
 MIN_LOAD = 1e-12
 EDGE_M = 5e-5
-"""Length over which an edge is rounded: a contact is some 0.2 mm wide."""
+"""Length over which an edge is rounded: a contact is about 0.2 mm wide."""
 FAR = 12.0
-"""Edge lengths outside a spall beyond which nothing is felt."""
+"""Distance outside a spall, in edge lengths, beyond which it has no effect."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def foot(k, row, theta, x, y):
-    """(d_x, d_y) in m: sinking over a race defect, and the sway of a bearing with clearance.
+    """(d_x, d_y) in m: sinking over a race defect, and the element-passing motion of a bearing with clearance.
 
-    `theta`: shaft angle. `x`, `y`: place of the shaft in the bearing, whose direction is that of the load now.
+    `theta`: shaft angle. `x`, `y`: position of the shaft in the bearing, whose direction is that of the present load.
     """
     dx, dy = 0.0, 0.0
     if k.race[row] > 0:
-        # At angle 0 the defect lies half way between two elements: nothing starts with a blow.
+        # At angle 0 the defect is halfway between two elements, so that no run starts with an impact.
         passed = k.race_order[row] * theta / (2.0 * pi) + 0.5
         element = floor(passed + 0.5)
         along = passed - element - k.places[row, int(element) % k.places.shape[1]]
         inside = (0.5 * k.race_length[row] - abs(along)) * k.race_spacing[row]
         if inside > -FAR * EDGE_M:
-            # The rounded corner of the far edge is taken off: a gap of no length is none.
+            # The rounding of the far edge is subtracted, so that a gap of zero length has no depth.
             across = k.race_length[row] * k.race_spacing[row]
             reach = EDGE_M * (_softplus(inside / EDGE_M) - _softplus((inside - across) / EDGE_M))
             depth = reach * reach / (2.0 * k.race_radius[row])
             direction = k.race_angle[row] + (k.load_angle[row] if k.race[row] == 1 else theta)
-            # The driven shaft turns clockwise: its angle counts the other way in the frame.
+            # The driven shaft turns clockwise: its angle has the opposite sign in the frame.
             if k.race[row] == 2 and row >= 2:
                 direction = -direction
             r = sqrt(x * x + y * y)
@@ -358,14 +358,14 @@ def foot(k, row, theta, x, y):
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def carried_part(k, row, x, y):
-    """(1 − c/r) beyond the clearance c, 0 within: the spring's force is that times k r. Smooth at the edge."""
+    """(1 − c/r) beyond the clearance c, 0 within, smooth at the edge; the spring's force is this times k r."""
     clearance = k.clearance[row]
     if clearance <= 0.0:
         return 1.0
     r = sqrt(x * x + y * y)
     if r <= MIN_LOAD:
         return 0.0
-    # A soft edge of a tenth of the clearance: roughness and oil carry a little before the metal does.
+    # The edge is smoothed over a tenth of the clearance: roughness and oil carry a little before the metal does.
     width = 0.1 * clearance
     over = (r - clearance) / width
     if over < -20.0:

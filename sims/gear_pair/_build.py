@@ -1,4 +1,4 @@
-"""The parameters of a spur pair, and the machine that they describe, with its rig and its measurement chain."""
+"""The parameters of a spur pair, and the machine, rig and measurement chain that they define."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ from sims.mesh import (
 from sims.simulator import Parameter, ParameterValues, Values
 
 # --------------------
-# The parameters: unit, range, meaning, default.
+# The parameters: unit, meaning, range, default.
 # --------------------
 
 
@@ -91,7 +91,7 @@ _GEARS = (
     Parameter("profile_shift_driven", "", "profile shift of the driven gear, in modules", -1, 1, 0.0),
     Parameter("addendum", "", "addendum of both gears, in modules", 0.2, 2, 1.0),
     Parameter("dedendum", "", "dedendum of both gears, in modules", 0.2, 2.5, 1.25),
-    Parameter("tool_tip_radius", "", "radius of the rack's tip, in modules; it makes the fillet", 0, 1, 0.38),
+    Parameter("tool_tip_radius", "", "tip radius of the rack, in modules; it cuts the fillet", 0, 1, 0.38),
     Parameter("centre_distance_mm", "mm", "centre distance; none: without backlash", 3, 12000, None),
     Parameter("bore_radius_driver_mm", "mm", "bore radius; none: 0.35 of the root radius", 0.1, 5000, None),
     Parameter("bore_radius_driven_mm", "mm", "bore radius; none: 0.35 of the root radius", 0.1, 5000, None),
@@ -107,22 +107,22 @@ _GEARS = (
 _MESH = (
     Parameter.choice(
         "contact_law",
-        "Hertz contact: constant stiffness or growing with the load",
+        "Hertzian contact: stiffness constant or increasing with the load",
         ("linear", "load-dependent"),
         "linear",
     ),
-    Parameter("mesh_ramp", "", "base pitches over which a tooth pair takes up its load", 0, 0.1, 0.05),
+    Parameter("mesh_ramp", "", "base pitches over which a tooth pair takes up or gives up its load", 0, 0.1, 0.05),
     Parameter.choice(
         "gear_body",
-        "whether neighbouring teeth move each other through the body, as in finite elements: a quarter softer",
+        "whether neighbouring teeth move each other through the body, as in finite elements (a quarter softer)",
         BODIES,
         "separate",
     ),
     Parameter("mesh_damping_ratio", "", "damping ratio of the mesh on its mean stiffness", 0, 1, 0.06),
-    Parameter("half_backlash_um", "um", "half of the play along the line of action", 0, 2000, 20.0),
-    Parameter("tip_relief_um", "um", "metal taken off at the tips of both gears", 0, 500, 0.0),
+    Parameter("half_backlash_um", "um", "half of the backlash along the line of action", 0, 2000, 20.0),
+    Parameter("tip_relief_um", "um", "metal removed at the tips of both gears", 0, 500, 0.0),
     Parameter("tip_relief_length_mm", "mm", "length of the relief along the line of action", 0.01, 100, 1.0),
-    Parameter("crowning_um", "um", "metal taken off at both ends of the face, a parabola from its middle", 0, 500, 0.0),
+    Parameter("crowning_um", "um", "metal removed at both ends of the face, a parabola from its middle", 0, 500, 0.0),
     Parameter("lead_error_um", "um", "misalignment of the flanks over the face width", -500, 500, 0.0),
     Parameter(
         "face_slices",
@@ -134,18 +134,18 @@ _MESH = (
         whole=True,
     ),
     Parameter(
-        "pitch_deviation_um", "um", "rms deviation of the teeth from their places, an ordinary tolerance", 0, 50, 0.0
+        "pitch_deviation_um", "um", "rms deviation of the teeth from their positions, a usual tolerance", 0, 50, 0.0
     ),
-    Parameter("tolerance_seed", "", "which specimen: seed of the teeth's deviations", 0, 1e6, 0, whole=True),
+    Parameter("tolerance_seed", "", "specimen: seed of the teeth's deviations", 0, 1e6, 0, whole=True),
     Parameter("roughness_um", "um", "composite rms roughness of both flanks", 0, 5, 0.0),
     Parameter.choice("roughness_locked_to", "what the rough profile follows", ("flank", "time", "none"), "flank"),
     Parameter("roughness_dimension", "", "fractal dimension of the rough profile", 1.001, 1.999, 1.5),
     Parameter.choice("friction", "sliding friction of the flanks", _SWITCH, "on"),
-    Parameter("friction_factor", "", "multiplies the coefficient of friction", 0, 20, 1.0),
+    Parameter("friction_factor", "", "factor on the coefficient of friction", 0, 20, 1.0),
     Parameter(
         "dry_friction",
         "",
-        "coefficient that is added at every sliding speed: starved flanks",
+        "coefficient added at every sliding speed: starved flanks",
         0,
         MAX_DRY_FRICTION,
         0.0,
@@ -164,12 +164,12 @@ _CRACK = (
 _SHAFTS = (
     Parameter("runout_driver_um", "um", "eccentricity of the driver (half its run-out)", 0, 2000, 0.0),
     Parameter("runout_driven_um", "um", "eccentricity of the driven gear (half its run-out)", 0, 2000, 0.0),
-    Parameter("runout_angle_driver_deg", "deg", "where the driver's eccentricity lies, from tooth 1", -360, 360, 0.0),
-    Parameter("runout_angle_driven_deg", "deg", "where the driven gear's eccentricity lies", -360, 360, 0.0),
+    Parameter("runout_angle_driver_deg", "deg", "angle of the driver's eccentricity, from tooth 1", -360, 360, 0.0),
+    Parameter("runout_angle_driven_deg", "deg", "angle of the driven gear's eccentricity", -360, 360, 0.0),
     Parameter("unbalance_driver_g_mm", "g mm", "unbalance of the driver", 0, 1e6, 0.0),
     Parameter("unbalance_driven_g_mm", "g mm", "unbalance of the driven gear", 0, 1e6, 0.0),
-    Parameter("unbalance_angle_driver_deg", "deg", "where the driver's unbalance lies", -360, 360, 0.0),
-    Parameter("unbalance_angle_driven_deg", "deg", "where the driven gear's unbalance lies", -360, 360, 0.0),
+    Parameter("unbalance_angle_driver_deg", "deg", "angle of the driver's unbalance", -360, 360, 0.0),
+    Parameter("unbalance_angle_driven_deg", "deg", "angle of the driven gear's unbalance", -360, 360, 0.0),
     Parameter("bending_stiffness_n_per_m", "N/m", "of each shaft, gear to bearings", 1e5, 1e12, 2e8),
     Parameter("bending_damping_n_s_per_m", "N s/m", "of each shaft, gear to bearings", 0, 1e6, 600.0),
     Parameter("torsional_stiffness_nm_per_rad", "N m/rad", "of each shaft, gear to rotor", 1, 1e9, 4e4),
@@ -181,7 +181,7 @@ _SHAFTS = (
     Parameter(
         "governor_nm_s_per_rad",
         "N m s/rad",
-        "of the drive; it holds the mean speed; none: recovers in 0.06 s",
+        "gain of the drive's speed control, which holds the mean speed; none: recovers in 0.06 s",
         1e-6,
         1e5,
         None,
@@ -200,10 +200,10 @@ _SHAFTS = (
 _BEARINGS = (
     Parameter("bearing_stiffness_n_per_m", "N/m", "of each bearing, to the ground", 1e5, 1e12, 2e8),
     Parameter("bearing_damping_n_s_per_m", "N s/m", "of each bearing, to the ground", 0, 1e6, 1500.0),
-    Parameter("bearing_mass_kg", "kg", "moving with each bearing", 1e-3, 1e4, 0.3),
+    Parameter("bearing_mass_kg", "kg", "mass that moves with each bearing", 1e-3, 1e4, 0.3),
     Parameter.choice(
         "bearing_law",
-        "one spring for each bearing, or Hertzian contacts of its balls one by one, as stiff as their size makes them",
+        "one spring for each bearing, or a Hertzian contact for each of its balls, with the stiffness of their size",
         BEARING_LAWS,
         "linear",
     ),
@@ -219,18 +219,18 @@ _CHAIN = (
         "channels", "a1 and a2, vertical at bearings 1 and 3; or vertical and horizontal at all", ("two", "all"), "two"
     ),
     Parameter.choice("path_modes", "modes of the housing between bearing and sensor", _SWITCH, "on"),
-    Parameter("noise_mps2", "m/s^2", "vibration of the surroundings, rms in the band of the recording", 0, 1000, 0.05),
-    Parameter("noise_slope", "", "power density of it goes as 1/f^slope: 0 white, 1 pink, 2 red", -2, 3, 0.0),
+    Parameter("noise_mps2", "m/s^2", "ambient vibration, rms in the recording's band", 0, 1000, 0.05),
+    Parameter("noise_slope", "", "its power density is proportional to 1/f^slope: 0 white, 1 pink, 2 red", -2, 3, 0.0),
     Parameter("sensor_noise_mps2_per_sqrt_hz", "m/s^2/√Hz", "white noise of the accelerometers", 0, 10, 2e-4),
     Parameter("sensor_resonance_hz", "Hz", "of the mounted accelerometers; 0: flat", 0, 1e5, 25000.0),
     Parameter("sensor_bias_mps2", "m/s^2", "offset of the accelerometers at the recording's start", -1e3, 1e3, 0.0),
     Parameter("sensor_drift_mps2_per_s", "m/s^2/s", "change of that offset, as from warming up", -1e3, 1e3, 0.0),
-    Parameter("sensor_range_mps2", "m/s^2", "range of accelerometers and converter, either way", 0.1, 1e6, 500.0),
+    Parameter("sensor_range_mps2", "m/s^2", "range (±) of accelerometers and converter", 0.1, 1e6, 500.0),
     Parameter("converter_bits", "", "bits of the converter", 8, 32, 24, whole=True),
     Parameter(
         "tachometer_pulses",
         "",
-        "pulses per revolution of the input shaft, the first where tooth 1 comes in; 0: none",
+        "pulses per revolution of the input shaft, the first when tooth 1 engages; 0: none",
         0,
         1024,
         1,
@@ -252,11 +252,11 @@ _CHAIN = (
 )
 
 PARAMETERS: tuple[Parameter, ...] = (*_GEARS, *_MESH, *_CRACK, *_SHAFTS, *_BEARINGS, *_CHAIN)
-"""All of them, by part of the machine."""
+"""All parameters, grouped by part of the machine."""
 
 
 # --------------------
-# The machine that they describe.
+# The machine that they define.
 # --------------------
 
 
@@ -268,16 +268,16 @@ _PLACES = (
     (2, "input shaft, free end"),
     (4, "output shaft, free end"),
 )
-"""Bearings in the order of their channels."""
+"""Bearings in the order of their channels, with their positions."""
 
 _HOUSING = (
     HousingMode(1150.0, 0.03, 0.06, (1.0, 0.8, 0.9, 0.7)),
     HousingMode(2900.0, 0.02, 0.05, (1.0, -0.7, 0.6, -0.8)),
     HousingMode(6300.0, 0.02, 0.04, (1.0, 0.5, -0.9, -0.4)),
 )
-"""The housing's modes where none are given: plausible for a small cast housing; no housing was measured."""
+"""Default modes of the housing: plausible for a small cast housing; no housing was measured."""
 _HORIZONTAL = 0.85
-"""Horizontal modes lie lower by this factor: a housing stands on its feet."""
+"""Factor on the frequencies of horizontal modes, which are lower because a housing stands on its feet."""
 
 
 def build_chain(
@@ -287,18 +287,18 @@ def build_chain(
     sampling_rate_hz: float,
     installed: Installed | None = None,
 ) -> MeasurementChain:
-    """Return the chain that the parameters describe.
+    """Return the measurement chain that the parameters define.
 
     Parameters
     ----------
     values : ParameterValues
     line_of_action_deg : float
-        β: upwards is x sin β + y cos β, to the right x cos β − y sin β.
+        β: the upward direction is x sin β + y cos β, to the right is x cos β − y sin β.
     first_pulse_rev : (float, float)
         Angle of the driver's and the driven shaft at a rising edge of a tachometer on it.
     sampling_rate_hz : float
     installed : Installed or None
-        Its sensors, housing and tachometer take the place of the usual ones.
+        Its sensors, housing and tachometer replace the usual ones.
     """
     beta = radians(line_of_action_deg)
     directions = {"vertical": (sin(beta), cos(beta)), "horizontal": (cos(beta), -sin(beta))}
@@ -352,7 +352,7 @@ def _channel(
 
 
 def _path(bearing: int, direction: tuple[float, float], factor: float, housing: tuple[HousingMode, ...]) -> ModalPath:
-    """Straight from the bearing under the sensor, and by the housing's modes from the forces of all four."""
+    """Path from the bearing under the sensor directly, and from the forces of all four through the housing's modes."""
     modes = [
         PathMode(
             factor * mode.frequency_hz,
@@ -385,27 +385,27 @@ def _tachometer(
 
 
 def _encoders(values: ParameterValues, shafts: tuple[str, str]) -> tuple[Encoder, ...]:
-    """One at each gear: what lies between both is the transmission error."""
+    """One encoder at each gear: their difference is the transmission error."""
     counts, noise_deg = values.whole("encoder_counts"), values.number("encoder_noise_arcsec") / 3600.0
     return tuple(Encoder(f"{shaft} encoder", shaft, counts, noise_deg=noise_deg) for shaft in shafts if counts)
 
 
 SHAFTS = ("input", "output")
-"""Names of the driver's and the driven shaft where none are given."""
+"""Default names of the driver's and the driven shaft."""
 
 
 def build_machine(values: Values, *, sampling_rate_hz: float = 20480.0, installed: Installed | None = None) -> Machine:
-    """Return the machine that complete values of `PARAMETERS` describe, with what is fitted to it.
+    """Return the machine defined by complete values of `PARAMETERS`, with its fittings.
 
     Raises
     ------
     InputError
-        If parameters do not fit each other: teeth that interfere, a crack past the tooth, balls that overlap.
+        If parameters are inconsistent: teeth that interfere, a crack beyond the tooth, balls that overlap.
     """
     parameters = ParameterValues(values)
     mesh = build_mesh(parameters)
     line_deg = parameters.optional("line_of_action_deg")
-    if line_deg is None:  # the line of centres, α_w ahead of x, lies level
+    if line_deg is None:  # the line of centres, α_w ahead of x, is horizontal
         line_deg = -degrees(mesh.pair.working_pressure_angle_rad)
     return Machine(
         mesh=mesh,
@@ -466,13 +466,13 @@ def _lead(values: ParameterValues) -> Lead:
 
 
 def build_rig(machine: Machine, operation: Operation, *, name: str = "", sources: Sequence[str] = ()) -> Rig:
-    """Return what somebody who knows the machine's drawing would write into a rig file; no damage is in it.
+    """Return the rig as it would be described from the machine's drawing, without any damage.
 
     Parameters
     ----------
     machine : Machine
     operation : Operation
-        Speed and torque are stated where they are constant.
+        Speed and torque are stated if they are constant.
     name : str
     sources : sequence of str
     """
@@ -504,10 +504,10 @@ def build_rig(machine: Machine, operation: Operation, *, name: str = "", sources
 
 
 def _first_pulse_rev(pair: PairGeometry) -> tuple[float, float]:
-    """Angle at which the tachometer's disc is fitted: half a tooth pitch later, tooth 0 is half through its contact.
+    """Angles of the tachometer's rising edge: half a tooth pitch later, tooth 0 is halfway through its contact.
 
-    So tooth 0 is engaged during the first pitch after the edge, tooth 1 during the next: as diagnoses count teeth.
-    One for a disc on the driver's shaft, one for the driven shaft.
+    Tooth 0 is thus engaged during the first pitch after the edge and tooth 1 during the next, as diagnoses number
+    teeth. One angle for a disc on the driver's shaft, one for the driven shaft.
     """
     pitches = pair.contact_ratio / 2.0 - 0.5
     return pitches / pair.driver.teeth, pitches / pair.driven.teeth
@@ -548,7 +548,7 @@ def _flank(values: ParameterValues, gear: GearGeometry, side: int) -> FlankDevia
 
 
 def _pitch_um(values: ParameterValues, teeth: int, side: int) -> tuple[float, ...]:
-    """Deviations of one specimen's teeth from their places, of the wanted rms and zero mean; the same in every run."""
+    """Deviations of one specimen's teeth, with the given rms and zero mean; the same in every run."""
     rms_um = values.number("pitch_deviation_um")
     if rms_um == 0.0:
         return ()

@@ -24,7 +24,7 @@ class SensorSeat:
     ----------
     channel : str
     bearing : int
-        1 to 4: two of the driver's shaft, then two of the driven one's.
+        1 to 4: two on the driver's shaft, then two on the driven shaft.
     direction : str
         "vertical" or "horizontal".
     position : str
@@ -48,9 +48,9 @@ class HousingMode:
     Parameters
     ----------
     frequency_hz, damping_ratio : float
-        Of the vertical mode; the horizontal one lies lower.
+        Of the vertical mode; the horizontal one has a lower frequency.
     gain : float
-        Static gain where the shape is 1.
+        Static gain at shape 1.
     shape : tuple of four floats
         At bearings 1 to 4.
     """
@@ -71,7 +71,7 @@ class HousingMode:
 
 @dataclass(frozen=True)
 class Pickup:
-    """The tachometer: its channel, and the side whose shaft carries its disc, 0 the driver."""
+    """The tachometer: its channel, and the side whose shaft carries its disc (0: driver)."""
 
     channel: str = "tacho"
     side: int = 0
@@ -84,7 +84,7 @@ class Pickup:
 
 @dataclass(frozen=True)
 class Installed:
-    """What is fitted to one machine.
+    """The fittings of one machine.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ class Installed:
             positive(bearing.n_rolling_elements or 0, f"n_rolling_elements of bearing {bearing.name!r}")
 
 
-# What is fitted to a machine, as a table of a preset file and back; files are not trusted.
+# A machine's fittings as a table of a preset file and back; files are not trusted.
 
 _LISTS = {"bearings": Bearing, "sensors": SensorSeat, "modes": HousingMode}
 _KEYS = ("shafts", "pickup", *_LISTS)
@@ -132,18 +132,18 @@ _PLACE = "[installed]"
 
 
 def table_of(installed: Installed) -> dict[str, Any]:
-    """Return what is fitted as plain tables; `installed_of` reads them back."""
+    """Return the fittings as plain tables; `installed_of` reads them back."""
     lists = {name: [to_table(item) for item in getattr(installed, name)] for name in _LISTS}
     return {"shafts": list(installed.shafts), "pickup": to_table(installed.pickup), **lists}
 
 
 def installed_of(table: Mapping[str, Any]) -> Installed:
-    """Read what is fitted from plain tables.
+    """Read fittings from plain tables.
 
     Raises
     ------
     InputError
-        If a key is missing or not known, or a value does not fit.
+        If a key is missing or unknown, or a value is not allowed.
     """
     if set(table) != set(_KEYS):
         raise InputError(f"has the keys {', '.join(map(str, table))}", where=_PLACE, allowed=", ".join(_KEYS))
@@ -160,32 +160,32 @@ def _items(kind: type, rows: object, where: str) -> tuple[Any, ...]:
     return tuple(from_table(kind, row, f"{where} {i}") for i, row in enumerate(rows, 1))
 
 
-# A rig's bearings and sensors at the places that the model has for them.
+# Assignment of a rig's bearings and sensors to the model's positions.
 
 BALLS, BALL_MM, PITCH_MM = 9, 7.94, 39.04
 """A usual bearing of a machine of size 1."""
 USUAL_SPLIT = 0.4
 """BPFO over the number of elements, where only one order is known."""
 SEAT_ORDER = (1, 3, 2, 4)
-"""Bearings under the sensors whose place is not told."""
+"""Bearings assigned in turn to sensors without a stated position."""
 MAX_RIG_SENSORS = 4
 UNLISTED = "unlisted bearing"
 MIN_PULSES = 4
-"""Per revolution, where the rig's speed is not told by a tachometer: well known speed, but no mark on a tooth."""
+"""Pulses per revolution if the rig has no tachometer: the speed is well known, but no pulse marks a tooth."""
 
 
 def installed_of_rig(rig: Rig, size: float, modes: Sequence[HousingMode], used: Sequence[str] = ()) -> Installed:
-    """Return the rig's own shafts, bearings, sensors and tachometer; what it lacks is usual for the size.
+    """Return the rig's shafts, bearings, sensors and tachometer, completed with those usual for the size.
 
     Parameters
     ----------
     rig : Rig
         With one gear pair.
     size : float
-        See `sims.gear_pair.Nominal.size`.
+        See `sims.machine.Nominal.size`.
     modes : sequence of HousingMode
     used : sequence of str
-        Bearings that must have a place: a model's shaft has only two.
+        Bearings that must be included: a shaft of the model has only two.
     """
     pair = rig.pairs[0]
     shafts = (pair.driver, pair.driven)
@@ -205,7 +205,7 @@ def installed_of_rig(rig: Rig, size: float, modes: Sequence[HousingMode], used: 
 
 
 def completed_bearing(bearing: Bearing, size: float) -> Bearing:
-    """Return a bearing with a geometry that gives its orders; where nothing is known, a usual one's.
+    """Return a bearing with a geometry that gives its orders; a usual geometry if nothing is known.
 
     n = BPFO + BPFI and d/D = (BPFI − BPFO)/n, with contact angle 0.
     """
@@ -220,12 +220,12 @@ def completed_bearing(bearing: Bearing, size: float) -> Bearing:
         n = max(round((outer or 0.0) / USUAL_SPLIT or (inner or 0.0) / (1.0 - USUAL_SPLIT)), 3)
         share = 1.0 - 2.0 * outer / n if outer is not None else 2.0 * (inner or 0.0) / n - 1.0
     pitch = PITCH_MM * size
-    ball = min(max(share, 0.05), 0.9 * sin(pi / n)) * pitch  # at sin π/n they touch each other
+    ball = min(max(share, 0.05), 0.9 * sin(pi / n)) * pitch  # at sin π/n the elements touch each other
     return replace(bearing, n_rolling_elements=n, rolling_element_diameter_mm=ball, pitch_diameter_mm=pitch)
 
 
 def _spare(rig: Rig, shaft: str, number: int, size: float) -> Bearing:
-    """A healthy bearing that the rig says nothing of."""
+    """A healthy bearing that the rig does not list."""
     name = f"{UNLISTED} {number}"
     while name in {b.name for b in rig.bearings}:
         name += "'"
@@ -245,7 +245,7 @@ def _pickup(rig: Rig, shafts: tuple[str, str]) -> Pickup:
 
 
 def _sensors(rig: Rig, bearings: Sequence[Bearing], tacho: str) -> tuple[SensorSeat, ...]:
-    """Return a seat for each of the rig's accelerometers: where its position says, else one bearing after another."""
+    """Return a seat for each of the rig's accelerometers: by its position, or else one bearing after another."""
     rig_sensors = [s for s in rig.sensors if s.quantity == "acceleration" and s.channel != tacho][:MAX_RIG_SENSORS]
     if not rig_sensors:
         rig_channels = {s.channel for s in rig.sensors} | {tacho}
@@ -263,14 +263,14 @@ def _sensors(rig: Rig, bearings: Sequence[Bearing], tacho: str) -> tuple[SensorS
 
 
 def _near(position: str, bearings: Sequence[Bearing]) -> list[int]:
-    """Numbers of the bearings that a sensor's position may mean: by a bearing's name, else by a shaft's."""
+    """Numbers of the bearings that a sensor's position may refer to: by the bearing's name, or else the shaft's."""
     by_bearing = [n for n, b in enumerate(bearings, 1) if b.name.lower() in position]
     by_shaft = [n for n, b in enumerate(bearings, 1) if b.shaft.lower() in position]
     return by_bearing or by_shaft
 
 
 def further_seats(installed: Installed) -> tuple[SensorSeat, ...]:
-    """Return upright sensors over the bearings that have none."""
+    """Return vertical sensors over the bearings that have none."""
     occupied = {seat.bearing for seat in installed.sensors}
     names = {seat.channel for seat in installed.sensors} | {installed.pickup.channel}
     seats = []

@@ -1,4 +1,4 @@
-"""A run of a gear pair: its drive, steps that can be interrupted, signals on an even grid, and what is measured."""
+"""A run of a gear pair: its drive, interruptible integration, signals on an even grid, and the measurement."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ from sims.mesh import (
 )
 
 # --------------------
-# Drive, inertias and friction as plain numbers, which compiled code reads.
+# Drive, inertias and friction as plain numbers for compiled code.
 # --------------------
 
 
 MAX_LINES = 8
-"""Torque ripples, or speed swings, at once."""
+"""Maximum number of torque ripples, and of speed swings."""
 MACHINE_FIELDS: list[Any] = [
     *(
         (name, np.float64)
@@ -53,7 +53,7 @@ MACHINE_FIELDS: list[Any] = [
     ("n_swings", np.int64),
     ("swings", np.float64, (MAX_LINES, 3)),
 ]
-"""Of the record of either model, in SI units; those of a side in pairs (driver, driven)."""
+"""Fields common to both models' records, in SI units; those per side in pairs (driver, driven)."""
 
 
 def machine_fields(machine: Machine) -> dict[str, Any]:
@@ -88,14 +88,14 @@ def machine_fields(machine: Machine) -> dict[str, Any]:
 
 
 def total_inertia_kg_m2(machine: Machine) -> float:
-    """Everything that turns, as the input shaft feels it."""
+    """Total rotating inertia referred to the input shaft."""
     (input_shaft, output_shaft), (driver, driven) = machine.shafts, machine.wheels
     far = driven.inertia_kg_m2 + output_shaft.rotor_inertia_kg_m2
     return input_shaft.rotor_inertia_kg_m2 + driver.inertia_kg_m2 + far / machine.ratio**2
 
 
 def governor_nm_s_per_rad(machine: Machine) -> float:
-    """G of the drive; an ordinary one suits what it turns."""
+    """Governor gain g of the drive; if none is stated, such that the speed recovers in `RECOVERY_S`."""
     stated = machine.drive.governor_nm_s_per_rad
     return 2.0 * total_inertia_kg_m2(machine) / RECOVERY_S if stated is None else stated
 
@@ -108,13 +108,13 @@ def _rows(items: list[tuple[float, float, float]], kind: str) -> FloatArray:
     return rows
 
 
-# Friction between the teeth as plain numbers, which compiled code reads.
+# Friction between the teeth as plain numbers for compiled code.
 
 STICKING, STICKING_S = 0.1, 1e-5
-"""Friction coefficient, and time within which it must not turn a gear's sliding round: near standstill the smoothed
-sign is as stiff as a spring, and a fixed step would chatter."""
+"""Friction coefficient, and time within which it must not reverse a gear's sliding: near standstill the smoothed sign
+is as stiff as a spring, and a fixed step would chatter."""
 SIGN_THRESHOLD = 0.01
-"""Sliding speed below which the sign of friction is smoothed, over the mesh's greatest sliding speed."""
+"""Sliding speed below which the sign of friction is smoothed, relative to the mesh's maximum sliding speed."""
 FRICTION_FIELDS: list[Any] = [
     ("friction", np.bool_),
     *(
@@ -126,7 +126,7 @@ FRICTION_FIELDS: list[Any] = [
         )
     ),
 ]
-"""Of the record: what `friction_of_pair` needs."""
+"""Fields of the record that `friction_of_pair` needs."""
 
 
 def friction_fields(machine: Machine, operation: Operation, force_n: float) -> dict[str, Any]:
@@ -152,7 +152,7 @@ def friction_fields(machine: Machine, operation: Operation, force_n: float) -> d
 
 
 def greatest_sliding_mps(machine: Machine, omega_rad_s: float) -> float:
-    """Sliding speed at the end of the path of contact where it is greatest."""
+    """Maximum sliding speed, reached at one end of the path of contact."""
     pair = machine.mesh.pair
     cycles = np.array([0.0, pair.contact_ratio])
     return float(np.max(np.abs(pair.sliding_speed_m_s(cycles, omega_rad_s * 30.0 / pi))))
@@ -160,7 +160,7 @@ def greatest_sliding_mps(machine: Machine, omega_rad_s: float) -> float:
 
 @njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)  # type: ignore[untyped-decorator,unused-ignore]
 def friction_of_pair(k, force, progress, omega_1, omega_2, slip_x, width):  # type: ignore[no-untyped-def]
-    """(f, fρ1, fρ2) of a pair at ζ; the film knows the speeds, the sign of its friction feels `slip_x` besides."""
+    """(f, fρ1, fρ2) of a pair at ζ; the film depends on the rolling speeds, the sign of friction also on `slip_x`."""
     rho_1 = k.start_radius + progress * k.base_pitch
     rho_2 = k.action_length - rho_1
     rubbing = contact_friction_n(
@@ -180,13 +180,13 @@ def friction_of_pair(k, force, progress, omega_1, omega_2, slip_x, width):  # ty
     return rubbing, rubbing * rho_1, rubbing * rho_2
 
 
-# Roughness of a pair's flanks, drawn.
+# Random roughness of a pair's flanks.
 
 
 def draw_roughness(machine: Machine, rng: np.random.Generator) -> tuple[Machine, TimeLockedRoughness]:
-    """Give every tooth its profile, or the backlash its endless one; returns what the mesh and the kernel need.
+    """Draw a profile for every tooth, or an endless one for the backlash; return the machine and the endless profile.
 
-    Composite roughness S is shared evenly by the two flanks of a pair: each has S/√2.
+    The composite roughness S is divided evenly between the two flanks of a pair: each has S/√2.
     """
     rough, pair = machine.roughness, machine.mesh.pair
     endless = FractalSurface.of_roughness(rough.rms_um if rough.locked_to == "time" else 0.0, rough.dimension)
@@ -199,13 +199,13 @@ def draw_roughness(machine: Machine, rng: np.random.Generator) -> tuple[Machine,
 
 
 # --------------------
-# Running: in parts that can be interrupted, onto an even grid, and what is measured of it.
+# Running: in interruptible parts, with output on an even grid.
 # --------------------
 
 
 State = TypeVar("State")
 March = Callable[[float, int, FloatArray, FloatArray], int]
-"""(time_s, n_steps, rows, energies) → rows that were filled, fewer than there are where the solution bursts."""
+"""(time_s, n_steps, rows, energies) → number of rows filled, fewer than available if the solution diverges."""
 
 
 @dataclass(frozen=True)
@@ -220,9 +220,9 @@ class PairResponse(Result, Generic[State], columns=("time_s", "signals")):
     step_s : float
         Of the integrator.
     energy_j : array
-        Potential, kinetic and gravitational energy, (n,), or empty where it was not asked for.
+        Sum of potential, kinetic and gravitational energy, (n,), or empty if not requested.
     last : state of the model or None
-        At the end of the last step: one step after the last point where every step is kept.
+        At the end of the last step: one step after the last point if every step is kept.
     """
 
     start_s: float
@@ -234,12 +234,12 @@ class PairResponse(Result, Generic[State], columns=("time_s", "signals")):
 
     @property
     def time_s(self) -> FloatArray:
-        """Times of the points."""
+        """Times of the points, (n,)."""
         return self.start_s + self.interval_s * np.arange(len(next(iter(self.signals.values()))))
 
     @property
     def ends_s(self) -> float:
-        """When a run that goes on from `last` begins."""
+        """Start time of a run that continues from `last`."""
         return self.start_s + self.interval_s * len(self.time_s)
 
     def __getitem__(self, name: str) -> FloatArray:
@@ -247,7 +247,7 @@ class PairResponse(Result, Generic[State], columns=("time_s", "signals")):
         return self.signals[name]
 
     def followed_by(self, other: PairResponse[State]) -> PairResponse[State]:
-        """Return this run and one that went on from its last state, of the same signals, as one."""
+        """Return this run joined with one that continued from its last state, with the same signals."""
         signals = {name: np.concatenate((values, other[name])) for name, values in self.signals.items()}
         return replace(
             other, start_s=self.start_s, signals=signals, energy_j=np.concatenate((self.energy_j, other.energy_j))
@@ -255,7 +255,7 @@ class PairResponse(Result, Generic[State], columns=("time_s", "signals")):
 
 
 MAX_STEPS = 400_000_000
-"""Ten minutes to half an hour of computing or so; more is taken for a mistake."""
+"""About ten minutes to half an hour of computing; more is taken for a mistake."""
 
 
 @dataclass(frozen=True)
@@ -266,9 +266,9 @@ class RunPlan:
     ----------
     start_s, duration_s, step_s : float
     stride : int
-        Every how many steps a point is kept.
+        Steps per kept point.
     steps_per_call : int
-        After these many compiled code comes back for a look whether it is to stop.
+        Steps after which compiled code returns, so that the run can be interrupted.
     """
 
     start_s: float
@@ -291,18 +291,18 @@ class RunPlan:
 
     @property
     def n_steps(self) -> int:
-        """Steps that reach the end."""
+        """Number of steps to the end."""
         return ceil(self.duration_s / self.step_s - 1e-9)
 
     def run(
         self, march: March, signals: Sequence[str], *, with_energy: bool, remedy: str
     ) -> tuple[dict[str, FloatArray], FloatArray]:
-        """Return the signals by name, and the energies where they are asked for.
+        """Return the signals by name, and the energies if requested.
 
         Raises
         ------
         RefusalError
-            If the solution grows beyond all bounds.
+            If the solution diverges.
         """
         every, n_steps = self.stride, self.n_steps
         rows = np.empty((-(-n_steps // every), len(signals)))
@@ -316,7 +316,7 @@ class RunPlan:
             )
             if filled < len(rows[part]) or not np.isfinite(rows[part]).all():
                 raise RefusalError(
-                    f"the solution grows beyond all bounds after {(begun + filled * every) * self.step_s:.3g} s "
+                    f"the solution diverges after {(begun + filled * every) * self.step_s:.3g} s "
                     f"at a step of {self.step_s:.3g} s",
                     remedy=remedy,
                 )
@@ -325,12 +325,12 @@ class RunPlan:
 
 @dataclass(frozen=True)
 class StepConvergence:
-    """What a shorter step of the integrator changes.
+    """Effect of a shorter integration step.
 
     Parameters
     ----------
     steps_s : tuple of float
-        The step in use first, the most exact run last.
+        The step in use first, that of the most accurate run last.
     rms : mapping
         Name of a signal → rms about its mean at each step.
     allowed : float
@@ -343,7 +343,7 @@ class StepConvergence:
 
     @classmethod
     def of(cls, runs: Sequence[PairResponse[State]], allowed: float, *, first: float = 0.0) -> StepConvergence:
-        """Compare runs with the same signals, from the part `first` of each on."""
+        """Compare runs with the same signals, omitting the initial fraction `first` of each."""
 
         def rms(values: FloatArray) -> float:
             return float(np.std(values[int(first * len(values)) :]))
@@ -352,17 +352,17 @@ class StepConvergence:
 
     @property
     def error(self) -> float:
-        """Greatest relative difference of an rms at the step in use from that of the most exact run."""
+        """Maximum relative difference of an rms at the step in use from that of the most accurate run."""
         return max(abs(values[0] / values[-1] - 1.0) for values in self.rms.values())
 
     @property
     def converged(self) -> bool:
-        """Whether the error is allowed."""
+        """Whether the error is within the allowed one."""
         return self.error <= self.allowed
 
     @property
     def text(self) -> str:
-        """For people: a line for each step and signal, and the verdict."""
+        """Readable summary: a line for each step and signal, and the verdict."""
         lines = [
             f"step {1e6 * step:8.4f} us: rms of {name} {values[i]:.6g}"
             for name, values in self.rms.items()
@@ -373,12 +373,12 @@ class StepConvergence:
 
 
 def profile_points(profile: Profile, factor: float) -> FloatArray:
-    """Times and values as kernels take them, (2, n)."""
+    """Times and scaled values in the form that kernels read, (2, n)."""
     return np.ascontiguousarray(np.vstack((profile.times_s, factor * np.asarray(profile.values))), dtype=np.float64)
 
 
 # --------------------
-# From the motion to a recording: what the measurement chain needs of a model, and what it makes of it.
+# From the motion to a recording: what the measurement chain needs from a model, and the measurement.
 # --------------------
 
 
@@ -393,52 +393,53 @@ COORDINATES = (
     "driven y",
     *(f"bearing {i} {axis}" for i in (1, 2, 3, 4) for axis in ("x", "y")),
 )
-"""Places in rad and m; models give their velocities and accelerations, too."""
+"""Coordinates in rad and m; models also give their velocities and accelerations."""
 ANGLES = COORDINATES[1:3]
 DEFLECTIONS = tuple(f"{name} yield" for name in COORDINATES[8:])
-"""By how much each bearing's spring is pressed, in m: its force over its stiffness without clearance, or over that at
-the load where balls carry one by one. That force moves the housing; where rolling elements pass, the shaft follows,
-and little of its motion reaches the housing."""
+"""Deflection of each bearing's spring in m: its force over its stiffness without clearance, or, with individual ball
+contacts, over the stiffness at the load. That force moves the housing; the shaft also follows the passing elements, and
+little of that motion reaches the housing."""
 POSITIONS = (*COORDINATES[4:], *DEFLECTIONS)
-"""Places whose acceleration a path can start from, each with its direction."""
+"""Positions at which a transfer path can start, each with its direction."""
 POINTS_PER_CYCLE = 6
-"""Of the fastest resonance in path and sensor, in the motion handed to the measurement chain."""
+"""Points per cycle of the fastest resonance in path and sensor, in the motion passed to the measurement chain."""
 MIN_MOTION_HZ = 80_000.0
-"""Rate of that motion at least: what the model still holds above half of it would fold back."""
+"""Minimum rate of that motion: content above half of it would alias."""
 CONTINUED_LEAD_IN_S = 0.1
-"""Of the lead-in that a run has to itself where it goes on from another."""
+"""Last part of the lead-in, which is simulated separately in a run that continues another."""
 SETTLING = 6.0
-"""Time constants of the slowest start-up motion that are left out ahead of the recording."""
+"""Time constants of the slowest start-up motion that are discarded before the recording."""
 
 
 @dataclass(frozen=True)
 class MeasuredRun(Generic[State]):
-    """What is asked of a run that is measured.
+    """Request for a measured run.
 
     Parameters
     ----------
     rng : numpy.random.Generator
-        Two streams are made of it, one for the machine and one for the chain: the same seed gives the same noise
-        whatever the machine draws.
+        Spawns two streams, one for the machine and one for the chain: the same seed gives the same noise whatever the
+        machine draws.
     sampling_rate_hz, duration_s : float
         Of the recording.
     rig : Rig or None
-        Goes with the recording.
+        Stored in the recording.
     truth : mapping
-        What was asked for; the model adds what it knows of machine and solver.
+        The inputs; the model adds its data of machine and solver.
     step_s : float or None
-        Longest step of the integrator; None: the model's. It is shortened to what the model needs, and to a whole part
-        of the sampling interval.
+        Maximum step of the integrator; None: the model's. It is shortened to what the model needs, and to an integer
+        fraction of the sampling interval.
     also : sequence of str
-        Signals of the model wanted in the motion besides those that are measured.
+        Signals of the model required in addition to those that are measured.
     first : state of the model or None
-        Where the lead-in starts; None: at the static balance.
+        Start of the lead-in; None: static equilibrium.
     before : PairResponse or None
-        `Measurement.lead_in` of the same machine in another state: the run goes on from its end, as a tooth breaks.
+        `Measurement.lead_in` of the same machine in another state: the run continues from its end, as when a tooth
+        breaks.
     min_motion_hz : float
-        Rate of the motion at least that is handed to the measurement chain.
+        Minimum rate of the motion passed to the measurement chain.
     noise_rng : numpy.random.Generator or None
-        For the chain, instead of the stream made of `rng`: the same machine with other noise.
+        For the chain, instead of the stream from `rng`: the same machine with other noise.
     """
 
     rng: np.random.Generator
@@ -454,14 +455,14 @@ class MeasuredRun(Generic[State]):
     noise_rng: np.random.Generator | None = None
 
     def streams(self) -> tuple[np.random.Generator, np.random.Generator]:
-        """Return the generators of the machine and of the chain; to be called once."""
+        """Return the generators for the machine and for the chain; to be called only once."""
         machine_rng, chain_rng = self.rng.spawn(2)
         return machine_rng, chain_rng if self.noise_rng is None else self.noise_rng
 
 
 @dataclass(frozen=True)
 class Measurement(Generic[State]):
-    """How a machine is run to be measured, and the recording of it; time 0 of its profiles is a sample.
+    """Plan of a measured run, and its recording; time 0 of the profiles is a sample.
 
     Parameters
     ----------
@@ -470,13 +471,13 @@ class Measurement(Generic[State]):
     chain : MeasurementChain
         At the sampling rate of the recording.
     lead_in_s : float
-        Of what goes before the recording.
+        Simulated time before the recording.
     step_s : float
-        Of the integrator, a whole part of the sampling interval.
+        Of the integrator, an integer fraction of the sampling interval.
     stride : int
-        Every how many steps a point is kept.
+        Steps per kept point.
     positions : tuple of str
-        Places that the channels' paths start from.
+        Positions at which the channels' paths start.
     """
 
     machine: Machine
@@ -494,7 +495,7 @@ class Measurement(Generic[State]):
         Raises
         ------
         InputError
-            If rate, duration or step are not above 0.
+            If rate, duration or step is not above 0.
         """
         positive(run.duration_s, "duration_s", "s")
         rate = positive(run.sampling_rate_hz, "sampling_rate_hz", "Hz")
@@ -513,7 +514,7 @@ class Measurement(Generic[State]):
 
     @property
     def motion(self) -> dict[str, Any]:
-        """How the model is to respond, by the names of its parameters: times, steps, signals, first state."""
+        """Keyword arguments for the model's response: times, steps, signals, first state."""
         needed = [name for position in self.positions for name in self._signals_at(position)]
         return {
             "duration_s": self.chain.simulated_s(self.run.duration_s, self.lead_in_s)
@@ -527,13 +528,13 @@ class Measurement(Generic[State]):
 
     @property
     def lead_in(self) -> dict[str, Any] | None:
-        """The same up to `CONTINUED_LEAD_IN_S` before the recording; runs in another state go on there."""
+        """The same up to `CONTINUED_LEAD_IN_S` before the recording, where runs in another state continue."""
         n_points = floor((self.lead_in_s - CONTINUED_LEAD_IN_S) / (self.step_s * self.stride))
         return {**self.motion, "duration_s": n_points * self.step_s * self.stride} if n_points > 0 else None
 
     @property
     def rest(self) -> dict[str, Any]:
-        """The same from where the run before it ended."""
+        """The same from the end of the run before."""
         before = self.run.before
         if before is None:
             return self.motion
@@ -546,11 +547,11 @@ class Measurement(Generic[State]):
         return (f"{place} acceleration", *((place, position) if self._rolls(position) else ()))
 
     def _rolls(self, position: str) -> bool:
-        """Whether a bearing's shaft moves by itself as its rolling elements pass, else as the spring yields."""
+        """Whether the shaft moves with the passing elements, apart from the spring's deflection."""
         return position in DEFLECTIONS and self.machine.bearings[DEFLECTIONS.index(position) // 2].elements_pass
 
     def _acceleration(self, response: PairResponse[State], position: str) -> FloatArray:
-        """Return a place's acceleration; of a yield by differences of what it is less than the shaft's motion."""
+        """Return a position's acceleration; a yield's includes second differences of its deviation from the shaft."""
         place = position.removesuffix(" yield")
         acceleration = response[f"{place} acceleration"]
         if not self._rolls(position):
@@ -578,7 +579,7 @@ class Measurement(Generic[State]):
         known : mapping
             What the model adds to the truth.
         notes : sequence of str
-            Where formulas are used outside their range: warnings of the recording.
+            Formulas used outside their range; they become warnings of the recording.
         source, reader : str
             For its provenance.
         """
@@ -602,20 +603,20 @@ class Measurement(Generic[State]):
 
 
 def lead_in_s(machine: Machine, chain: MeasurementChain) -> float:
-    """Time ahead of the recording: filters, the drive's governor, and the least damped start-up ringing settle."""
+    """Simulated time before the recording, in which filters, the governor and the start-up ringing settle."""
     recovery = 2.0 * total_inertia_kg_m2(machine) / governor_nm_s_per_rad(machine)
     return max(chain.lead_in_s, SETTLING * recovery, 0.1)
 
 
 def motion_rate_hz(chain: MeasurementChain, min_motion_hz: float) -> float:
-    """Points per second that the chain needs of the motion at least."""
+    """Minimum rate of the motion that the chain needs, in points per second."""
     modes = [mode.frequency_hz for channel in chain.channels for mode in channel.path.modes]
     sensors = [channel.accelerometer.resonance_hz or 0.0 for channel in chain.channels]
     return max(POINTS_PER_CYCLE * max([*modes, *sensors, 0.0]), min_motion_hz, 4.0 * chain.sampling_rate_hz)
 
 
 def used_positions(chain: MeasurementChain) -> tuple[str, ...]:
-    """Places that the channels' paths start from, in the model's order; unknown ones last, for the chain to refuse."""
+    """Positions at which the channels' paths start, in the model's order; the chain rejects unknown ones."""
     used = {
         name
         for channel in chain.channels

@@ -1,4 +1,4 @@
-"""A simulator of a gear pair: preset and values → machine with effects → recording."""
+"""Simulator of a gear pair: preset and values → machine with effects → recording."""
 
 from __future__ import annotations
 
@@ -54,25 +54,25 @@ from sims.simulator import (
     sources_digest,
 )
 
-# What a simulated gear pair can be asked for: speeds, loads, sampling rates, durations.
+# Limits for a simulated gear pair: speeds, loads, sampling rates, durations.
 
 SPEED_RANGE_RPM = (0.0, 30000.0)
 BREAKING_STRESS_PA = 2e9
-"""F/(b m) beyond which any steel tooth would break; rated gears stay below a quarter of it."""
+"""F/(b m) beyond which any steel tooth breaks; rated gears stay below a quarter of it."""
 SAMPLING_RATE_RANGE_HZ = (100.0, 250000.0)
 DURATION_RANGE_S = (0.01, 120.0)
-"""The motion is held in memory: some 30 MB a second."""
+"""The motion is held in memory, about 30 MB per second."""
 
 
 def check_run(operation: Operation, sampling_rate_hz: float) -> None:
-    """Refuse speeds and sampling rates that no gear pair has."""
+    """Reject speeds and sampling rates outside their ranges."""
     for value in (operation.speed_rpm.values.min(), operation.speed_rpm.values.max()):
         within(value, "speed_rpm", *SPEED_RANGE_RPM, "rpm")
     within(sampling_rate_hz, "sampling_rate_hz", *SAMPLING_RATE_RANGE_HZ, "Hz")
 
 
 def check_load(machine: Machine, operation: Operation) -> None:
-    """Refuse a torque that would break the teeth: far beyond, the linear model means nothing."""
+    """Reject a torque that would break the teeth, where the linear model is meaningless."""
     pair = machine.mesh.pair
     section_m2 = pair.face_width_mm * pair.driver.module_mm * 1e-6
     breaking_nm = BREAKING_STRESS_PA * section_m2 * pair.driver.pitch_radius_mm * 1e-3
@@ -100,7 +100,7 @@ class PairModel(Simulator, Generic[Ready]):
     """Base of the simulators of a gear pair."""
 
     def prepare(self, setup: SimulationSetup, rng: np.random.Generator, *, sampling_rate_hz: float = 20480.0) -> Ready:
-        """Build the pair and switch its effects on; one number is drawn from `rng`, with and without effects."""
+        """Build the pair and switch on its effects; one number is drawn from `rng`, with or without effects."""
         request = SimulationRequest.of(self.name, self.parameters, setup)
         check_run(request.operation, sampling_rate_hz)
         installed = setup.preset_of(self.name).installed
@@ -128,7 +128,7 @@ class PairModel(Simulator, Generic[Ready]):
 
     @abstractmethod
     def _ready(self, request: SimulationRequest, machine: Machine) -> Ready:
-        """Complete what is asked for by its machine."""
+        """Add the machine to the request."""
 
     @abstractmethod
     def _run(self, ready: Ready, run: MeasuredRun[Any]) -> Recording:
@@ -136,24 +136,24 @@ class PairModel(Simulator, Generic[Ready]):
 
     @abstractmethod
     def _converges(self, ready: Ready, rng: np.random.Generator) -> HasText:
-        """Compare a prepared pair's motion with that of smaller steps."""
+        """Compare a prepared pair's motion with that at smaller steps."""
 
     def record(self, ready: Ready, run: MeasuredRun[Any]) -> Recording:
-        """Run a prepared pair and measure it; what was put in goes into the truth."""
+        """Run a prepared pair and measure it; the inputs go into the truth."""
         return self._run(ready, replace(run, truth=ready.truth()))
 
     def check_convergence(self, setup: SimulationSetup, rng: np.random.Generator) -> HasText:
-        """Tell how far a smaller step of the integrator changes the result of this very machine."""
+        """Report how much a smaller integration step changes the result for this machine."""
         return self._converges(self.prepare(setup, rng), rng)
 
-    # As the gap diagnosis takes it, see `gearsig.gap.GapSimulator`.
+    # The interface of the gap diagnosis, see `gearsig.gap.GapSimulator`.
 
     def gap_effects(self) -> Mapping[str, GapEffect]:
         """Return all effects of the catalogue: each has a meaning for a gear pair."""
         return {name: as_gap_effect(e) for name, e in effects().items()}
 
     def twin_of(self, rig: Rig) -> PairTwin:
-        """Return a twin of the rig, whose machine has been built to see that it can be.
+        """Return a twin of the rig, after checking that its gears can be built.
 
         Raises
         ------
@@ -164,39 +164,39 @@ class PairModel(Simulator, Generic[Ready]):
         try:
             twin.pair_geometry()
         except InputError as error:
-            raise RefusalError(f"the model {self.name!r} cannot be set to this rig: {error}") from None
+            raise RefusalError(f"the model {self.name!r} cannot be adapted to this rig: {error}") from None
         return twin
 
     @abstractmethod
     def _twin(self, rig: Rig, nominal: Nominal) -> PairTwin:
-        """Return the twin of a rig, of which that is known of its pair."""
+        """Return the twin of a rig with the nominal data of its pair."""
 
 
 # --------------------
-# A model set to a rig, for the gap diagnosis: see `gearsig.gap`.
+# A model adapted to a rig, for the gap diagnosis: see `gearsig.gap`.
 # --------------------
 
 # Parameters of a pair of which only the rig's data are known: the rest is usual for its size.
 #
-# Middles of the ranges from which gearboxes for calibrations are drawn. They are plausible, not measured.
+# The values are the middles of the ranges from which gearboxes for calibrations are drawn: plausible, not measured.
 
 RELIEF_SHARE, RELIEF_LENGTH_MODULES = 0.8, 1.1
 """Tip relief over the deflection under the nominal load; its length along the line of action."""
 PITCH_RMS_SHARE, RUNOUT_SHARE = 0.1, 0.3
-"""A ground gear's rms pitch deviation over f_pt, its eccentricity over F_r: tolerances of class 5 of ISO 1328."""
+"""A ground gear's rms pitch deviation over f_pt, and eccentricity over F_r: tolerances of class 5 of ISO 1328."""
 BODY_KG, MOUNTS_HZ, MOUNTS_DAMPING = 40.0, 6.0, 0.3
-"""A housing with its bed, of a machine of size 1; below its mounts' frequency nothing that turns is slow enough."""
+"""Housing with its bed, for a machine of size 1; all shaft speeds are above the frequency of its mounts."""
 BODY_SHAPES = ((1.0, 1.0, 1.0, 1.0), (1.0, -1.0, 1.0, -1.0))
 """Heave and pitch of that housing at bearings 1 to 4, the first two at the ends of one shaft."""
 UNBALANCE_UM = 30.0
-"""Offset of the centre of mass; 40 um are balance grade G 6.3 at 1500 rpm."""
+"""Offset of the centre of mass; 40 um is balance grade G 6.3 at 1500 rpm."""
 COUPLING_BENDING_SHARE = 0.01
-"""A coupling's bending stiffness over the torsional one of shaft and coupling: catalogues have 0.002 (steel discs) to
-0.05 (elastomer)."""
+"""Bending stiffness of a coupling over the torsional stiffness of shaft and coupling: catalogues have 0.002 (steel
+discs) to 0.05 (elastomer)."""
 
 
 def usual_parameters(nominal: Nominal) -> dict[str, ParameterValue]:
-    """Return the parameters of the model "cracked" that do not depend on the specimen."""
+    """Return the parameters of the model "cracked" that are common to all specimens."""
     m, z, size = nominal.module_mm, nominal.teeth, nominal.size
     shifts = [_shift(teeth, nominal.pressure_angle_deg) for teeth in z]
     rotor = 4.5e-3 * size**4 * (sum(z) / 80.0) ** 3
@@ -238,7 +238,7 @@ def usual_parameters(nominal: Nominal) -> dict[str, ParameterValue]:
 
 
 def specimen_parameters(nominal: Nominal, rng: np.random.Generator) -> dict[str, ParameterValue]:
-    """Return what differs between machines of one drawing: tolerances, half to twice the usual, and their places."""
+    """Draw what differs between machines of one drawing: tolerances, half to twice the usual, and their angles."""
     parameters: dict[str, ParameterValue] = {"tolerance_seed": int(rng.integers(10**6))}
     widest = max(nominal.pitch_diameters_mm)
     parameters["pitch_deviation_um"] = PITCH_RMS_SHARE * pitch_tolerance_um(nominal.module_mm, widest) * _spread(rng)
@@ -252,7 +252,7 @@ def specimen_parameters(nominal: Nominal, rng: np.random.Generator) -> dict[str,
 
 
 def usual_housing(rng: np.random.Generator) -> tuple[HousingMode, ...]:
-    """Draw the modes of a housing that nobody has measured."""
+    """Draw the modes of an unmeasured housing."""
     return tuple(
         HousingMode(
             _rounded(log_uniform(rng, 600.0, 8000.0)),
@@ -265,11 +265,11 @@ def usual_housing(rng: np.random.Generator) -> tuple[HousingMode, ...]:
 
 
 def body_on_mounts(nominal: Nominal) -> tuple[HousingMode, ...]:
-    """Return the housing as a rigid body on soft mounts, as which it answers to a shaft's low orders: heave and pitch.
+    """Return heave and pitch of the housing as a rigid body on soft mounts, its response to a shaft's low orders.
 
-    Above the mounts' frequency a = Σ F/M; with F = k x the force of a bearing whose acceleration is −ω² x, that is a
-    mode of static gain k/(M ω₀²). On rigid ground a machine shakes some 50 dB less at 25 Hz. A pair of opposite forces
-    on a shaft's two bearings, as a bending moment makes, leaves the sum nothing and turns the body: at arms ±l/2,
+    Above the mounts' frequency a = Σ F/M; with F = k x, the force of a bearing whose acceleration is −ω² x, that is a
+    mode of static gain k/(M ω₀²). On rigid ground a machine vibrates about 50 dB less at 25 Hz. Opposite forces on a
+    shaft's two bearings, as from a bending moment, have zero sum and rotate the body: at arms ±l/2,
     a = ±(l/2) Σ ±F (l/2)/J with J = M i². A block 1.5 l long and l high has i = 0.52 l, here l/2: the same gain.
 
     Source: H. Himelblau and S. Rubin, Vibration of a resiliently supported rigid body, in *Harris' Shock and Vibration
@@ -281,18 +281,18 @@ def body_on_mounts(nominal: Nominal) -> tuple[HousingMode, ...]:
 
 
 def body_gain(bearing_stiffness_n_per_m: float, mass_kg: float, mounts_hz: float) -> float:
-    """Return the static gain k/(M ω₀²) of a body on mounts, see `body_on_mounts`."""
+    """Return the static gain k/(M ω₀²) of a body on mounts; see `body_on_mounts`."""
     return bearing_stiffness_n_per_m / (mass_kg * (2.0 * pi * mounts_hz) ** 2)
 
 
 def _shift(teeth: int, pressure_angle_deg: float) -> float:
-    """Least profile shift without undercut, in modules: (z_min − z)/z_min, z_min = 2/sin²α of the rack."""
+    """Minimum profile shift without undercut, in modules: (z_min − z)/z_min, z_min = 2/sin²α of the rack."""
     min_teeth = 2.0 / sin(radians(pressure_angle_deg)) ** 2
     return max(0.0, (min_teeth - teeth) / min_teeth)
 
 
 def _tool_tip_radius(pressure_angle_deg: float) -> float:
-    """0.38 modules, or what a rack of 1.25 modules dedendum has room for: (π/4 − 1.25 tan α)/(sec α − tan α)."""
+    """0.38 modules, or 95 % of the limit at a dedendum of 1.25 modules: (π/4 − 1.25 tan α)/(sec α − tan α)."""
     alpha = radians(pressure_angle_deg)
     return min(0.38, 0.95 * (pi / 4.0 - 1.25 * tan(alpha)) / (1.0 / cos(alpha) - tan(alpha)))
 
@@ -302,39 +302,39 @@ def _spread(rng: np.random.Generator) -> float:
 
 
 def _rounded(value: float) -> float:
-    """To six digits: what a preset file holds is what runs."""
+    """Round to six digits, so that the simulated values are those in the preset file."""
     return float(f"{value:.6g}")
 
 
 LONGEST_LEAD_REV = 8.0
-"""Of the driver, that another run starts later."""
+"""Maximum delay of the start of another run, in revolutions of the driver."""
 EVEN = 0.01
-"""Of a quiet machine's tolerances, what is left: none at all would leave lines of power 0."""
+"""Fraction of the tolerances in a quiet machine; none at all would leave lines of zero power."""
 _UNEVEN = (
     "pitch_deviation_um",
     *(f"{what}_{gear}_{unit}" for what, unit in (("runout", "um"), ("unbalance", "g_mm")) for gear in GEARS),
 )
 _NOISES = ("noise_mps2", "sensor_noise_mps2_per_sqrt_hz")
 RUN_UP_POINTS = 32
-"""Between which the set speed of a run-up is straight."""
+"""Points between which the set speed of a run-up is linear."""
 VIBRATION_S = 0.5
-"""Length of the run that tells how strongly the healthy machine vibrates."""
+"""Duration of the run that gives the healthy machine's vibration level."""
 
 
 @dataclass(frozen=True)
 class PairTwin:
-    """A rig's twin, whatever model runs it: its own geometry, the rest usual for its size.
+    """A rig's twin for any of the models: the rig's geometry, the rest usual for its size.
 
-    A seed is one specimen with its housing.
+    Each seed is one specimen with its housing.
 
     Parameters
     ----------
     rig : Rig
     nominal : Nominal
     further : tuple of SensorSeat
-        Sensors beside the rig's own.
+        Sensors in addition to the rig's.
     is_quiet : bool
-        On soft mounts, rigid, without the vibration of the surroundings, its gears nearly even.
+        Rigid on soft mounts, without ambient vibration, with almost perfect gears.
     """
 
     rig: Rig
@@ -344,7 +344,7 @@ class PairTwin:
 
     @property
     def key(self) -> str:
-        """Model, state of its code, and what is known of the rig."""
+        """Key of the twin: model, version of its code, and the rig's data."""
         known = {name: value for name, value in rig_to_dict(self.rig).items() if name not in ("name", "sources")}
         text = repr(known) + (repr(self.further) if self.further else "") + ("quiet" if self.is_quiet else "")
         return f"{self.model} {sources_digest()} {sha256(text.encode()).hexdigest()[:16]}"
@@ -356,12 +356,12 @@ class PairTwin:
 
     @property
     def model(self) -> str:
-        """Name of the model whose preset the twin is."""
+        """Name of the model that the twin's preset is for."""
         return self.pair_model.name
 
     @property
     def point(self) -> OperatingCondition:
-        """The rig's nominal operating point, as is usual for its size where the rig does not tell."""
+        """The rig's nominal operating point, usual for its size where the rig does not state it."""
         return OperatingCondition(self.nominal.speed_rpm, self.nominal.torque_nm)
 
     def run(
@@ -374,10 +374,10 @@ class PairTwin:
         sampling_rate_hz: float,
         noise: int = 0,
     ) -> Recording:
-        """Return a recording that carries the rig; another `noise` is another run of the same machine.
+        """Return a recording with its rig; each value of `noise` is another run of the same machine.
 
-        Flanks, tolerances and housing follow from `seed` alone. Sensor noise, tachometer jitter and where the run
-        starts follow from seed and noise; run 0 starts at the driver's first tooth.
+        Flanks, tolerances and housing follow from `seed` alone. Sensor noise, tachometer jitter and the start of the
+        run follow from seed and noise; run 0 starts at the driver's first tooth.
         """
         run_rng = np.random.default_rng([count(seed, "seed", minimum=0), count(noise, "noise", minimum=0)])
         skipped = 0
@@ -392,7 +392,7 @@ class PairTwin:
     def _planned(
         self, point: OperatingCondition, added: Sequence[AddedEffect], seed: int, sampling_rate_hz: float
     ) -> tuple[ReadyPair, MeasuredRun[Any]]:
-        """Return a specimen with its effects, and a run of it that lasts one sample."""
+        """Return a specimen with its effects, and a run of it with a duration of one sample."""
         rng = np.random.default_rng(seed)
         ready = self._prepared(self.preset(point, added, seed=seed), rng, sampling_rate_hz)
         step_s = self._step_s(point, seed)
@@ -408,7 +408,7 @@ class PairTwin:
         duration_s: float,
         sampling_rate_hz: float,
     ) -> Recording:
-        """Return a recording of the healthy machine whose speed rises, by equal factors in equal times."""
+        """Return a recording of the healthy machine with a speed that rises by equal factors in equal times."""
         ready, run = self._planned(OperatingCondition(to_rpm, torque_nm), (), seed, sampling_rate_hz)
         part = np.linspace(0.0, 1.0, RUN_UP_POINTS)
         speed_rpm = Profile.of(duration_s * part, from_rpm * (to_rpm / from_rpm) ** part)
@@ -416,26 +416,26 @@ class PairTwin:
         return self.pair_model.record(replace(ready, operation=operation), replace(run, duration_s=duration_s))
 
     def quiet(self) -> Self:
-        """Return the machine on soft mounts where nothing else vibrates and its own gears hardly do.
+        """Return the machine on soft mounts, without ambient vibration and with hardly any from its own gears.
 
-        What an effect adds is neither lost in noise nor, as a second unbalance would, weighed up against what the
-        specimen happens to have there. Its housing is rigid: resonances that were drawn are those of another machine,
-        and bend the profile of a tooth's fault as the real ones do not.
+        The effect of a fault is then neither lost in noise nor combined with what the specimen happens to have, as a
+        second unbalance would be. The housing is rigid: drawn resonances are those of another machine, and would
+        distort the profile of a tooth fault in a way that the real ones do not.
         """
         return replace(self, is_quiet=True)
 
     def candidates(self, name: str) -> Sequence[AddedEffect]:
-        """Return settings of an effect worth a try, from barely noticeable to strong, for each option that matters."""
+        """Return the settings of an effect to try, from barely noticeable to strong, for each relevant option."""
         plausible = effect(name).plausible_range
         indices = range(plausible.n_severities)
         return self._settings(name, [(options, indices) for options in plausible.choices(self._facts)])
 
     def further_settings(self, name: str) -> Sequence[AddedEffect]:
-        """Return further settings, with which a tooth's fault takes another profile over the engagement."""
+        """Return further settings, for which a tooth fault has another profile over the engagement."""
         return self._settings(name, effect(name).plausible_range.further_settings(self._facts))
 
     def _settings(self, name: str, chosen: Sequence[tuple[Options, Sequence[float]]]) -> list[AddedEffect]:
-        """Return each set of options with some of its severities, counted from 0; 0.5 lies between the first two."""
+        """Return each set of options with some of its severities, counted from 0; 0.5 is between the first two."""
         last, settings = effect(name).plausible_range.n_severities - 1, []
         for options, places in chosen:
             low, high = effect(name).plausible_severities(self._facts, options)
@@ -444,19 +444,19 @@ class PairTwin:
         return settings
 
     def with_further_sensors(self) -> tuple[Self, Mapping[str, str]]:
-        """Return the machine with an upright sensor over each bearing that has none, and those channels' places."""
+        """Return the machine with a vertical sensor over each bearing that has none, and those channels' positions."""
         further = further_seats(installed_of_rig(self.rig, self.nominal.size, ()))
         return replace(self, further=further), {seat.channel: seat.position for seat in further}
 
     def draw(self, name: str, rng: np.random.Generator, *, above: float = 0.0) -> AddedEffect:
-        """Draw a setting from the range of the candidates, its options at random.
+        """Draw a setting from the range of the candidates, with random options.
 
         Parameters
         ----------
         name : str
         rng : numpy.random.Generator
         above : float
-            Share of the range, in logarithms, that is left out at its lower end.
+            Fraction of the logarithmic range that is excluded at its lower end.
 
         Raises
         ------
@@ -465,7 +465,7 @@ class PairTwin:
         """
         plausible, machine = effect(name).plausible_range, self._facts
         if not plausible.choices(machine):
-            raise RefusalError(f"the rig describes no part that {name} could be in", remedy="describe its bearings")
+            raise RefusalError(f"the rig describes no part that {name} could affect", remedy="describe its bearings")
         options = plausible.drawn(machine, rng)
         low, high = effect(name).plausible_severities(machine, options)
         return AddedEffect(name, log_uniform(rng, low * (high / low) ** above, high), options)
@@ -491,8 +491,8 @@ class PairTwin:
             assumed=(
                 "usual for its size: masses, inertias, shafts, stiffness and damping, tip relief, tolerances, oil",
                 "transfer path: drawn",
-                f"profiles of the flanks, and angles of its effects: those of seed {seed}",
-                *(f"{name}: usual, the rig does not tell" for name in self.nominal.assumed),
+                f"flank profiles, and angles of effects: those of seed {seed}",
+                *(f"{name}: usual value, as the rig does not state it" for name in self.nominal.assumed),
             ),
             does_not_represent=("the real machine's own flanks, tolerances and housing",),
             parameters=MappingProxyType(
@@ -537,11 +537,11 @@ class PairTwin:
         return ready
 
     def _step_s(self, point: OperatingCondition, seed: int) -> float:
-        """Longest step of the integrator for a specimen, with effects or without."""
+        """Maximum integration step for a specimen, with or without effects."""
         raise NotImplementedError
 
     def _model_parameters(self, values: dict[str, ParameterValue]) -> dict[str, ParameterValue]:
-        """Return what is usual in the model's own parameters."""
+        """Convert the usual parameters to those of the model."""
         return values
 
     def _rig_at(self, point: OperatingCondition) -> Rig:

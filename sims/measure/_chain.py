@@ -1,4 +1,4 @@
-"""From simulated motion to a recording, as a measurement would have made it."""
+"""From simulated motion to a recording as a measurement would give it."""
 
 from __future__ import annotations
 
@@ -26,23 +26,23 @@ from sims.measure._sensors import (
     pulse_voltage,
 )
 
-# What a simulator hands to the measurement chain.
+# A simulator's input to the measurement chain.
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Accelerations of places and angles of shafts on an even grid of time that starts at 0.
+    """Accelerations at positions and angles of shafts on an even time grid starting at 0.
 
     Parameters
     ----------
     step_s : float
-        Five steps or more per cycle of the fastest mode of path and sensor. What the simulation holds above half of
-        1/step would fold back: keep every step of the solver, or one in few.
+        At least five steps per cycle of the fastest mode of path and sensor. Content of the simulation above half of
+        1/step would alias: keep every step of the solver, or one in few.
     positions : tuple of str
-        Names of the places, each with its direction: "pinion bearing y".
+        Names of the positions, each with its direction: "pinion bearing y".
     accelerations_mps2 : array, (n_steps, n_positions)
     shaft_angles_rad : mapping
-        Shaft → (n_steps,), running on through revolutions; above 0 in the shaft's own direction.
+        Shaft → (n_steps,), continuous over revolutions; positive in the shaft's own direction.
     """
 
     step_s: float
@@ -70,12 +70,12 @@ class Motion:
 
     @property
     def n_steps(self) -> int:
-        """Points of time."""
+        """Number of time steps."""
         return int(self.accelerations_mps2.shape[0])
 
     def angle_rad(self, shaft: str, user: str) -> FloatArray:
-        """Angle of a shaft that a sensor is fitted to, (n_steps,)."""
-        complaint = f"the {user} sits on shaft {shaft!r}, whose angle the simulation does not give"
+        """Angle of the shaft that a sensor (`user`) is fitted to, (n_steps,)."""
+        complaint = f"the {user} is on shaft {shaft!r}, whose angle the simulation does not provide"
         return self.shaft_angles_rad[known_name(shaft, self.shaft_angles_rad, complaint)]
 
     def time_s(self, start_s: float = 0.0) -> FloatArray:
@@ -87,7 +87,7 @@ class Motion:
 
 
 def plain(part: Any) -> Any:
-    """Return dataclasses as dictionaries with their class's name under "kind", tuples as lists, the rest unchanged."""
+    """Convert dataclasses to dictionaries with the class name under "kind", tuples to lists; the rest is unchanged."""
     if is_dataclass(part) and not isinstance(part, type):
         return {"kind": type(part).__name__} | {f.name: plain(getattr(part, f.name)) for f in fields(part)}
     if isinstance(part, Mapping):
@@ -99,22 +99,22 @@ def plain(part: Any) -> Any:
 
 # Anti-alias filter and sampling: from the solver's grid to the recording's rate.
 
-_LARGEST_TERM = 4096  # of the ratio of rates; beyond, the filter's table outgrows the signal
+_LARGEST_TERM = 4096  # of the ratio of rates; beyond it, the filter's table is larger than the signal
 
 
 @dataclass(frozen=True)
 class AntiAlias:
-    """Linear-phase low-pass with its delay taken out, as converters with digital decimation have it.
+    """Linear-phase low-pass with its delay removed, as in converters with digital decimation.
 
     A sine below `passband_fraction` of the sampling rate keeps its amplitude within 10^(-A/20) and its phase; one
-    above half the sampling rate is down by A or more.
+    above half the sampling rate is attenuated by at least A.
 
     Parameters
     ----------
     attenuation_db : float
         A, 40 to 140.
     passband_fraction : float
-        Pass-band edge over sampling rate, 0.2 to 0.48. Nearer to 0.5 is longer: see `reach_s`.
+        Pass-band edge over sampling rate, 0.2 to 0.48. The closer to 0.5, the longer the filter: see `reach_s`.
     """
 
     attenuation_db: float = 90.0
@@ -125,20 +125,20 @@ class AntiAlias:
         within(self.passband_fraction, "passband_fraction of the anti-alias filter", 0.2, 0.48)
 
     def reach_s(self, sampling_rate_hz: float) -> float:
-        """Time on each side of a sample that takes part in it: half the filter's length, by Kaiser's formula."""
+        """Time on each side of a sample that affects it: half the filter's length, by Kaiser's formula."""
         width_rad = 2 * np.pi * (0.5 - self.passband_fraction)
         return float((self.attenuation_db - 7.95) / (2 * 2.285 * width_rad) / sampling_rate_hz)
 
     def sample(
         self, signals: FloatArray, step_s: float, sampling_rate_hz: float, first: int, n_samples: int
     ) -> FloatArray:
-        """Filter and sample, (n, n_steps) → (n, n_samples): samples at times (first + j)/rate of the solver's axis.
+        """Filter and sample, (n, n_steps) → (n, n_samples), at times (first + j)/rate on the solver's time axis.
 
         Raises
         ------
         InputError
-            If a sample would reach past the signals' ends, if the sampling rate is above the solver's, or if the two
-            are not in the ratio of whole numbers up to 4096.
+            If a sample would need signal beyond the ends, if the sampling rate is above the solver's, or if the ratio
+            of the two is not one of integers up to 4096.
         """
         from scipy.signal import firwin, kaiser_beta, resample_poly
 
@@ -147,7 +147,7 @@ class AntiAlias:
         low, high = covered(signals.shape[1], step_s, sampling_rate_hz, half / up * step_s)
         if first < low or first + n_samples - 1 > high:
             raise InputError(
-                f"samples {first} to {first + n_samples - 1} reach past the simulated time",
+                f"samples {first} to {first + n_samples - 1} reach beyond the simulated time",
                 where="anti-alias filter",
                 allowed=f"{low} to {high}",
                 remedy="simulate longer",
@@ -158,12 +158,12 @@ class AntiAlias:
             window=("kaiser", kaiser_beta(self.attenuation_db)),
             fs=up / step_s,
         )
-        # Only the segment that these samples need; it starts at a common point of both grids.
+        # Only the segment needed for these samples; it starts at a common point of both grids.
         start = max(0, floor((first * down / up - half / up) / down) * down)
         stop = min(signals.shape[1], ceil((first + n_samples) * down / up + half / up) + 1)
         skipped = start // down * up
         segment = signals[:, start:stop]
-        # The stubs know only named windows; an array of coefficients is documented.
+        # The type stubs list only named windows; an array of coefficients is documented.
         sampled: FloatArray = resample_poly(segment, up, down, axis=1, window=taps)  # type: ignore[call-overload]
         return sampled[:, first - skipped : first - skipped + n_samples]
 
@@ -180,7 +180,7 @@ def ratio_of_rates(step_s: float, sampling_rate_hz: float) -> tuple[int, int]:
     ratio = Fraction(product).limit_denominator(_LARGEST_TERM)
     if abs(float(ratio) / product - 1.0) > 1e-12:
         raise InputError(
-            f"a step of {step_s!r} s does not go into a sampling rate of {sampling_rate_hz:g} Hz",
+            f"a step of {step_s!r} s does not fit a sampling rate of {sampling_rate_hz:g} Hz",
             allowed=f"rates in the ratio of whole numbers up to {_LARGEST_TERM}",
             remedy=f"take {1 / (sampling_rate_hz * ceil(1 / product))!r} s",
         )
@@ -188,8 +188,8 @@ def ratio_of_rates(step_s: float, sampling_rate_hz: float) -> tuple[int, int]:
 
 
 def covered(n_steps: int, step_s: float, sampling_rate_hz: float, reach_s: float) -> tuple[int, int]:
-    """First and last sample, counted from the solver's start, whose filter lies within the signals."""
-    tiny = 1e-9  # of a sample, against rounding of whole ratios
+    """First and last sample, counted from the solver's start, whose filter is within the signals."""
+    tiny = 1e-9  # of a sample, against rounding of integer ratios
     first = ceil(reach_s * sampling_rate_hz - tiny)
     last = floor(((n_steps - 1) * step_s - reach_s) * sampling_rate_hz + tiny)
     return first, last
@@ -206,7 +206,7 @@ class MeasuredChannel:
     accelerometer : Accelerometer
     hum : MainsHum
     background : ColouredNoise
-        Vibration of the surroundings in the recording's band.
+        Ambient vibration in the recording's band.
     converter : Converter or None
     position : str
         For the reader of the recording, e.g. "pinion bearing, vertical".
@@ -232,7 +232,7 @@ class MeasurementChain:
     anti_alias : AntiAlias
     tachometer : Tachometer or None
     encoders : tuple of Encoder
-        The first is the speed source where there is no tachometer.
+        The first is the speed source if there is no tachometer.
 
     Examples
     --------
@@ -258,12 +258,12 @@ class MeasurementChain:
 
     @property
     def lead_in_s(self) -> float:
-        """Simulated time ahead of the recording: filters and modes have forgotten the start to 1e-4."""
+        """Simulated time before the recording, in which transients of filters and modes decay to 1e-4."""
         settling = max(channel.path.settling_s + channel.accelerometer.settling_s for channel in self.channels)
         return settling + self.anti_alias.reach_s(self.sampling_rate_hz)
 
     def simulated_s(self, duration_s: float, lead_in_s: float | None = None) -> float:
-        """Time that a simulation must last for a recording of `duration_s`."""
+        """Minimum duration of a simulation for a recording of `duration_s`."""
         lead = max(self.lead_in_s, lead_in_s or 0.0)
         return lead + duration_s + self.anti_alias.reach_s(self.sampling_rate_hz) + 2 / self.sampling_rate_hz
 
@@ -285,17 +285,17 @@ class MeasurementChain:
         ----------
         motion : Motion
         rng : numpy.random.Generator
-            Gives sensors, background, tachometer and encoders a stream each: the background is the same at another
-            motion rate.
+            Sensors, background, tachometer and encoders each get their own stream: the background does not depend on
+            the motion's rate.
         rig : Rig or None
-            Goes with the recording; its reference shaft is that of angle sensors without a shaft of their own.
+            Stored in the recording; its reference shaft is the default for angle sensors.
         duration_s : float or None
-            None: as long as the motion covers.
+            None: as long as the motion allows.
         lead_in_s : float or None
-            Motion ahead of the recording that is left out; None: `self.lead_in_s`. Give more where the machine itself
-            needs time to settle, 0 to keep the start of a run from rest.
+            Motion discarded before the recording; None: `self.lead_in_s`. Give more if the machine itself needs time
+            to settle, 0 to keep the start of a run from rest.
         truth : mapping or None
-            What the simulator put in; "measurement" is added to it.
+            The simulator's inputs; "measurement" is added to it.
         source, reader : str
             For the provenance.
 
@@ -339,7 +339,7 @@ class MeasurementChain:
                 f"the motion lasts {lasts_s:g} s, of which {max(n_max, 0) / rate:g} s can be recorded",
                 where="duration_s",
                 allowed="at least one sample and no more than that",
-                remedy="simulate longer: MeasurementChain.simulated_s tells how long",
+                remedy="simulate longer: MeasurementChain.simulated_s gives the duration",
             )
         return first, n_samples
 
@@ -413,7 +413,7 @@ def _voltage(
 ) -> FloatArray:
     rising, falling, high = edges
     rising = rising + tacho.jitter_s * rng.standard_normal(len(rising))
-    if high:  # the pulse that the motion starts in rose before it
+    if high:  # the motion starts within a pulse, which rose before it
         before = min(float(falling[0]) if len(falling) else 0.0, 0.0) - 1.0
         rising = np.append(before, rising)
     return pulse_voltage(tacho, rising, falling, time_s) + tacho.noise_v * rng.standard_normal(len(time_s))

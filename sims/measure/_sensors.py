@@ -12,21 +12,21 @@ from gearsig.checks import FloatArray, count, known_name, not_negative, positive
 from gearsig.compiled import njit
 from gearsig.errors import InputError
 
-# Linear systems on a solver's grid, exact for an input that runs straight from step to step.
+# Linear systems on a solver's grid, exact for an input that is linear between steps.
 
 Section = tuple[tuple[float, float, float], tuple[float, float, float]]
 """b and a of a second-order filter."""
 
 HIGHEST_FRACTION = 0.2
-"""Highest natural frequency as a fraction of the grid's rate: five steps a cycle."""
+"""Maximum natural frequency as a fraction of the grid's rate: five steps per cycle."""
 
 
 @lru_cache(maxsize=256)
 def discrete(numerator: tuple[float, ...], denominator: tuple[float, ...], step_s: float) -> Section:
     """Ramp-invariant (first-order hold) equivalent of a transfer function in s, of second order at most.
 
-    Poles map exactly, and so does the response to any input that is straight between steps. A sine is not: its gain
-    is short by 1 - sinc²(fΔ), about (πfΔ)²/3 or 0.02 % at 2 kHz and 4 µs, its phase is right.
+    Poles, and the response to any input that is linear between steps, are exact. For a sine the gain is low by
+    1 - sinc²(fΔ), about (πfΔ)²/3 or 0.02 % at 2 kHz and 4 µs; its phase is exact.
 
     Source: G. F. Franklin, J. D. Powell, M. L. Workman, *Digital Control of Dynamic Systems*, 3rd ed., 1998, ch. 6.
 
@@ -43,12 +43,12 @@ def discrete(numerator: tuple[float, ...], denominator: tuple[float, ...], step_
 
 
 def low_pass(frequency_hz: float, damping_ratio: float, step_s: float) -> Section:
-    """ω²/(s² + 2ζωs + ω²), discrete; refuses a frequency that the grid does not resolve."""
+    """Discrete equivalent of ω²/(s² + 2ζωs + ω²); rejects a frequency that the grid does not resolve."""
     if frequency_hz * step_s > HIGHEST_FRACTION:
         n_steps = 1 / (frequency_hz * step_s)
         raise InputError(
-            f"a natural frequency of {frequency_hz:g} Hz has {n_steps:.2g} steps of {step_s:g} s a cycle",
-            allowed=f"at least {1 / HIGHEST_FRACTION:g} steps a cycle",
+            f"a natural frequency of {frequency_hz:g} Hz has {n_steps:.2g} steps of {step_s:g} s per cycle",
+            allowed=f"at least {1 / HIGHEST_FRACTION:g} steps per cycle",
             remedy="leave it out, or give the motion at a finer step",
         )
     w = 2 * np.pi * frequency_hz
@@ -56,17 +56,17 @@ def low_pass(frequency_hz: float, damping_ratio: float, step_s: float) -> Sectio
 
 
 def apply_bank(sections: list[Section], gains: FloatArray, inputs: FloatArray, direct: FloatArray) -> FloatArray:
-    """Sum of filtered inputs, each filter from the steady state that belongs to the first values.
+    """Sum of filtered inputs, each filter starting in the steady state for the first values.
 
     Parameters
     ----------
     sections : list
         One per row of `gains`.
     gains : array, (n_sections, n_inputs)
-        What of each input goes into each filter.
+        Gain from each input to each filter.
     inputs : array, (n_steps, n_inputs)
     direct : array, (n_inputs,)
-        What of each input goes past the filters.
+        Gain of each input past the filters.
 
     Returns
     -------
@@ -93,9 +93,9 @@ def _three(values: FloatArray) -> tuple[float, float, float]:
 
 @dataclass(frozen=True)
 class Accelerometer:
-    """value = clip(sensor's dynamics applied to the acceleration + noise + bias).
+    """An accelerometer: value = clip(dynamics applied to the acceleration + noise + bias).
 
-    The dynamics are ω²/(s² + 2ζωs + ω²) of the mounted sensor and s/(s + ω_c) of its coupling.
+    The dynamics are ω²/(s² + 2ζωs + ω²) of the mounted sensor and s/(s + ω_c) of its AC coupling.
 
     Parameters
     ----------
@@ -104,12 +104,12 @@ class Accelerometer:
     damping_ratio : float
         Of that resonance.
     lower_limit_hz : float
-        -3 dB point of the coupling; 0: measures down to a standing acceleration.
+        -3 dB frequency of the coupling; 0: measures down to a constant acceleration.
     range_mps2 : float or None
-        Values are held at ± this; None: no limit.
+        Values are limited to ± this; None: no limit.
     clip_percent : float
-        A range that is too small for the signal: values are held at the level that the reading exceeds this part of the
-        recording's time, 0 to 50 %. The level follows from each signal; `range_mps2` stays the same for all.
+        A range too small for the signal: values are limited to the level that the reading exceeds for this part of the
+        recording, 0 to 50 %. The level follows from each signal; `range_mps2` is the same for all.
     noise_mps2_per_sqrt_hz : float
         One-sided density of white noise.
     bias_mps2 : float
@@ -142,7 +142,7 @@ class Accelerometer:
 
     @property
     def settling_s(self) -> float:
-        """Time until a blow has rung down to 1e-4 in the mounted sensor; its coupling begins settled."""
+        """Time in which an impact decays to 1e-4 in the mounted sensor; its coupling starts settled."""
         if self.resonance_hz is None:
             return 0.0
         return float(np.log(1e4) / (self.damping_ratio * 2 * np.pi * self.resonance_hz))
@@ -153,7 +153,7 @@ class Accelerometer:
         if self.resonance_hz is not None:
             x = apply(low_pass(self.resonance_hz, self.damping_ratio, step_s), x)
         if self.lower_limit_hz > 0:
-            # The coupling has long settled on the mean, not on a first value that may be the middle of a blow.
+            # The coupling has settled to the mean, not to a first value that may be the middle of an impact.
             coupling = discrete((1.0, 0.0), (1.0, 2 * np.pi * self.lower_limit_hz), step_s)
             x = apply(coupling, np.concatenate(([np.mean(x)], x)))[1:]
         return x
@@ -161,8 +161,8 @@ class Accelerometer:
     def read(self, acceleration_mps2: FloatArray, time_s: FloatArray, rng: np.random.Generator) -> FloatArray:
         """Reading over time on a fine even grid, (n_steps,); noise is drawn from `rng`.
 
-        The noise fills the band of the grid; the anti-alias filter that follows leaves its density in the band of the
-        recording.
+        The noise fills the band of the grid; the anti-alias filter that follows keeps its density in the recording's
+        band.
         """
         step_s = float(time_s[1] - time_s[0])
         reading = self.dynamics(acceleration_mps2, step_s) + self.bias_mps2 + self.drift_mps2_per_s * time_s
@@ -173,7 +173,7 @@ class Accelerometer:
         return reading if limit is None else np.clip(reading, -limit, limit)
 
     def _limit_mps2(self, reading: FloatArray) -> float | None:
-        """Where values are held; None for nowhere."""
+        """Level to which values are limited, None for no limit."""
         if self.clip_percent == 0.0:
             return self.range_mps2
         level = float(np.quantile(np.abs(reading), 1.0 - self.clip_percent / 100.0))
@@ -204,18 +204,18 @@ class Converter:
         return self.range_mps2 / 2.0 ** (self.n_bits - 1)
 
     def convert(self, values_mps2: FloatArray) -> FloatArray:
-        """Round to steps and hold at the ends: -range … range - one step."""
+        """Round to steps and limit to -range … range - one step."""
         half = 2.0 ** (self.n_bits - 1)
         steps: FloatArray = np.clip(np.round(values_mps2 / self.step_mps2), -half, half - 1)
         return steps * self.step_mps2
 
 
-# Modal transfer path: from accelerations at bearings to the place where a sensor sits.
+# Modal transfer path: from accelerations at bearings to the location of a sensor.
 
 
 @dataclass(frozen=True)
 class PathMode:
-    """One mode of the housing as a sensor sees it.
+    """One mode of the housing as seen by a sensor.
 
     Parameters
     ----------
@@ -223,8 +223,8 @@ class PathMode:
     damping_ratio : float
         ζ, 1e-4 to 1.
     gains : mapping
-        Position → static gain g: well below its frequency the mode adds g times that position's acceleration, at its
-        frequency g/(2ζ) times, a quarter of a period late.
+        Position → static gain g: well below its frequency the mode adds g times that position's acceleration; at its
+        frequency, g/(2ζ) times, delayed by a quarter period.
     """
 
     frequency_hz: float
@@ -244,7 +244,7 @@ class ModalPath:
     Parameters
     ----------
     direct : mapping
-        Position → d, the part that arrives unfiltered. {"bearing 1": 1.0} alone is a sensor on that bearing.
+        Position → d, gain of the unfiltered part. {"bearing 1": 1.0} alone is a sensor on that bearing.
     modes : tuple of PathMode
     """
 
@@ -259,14 +259,14 @@ class ModalPath:
 
     @property
     def settling_s(self) -> float:
-        """Time until a start has rung down to 1e-4 in the slowest mode."""
+        """Time in which the starting transient decays to 1e-4 in the slowest mode."""
         return max((np.log(1e4) / (m.damping_ratio * 2 * np.pi * m.frequency_hz) for m in self.modes), default=0.0)
 
     def apply(self, accelerations: FloatArray, positions: tuple[str, ...], step_s: float) -> FloatArray:
         """Acceleration at the sensor, (n_steps, n_positions) → (n_steps,).
 
-        Exact for accelerations that run straight between steps; for a sine see `sims.measure.discrete`. Modes
-        begin settled on the mean: a first value may be the middle of a blow, from which a slow mode would ring long.
+        Exact for accelerations that are linear between steps; for a sine see `sims.measure.discrete`. Modes start
+        settled to the mean: a first value may be the middle of an impact, from which a slow mode would ring for long.
         """
         settled = np.mean(accelerations, axis=0, keepdims=True)
         return apply_bank(
@@ -277,7 +277,7 @@ class ModalPath:
         )[1:]
 
     def response(self, frequency_hz: FloatArray, position: str) -> FloatArray:
-        """Complex frequency response from a position, analytic."""
+        """Analytic complex frequency response from a position."""
         f = np.asarray(frequency_hz, dtype=np.float64)
         total = np.full(f.shape, self.direct.get(position, 0.0), dtype=complex)
         for mode in self.modes:
@@ -288,7 +288,7 @@ class ModalPath:
 
 def _weights(gains: Mapping[str, float], positions: tuple[str, ...]) -> FloatArray:
     for name in gains:
-        known_name(name, positions, f"the path starts at {name!r}, which the simulation does not give")
+        known_name(name, positions, f"the path starts at {name!r}, which the simulation does not provide")
     return np.array([gains.get(name, 0.0) for name in positions])
 
 
@@ -306,8 +306,8 @@ def _gains(gains: Mapping[str, float]) -> dict[str, float]:
 def filter_bank(inputs, gains, b, a, out):  # type: ignore[no-untyped-def]
     """out[t] += Σ_m H_m applied to Σ_p gains[m, p] inputs[t, p].
 
-    Transposed direct form II, from the steady state of the first input. The filters of a bank do not wait for each
-    other, so that several run at the speed of one.
+    Transposed direct form II, starting in the steady state for the first input. The filters of a bank are independent,
+    so several run at the speed of one.
 
     `inputs` (n_steps, n_inputs), `gains` (n_filters, n_inputs), `b` (n_filters, 3), `a` (n_filters, 2) without the
     leading 1, `out` (n_steps,).
@@ -339,14 +339,14 @@ def filter_bank(inputs, gains, b, a, out):  # type: ignore[no-untyped-def]
 
 @dataclass(frozen=True)
 class ColouredNoise:
-    """Gaussian noise with a power density that goes as 1/f^slope.
+    """Gaussian noise with a power density proportional to 1/f^slope.
 
     Parameters
     ----------
     rms_mps2 : float
-        Standard deviation expected over the whole band.
+        Expected standard deviation over the whole band.
     slope : float
-        0: white, 1: pink, 2: red. Below 10 Hz the density stays level.
+        0: white, 1: pink, 2: red. Below 10 Hz the density is constant.
     """
 
     rms_mps2: float = 0.0
@@ -369,8 +369,8 @@ class ColouredNoise:
         weight[0] = 1.0
         if n_samples % 2 == 0:
             weight[-1] = 1.0
-        # Scaled by the expected power of the filtered noise, so that rms_mps2 is a property of the model and not forced
-        # on each drawn sample.
+        # Scaled by the expected power of the filtered noise: rms_mps2 is a property of the model and is not imposed on
+        # each realisation.
         scale = self.rms_mps2 / np.sqrt(np.sum(weight * shape**2) / n_samples)
         coloured: FloatArray = scale * fft.irfft(fft.rfft(white) * shape, n_samples)
         return coloured
@@ -381,12 +381,12 @@ class ColouredNoise:
 
 @dataclass(frozen=True)
 class MainsHum:
-    """Pick-up from the electric supply: a fixed frequency, whatever the shaft does.
+    """Pick-up from the electric supply at a fixed frequency, independent of the shaft.
 
     Parameters
     ----------
     amplitudes_mps2 : tuple of float
-        Peak amplitude of harmonics 1, 2, … as the sensor reads them.
+        Peak amplitudes of harmonics 1, 2, … in the reading.
     frequency_hz : float
     phase_rad : float
     """
@@ -407,17 +407,17 @@ class MainsHum:
 
 
 # --------------------
-# A tachometer: pulses at equal steps of a shaft's angle, as a voltage.
+# A tachometer: voltage pulses at equal steps of a shaft's angle.
 # --------------------
 
 
 HIGH_V = 5.0
-"""Of a pulse, from 0 V."""
+"""Height of a pulse above 0 V."""
 
 
 @dataclass(frozen=True)
 class Tachometer:
-    """A pulse channel; the middle of each rising edge lies at shaft angle (k + offset)/n.
+    """A pulse channel; the middle of each rising edge is at shaft angle (k + offset)/n, in revolutions.
 
     Parameters
     ----------
@@ -428,7 +428,7 @@ class Tachometer:
     duty : float
         Pulse width over pulse period, in angle; 0.01 to 0.99.
     edge_s : float
-        Duration of an edge; linear.
+        Duration of an edge, which is linear.
     jitter_s : float
         Standard deviation of each rising edge's time.
     first_pulse_rev : float
@@ -456,7 +456,7 @@ class Tachometer:
 
 
 def pulse_voltage(tacho: Tachometer, rising_s: FloatArray, falling_s: FloatArray, time_s: FloatArray) -> FloatArray:
-    """Voltage at `time_s`: a trapezoid per pulse, half way up at its edge times."""
+    """Voltage at `time_s`: a trapezoid per pulse, at half height at its edge times."""
     up = np.zeros(np.shape(time_s))
     for edges, sign in ((rising_s, 1.0), (falling_s, -1.0)):
         if len(edges):
@@ -474,7 +474,7 @@ def pulse_voltage(tacho: Tachometer, rising_s: FloatArray, falling_s: FloatArray
 
 @dataclass(frozen=True)
 class Encoder:
-    """An angle channel in degrees: whole counts since the zero mark.
+    """An angle channel in degrees, in whole counts from the zero mark.
 
     Parameters
     ----------
@@ -482,11 +482,11 @@ class Encoder:
     shaft : str
         Empty: the reference shaft.
     counts_per_revolution : int
-        The reading stays up to one count behind the angle.
+        The reading lags the angle by up to one count.
     wraps : bool
-        Whether it starts again after each revolution.
+        Whether the reading restarts at each revolution.
     noise_deg : float
-        Standard deviation of each reading's error ahead of the counting.
+        Standard deviation of each reading's error before quantisation.
     """
 
     channel: str = "encoder"
@@ -500,7 +500,7 @@ class Encoder:
         not_negative(self.noise_deg, "noise_deg of the encoder", "deg")
 
     def read_deg(self, angle_rad: FloatArray, rng: np.random.Generator | None = None) -> FloatArray:
-        """Reading at the given shaft angles; without `rng` free of noise."""
+        """Reading in degrees at the given shaft angles; without `rng`, free of noise."""
         read_rev = angle_rad / (2 * np.pi)
         if rng is not None and self.noise_deg:
             read_rev = read_rev + self.noise_deg / 360.0 * rng.standard_normal(np.shape(angle_rad))
@@ -511,7 +511,7 @@ class Encoder:
         return reading
 
 
-# Where a simulated shaft passes the edges of a pulse disc.
+# Times at which a simulated shaft passes the edges of a pulse disc.
 
 
 def disc_edges(
@@ -519,8 +519,8 @@ def disc_edges(
 ) -> tuple[FloatArray, FloatArray, bool]:
     """Times at which the pulse rises and falls, and whether it is high at the start.
 
-    A window opens at angles (k + offset) and closes `duty` of a pulse period later; turning back, its end opens it.
-    Times are interpolated between steps: wrong by at most (acceleration/speed)·Δ²/8.
+    A window opens at angles (k + offset) and closes `duty` of a pulse period later; in reverse rotation its end opens
+    it. Times are interpolated between steps, with an error of at most (acceleration/speed)·Δ²/8.
 
     Parameters
     ----------
@@ -532,7 +532,7 @@ def disc_edges(
     Raises
     ------
     InputError
-        If the shaft turns by half a pulse period or more within a step.
+        If the shaft turns by half the shorter part of a pulse period or more within a step.
     """
     periods = (revolutions - first_pulse_rev) * pulses_per_revolution
     if len(periods) > 1 and np.abs(np.diff(periods)).max() >= 0.5 * min(duty, 1 - duty):
@@ -549,7 +549,7 @@ def disc_edges(
 
 
 def _crossings(periods: FloatArray, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Times of passing whole numbers, forwards and backwards."""
+    """Times of passing integers, forwards and backwards."""
     whole = np.floor(periods)
     step = np.diff(whole)
     crossings = []

@@ -1,4 +1,4 @@
-"""Faults of single teeth: a crack at the root, a spall on the flank, a tip chipped off; what each leaves."""
+"""Faults of single teeth: a root crack, a spall on the flank, a chipped tip, and the tooth that each leaves."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from sims.mesh._geometry import (
 )
 
 MIN_SECTION = 0.1
-"""Part of a section's thickness that a crack must leave; a tooth with less counts as broken."""
+"""Fraction of a section's thickness that a crack must leave; with less, the tooth counts as broken."""
 
 
 @dataclass(frozen=True)
@@ -38,18 +38,18 @@ class RootCrack:
     Parameters
     ----------
     depth_mm : float
-        Length of the crack in the cross-section, above 0. How deep it may be: see `deepest_crack_mm`.
+        Length of the crack in the cross-section, above 0. For its limit see `deepest_crack_mm`.
     angle_deg : float
         ϑ between the crack and the tooth's centre line, 15 to 90; 90 runs straight across the tooth.
     tooth : int
-        Which tooth of the gear, from 0.
+        Tooth of the gear, counted from 0.
     width_mm : float or None
-        How far it reaches over the face width from one end, everywhere as deep; None: all through.
+        Extent over the face width from one end, at constant depth; None: over the whole face.
 
     Notes
     -----
-    It lies on the side that is in tension while the tooth drives. Loaded on the back flank it closes, and the tooth is
-    as stiff as a whole one.
+    The crack is on the side in tension while the tooth drives. Under load on the back flank it closes, and the tooth is
+    as stiff as a healthy one.
     """
 
     depth_mm: float
@@ -66,13 +66,13 @@ class RootCrack:
 
 
 def crack_mouth_mm(gear: GearGeometry) -> tuple[float, float]:
-    """Middle of the fillet, x and y (half way in γ), where a crack starts."""
+    """Middle of the fillet (halfway in γ), x and y, where a crack starts."""
     point = fillet_outline(gear, np.array([(pi / 2.0 + gear.pressure_angle_rad) / 2.0]))
     return float(point.x_mm[0]), float(point.y_mm[0])
 
 
 def crack_tip_mm(gear: GearGeometry, depth_mm: float, angle_deg: float) -> tuple[float, float]:
-    """Tip of the crack, x and y: inwards along the centre line and across it."""
+    """Tip of the crack, x along the tooth's centre line and y across it."""
     x, y = crack_mouth_mm(gear)
     angle = _angle_rad(angle_deg)
     return x - depth_mm * cos(angle), y - depth_mm * sin(angle)
@@ -84,7 +84,7 @@ def crack_percent(gear: GearGeometry, depth_mm: float, angle_deg: float = 45.0) 
 
 
 CRACK_LAWS = ("two lines", "limiting line", "parallel line")
-"""What of a tooth carries no load behind a crack; see `effective_flank_mm`."""
+"""Rules for the part of a tooth behind a crack that carries no load; see `effective_flank_mm`."""
 
 
 def effective_flank_mm(
@@ -95,14 +95,14 @@ def effective_flank_mm(
     y_mm: FloatArray,
     law: str = "two lines",
 ) -> FloatArray:
-    """Where the loaded side of each section ends, behind a crack: y less the part that carries no load.
+    """Effective y of the loaded side of each section behind a crack: y less the part that carries no load.
 
-    - two lines: they run to the tooth tip, one from the crack's mouth and one from its tip. What lies between them
-      carries no load; between the crack's tip and its mouth, what lies outside the second line. Without depth nothing
-      is lost, so that the stiffness falls steadily from the healthy tooth's.
-    - limiting line: what lies outside the second line carries no load, as is common. It takes the bulge of the flank
-      off a tooth whose crack has no depth yet.
-    - parallel line: what lies further from the tooth's centre line than the crack's tip carries no load.
+    - two lines: both run to the tooth tip, one from the crack's mouth and one from its tip. The part between them
+      carries no load; between the crack's tip and its mouth, the part outside the second line. At zero depth nothing
+      is lost, so the stiffness decreases continuously from that of the healthy tooth.
+    - limiting line: the part outside the second line carries no load, as is common. At zero depth this already removes
+      the bulge of the flank.
+    - parallel line: the part further from the tooth's centre line than the crack's tip carries no load.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def effective_flank_mm(
 
 @lru_cache(maxsize=256)
 def deepest_crack_mm(gear: GearGeometry, angle_deg: float = 45.0) -> float:
-    """Deepest crack that leaves a tenth of the root and of every section, and stays in the outer half of the rim."""
+    """Deepest crack that leaves a tenth of the root and of every section and stays in the outer half of the body."""
     from scipy.optimize import brentq
 
     def spare(depth: float) -> float:
@@ -145,7 +145,7 @@ def deepest_crack_mm(gear: GearGeometry, angle_deg: float = 45.0) -> float:
 
 
 def check_crack(gear: GearGeometry, crack: RootCrack) -> None:
-    """Refuse a crack that goes past the tooth, is wider than the gear, or sits on a tooth that is not there."""
+    """Reject a crack that extends beyond the tooth, is wider than the gear, or is on a tooth that does not exist."""
     deepest = deepest_crack_mm(gear, crack.angle_deg)
     if crack.depth_mm > deepest:
         raise InputError(
@@ -159,7 +159,7 @@ def check_crack(gear: GearGeometry, crack: RootCrack) -> None:
 
 
 def _least_section(gear: GearGeometry, depth_mm: float, angle_deg: float) -> float:
-    """Smallest part of a section's thickness that is left, over the tooth."""
+    """Minimum over the tooth of the fraction of section thickness that is left."""
     fillet = fillet_outline(gear, np.linspace(pi / 2.0, gear.pressure_angle_rad, 60))
     flank = involute_outline(gear, np.linspace(gear.form_roll_rad, gear.tip_roll_rad, 60))
     x, y = np.concatenate((fillet.x_mm, flank.x_mm)), np.concatenate((fillet.y_mm, flank.y_mm))
@@ -174,7 +174,7 @@ def _angle_rad(angle_deg: float) -> float:
 # A spall: metal broken out of one flank, below the zone of contact.
 
 LARGEST_PART = 0.9
-"""Greatest part of the face width that damage may take if it does not take all: what is left must carry the load."""
+"""Maximum fraction of the face width that partial damage may take: the rest must carry the load."""
 
 
 @dataclass(frozen=True)
@@ -190,15 +190,15 @@ class ToothSpall:
     depth_um : float
         0 or above. 0: no spall.
     tooth : int
-        Which tooth of the gear, from 0.
+        Tooth of the gear, counted from 0.
     centre : float or None
-        Where its middle lies on the path of contact, 0 at this flank's root end to 1 at its tip end. None: at the pitch
-        point.
+        Position of its middle on the path of contact, 0 at this flank's root end to 1 at its tip end. None: at the
+        pitch point.
 
     Notes
     -----
-    Over part of the face, the flank beside it carries: see `spall_share`. Over the whole face, the mate sinks in as far
-    as its curvature lets it: see `spall_separation_m`. Edges do not grow, and neither do they press into the mate.
+    Over part of the face, the rest of the flank carries: see `spall_share`. Over the whole face, the mate sinks in as
+    far as its curvature allows: see `spall_separation_m`. Edges neither grow nor press into the mate.
     """
 
     length_mm: float
@@ -217,7 +217,7 @@ class ToothSpall:
 
 
 def check_spall(pair: PairGeometry, side: int, spall: ToothSpall) -> None:
-    """Refuse a spall longer than its flank, wider than the face, or on a tooth that is not there."""
+    """Reject a spall longer than its flank, wider than the face, or on a tooth that does not exist."""
     gear = pair.driver if side == 1 else pair.driven
     longest = flank_length_mm(gear)
     if spall.length_mm > longest:
@@ -230,8 +230,8 @@ def check_spall(pair: PairGeometry, side: int, spall: ToothSpall) -> None:
 
 
 def check_part_of_face(width_mm: float, name: str, face_width_mm: float) -> None:
-    """Refuse a width beyond the loaded face, and one that leaves hardly a strip of it."""
-    # A part given in percent of the face comes back from its width with a rounding error.
+    """Reject a width beyond the loaded face, or one that leaves too narrow a strip of it."""
+    # A width computed from a percentage of the face has a rounding error.
     if width_mm > face_width_mm * (1.0 + 1e-12) or LARGEST_PART + 1e-12 < width_mm / face_width_mm < 1.0 - 1e-12:
         raise InputError(
             f"{name} is {width_mm:g} mm on a loaded face of {face_width_mm:g} mm",
@@ -243,7 +243,7 @@ def check_part_of_face(width_mm: float, name: str, face_width_mm: float) -> None
 
 
 def spans_face(width_mm: float, face_width_mm: float) -> bool:
-    """Whether damage takes the whole loaded face."""
+    """Whether the damage covers the whole loaded face."""
     return width_mm >= face_width_mm * (1.0 - 1e-12)
 
 
@@ -254,12 +254,12 @@ def spall_share(
     spall: ToothSpall,
     roll_length_mm: FloatArray,
 ) -> FloatArray:
-    """Part of the contact's width that a spall over part of the face takes away, λ; 0 if it spans the whole face.
+    """Fraction λ of the contact width lost to a spall over part of the face; 0 if it spans the whole face.
 
-    λ = (w/b) min(1, 2 R h/a²) · (part of the zone of contact, 2a wide, that lies in the spall)
+    λ = (w/b) min(1, 2 R h/a²) · (fraction of the contact zone, 2a wide, that lies in the spall)
 
-    The compliance of the contact grows by 1/(1 − λ). a is taken at 1 GPa, as the load is not known here. a²/(2R) is the
-    Hertzian flattening: a mate that meets a pit less deep than it still presses on the floor.
+    The contact compliance is multiplied by 1/(1 − λ). a is taken at 1 GPa, as the load is not known here. a²/(2R) is
+    the Hertzian flattening: in a pit shallower than that, the mate still presses on the floor.
 
     Parameters
     ----------
@@ -283,10 +283,10 @@ def spall_share(
 
 
 def spall_separation_m(pair: PairGeometry, side: int, spall: ToothSpall, roll_length_mm: FloatArray) -> FloatArray:
-    """How far the mate sinks into a spall over the whole face, E = min(h, d²/(2R)); 0 if it is less wide.
+    """Depth to which the mate sinks into a spall over the whole face, E = min(h, d²/(2R)), in m; 0 if it is narrower.
 
     At a distance d inside the edge of a pit, a mate of relative curvature 1/R rests on that edge, d²/(2R) below its
-    place on a whole flank, until it reaches the floor at h. A short pit is bridged.
+    position on a healthy flank, until it reaches the floor at h. A short pit is bridged.
 
     Parameters
     ----------
@@ -299,14 +299,14 @@ def spall_separation_m(pair: PairGeometry, side: int, spall: ToothSpall, roll_le
     place = arc_length_mm(gear, roll_length_mm)
     low, high = _ends_mm(pair, side, spall)
     inside = np.maximum(np.minimum(place - low, high - place), 0.0)
-    # R is 0 at the base circle, where no contact can be; the floor bounds the sinking there.
+    # R is 0 at the base circle, where there is no contact; the floor limits the depth there.
     sunk = inside**2 / np.maximum(2.0 * curvature_radius_mm(pair, roll_length_mm), 1e-12)
     result: FloatArray = np.minimum(spall.depth_um * 1e-6, sunk * 1e-3)
     return result
 
 
 def _ends_mm(pair: PairGeometry, side: int, spall: ToothSpall) -> tuple[float, float]:
-    """Arc lengths of its ends."""
+    """Arc lengths of the spall's ends."""
     low, high = contact_ends_mm(pair, side)
     rho = pitch_point_mm(pair, side) if spall.centre is None else low + spall.centre * (high - low)
     middle = float(arc_length_mm(pair.driver if side == 1 else pair.driven, rho))
@@ -316,7 +316,7 @@ def _ends_mm(pair: PairGeometry, side: int, spall: ToothSpall) -> tuple[float, f
 # A chipped tooth: a piece broken off its tip.
 
 DEFLECTION_M = 10e-6
-"""What a loaded pair yields by: an edge that lies back by so much has let go of most of its load."""
+"""Typical deflection of a loaded pair: an edge set back by this much has lost most of its load."""
 
 
 @dataclass(frozen=True)
@@ -330,14 +330,14 @@ class ToothChip:
     width_mm : float or None
         Across the face from one end, 0 to 0.9 of the face width, or all of it. None: all of it.
     tooth : int
-        Which tooth of the gear, from 0.
+        Tooth of the gear, counted from 0.
 
     Notes
     -----
-    Beyond the chip a pair touches by the edge that is left, which sinks away from the mate's flank as the corner of a
-    whole tooth does (`corner_separation_m`). Over the whole face this is a separation. Over part of the face that part
-    is lost by and by, and the compliance of tooth and contact grows by 1/(1 − w/b). The driving flank alone is
-    described, and the mass of the piece is not taken off the gear.
+    Beyond the chip the pair is in contact at the remaining edge, which recedes from the mate's flank as the corner of a
+    healthy tooth does (`corner_separation_m`). Over the whole face this is a separation. Over part of it, that part is
+    lost gradually, and the compliance of tooth and contact is multiplied by up to 1/(1 − w/b). Only the driving flank
+    is described, and the mass of the piece is not subtracted.
     """
 
     height_mm: float
@@ -357,7 +357,7 @@ def highest_chip_mm(gear: GearGeometry) -> float:
 
 
 def check_chip(pair: PairGeometry, side: int, chip: ToothChip) -> None:
-    """Refuse a chip higher than the flank, wider than the face, or on a tooth that is not there."""
+    """Reject a chip higher than the flank, wider than the face, or on a tooth that does not exist."""
     gear = pair.driver if side == 1 else pair.driven
     highest = highest_chip_mm(gear)
     if chip.height_mm > highest:
@@ -371,10 +371,10 @@ def check_chip(pair: PairGeometry, side: int, chip: ToothChip) -> None:
 
 
 def chip_share(pair: PairGeometry, side: int, chip: ToothChip, progress: FloatArray) -> FloatArray:
-    """Part of the width that a chip over part of the face takes away, 0 to 0.9; 0 if it spans the whole face.
+    """Fraction of the width lost to a chip over part of the face, 0 to 0.9; 0 if it spans the whole face.
 
-    λ = (w/b) [1 − exp(−s/s₀)], with the separation s of the edge that is left, and what a loaded pair yields by, s₀:
-    both parts of the width share the load until the edge has sunk away from the mate's flank.
+    λ = (w/b) [1 − exp(−s/s₀)], with the separation s of the remaining edge and the deflection s₀ of a loaded pair: both
+    parts of the width share the load until the edge has receded from the mate's flank.
 
     Parameters
     ----------
@@ -389,7 +389,7 @@ def chip_share(pair: PairGeometry, side: int, chip: ToothChip, progress: FloatAr
 
 
 def chip_separation_m(pair: PairGeometry, side: int, chip: ToothChip, progress: FloatArray) -> FloatArray:
-    """Separation by a chip over the whole face, of the edge that is left from the mate's flank; 0 for a narrower chip.
+    """Separation of the remaining edge from the mate's flank, for a chip over the whole face, in m; 0 if narrower.
 
     Parameters
     ----------
@@ -405,6 +405,6 @@ def _is_whole(pair: PairGeometry, chip: ToothChip) -> bool:
 
 
 def _edge_separation_m(pair: PairGeometry, side: int, chip: ToothChip, progress: FloatArray) -> FloatArray:
-    """0 up to the chip's edge, and what is more than at the corner of a whole tooth beyond it."""
+    """Separation of the chip's edge in excess of that at a healthy tooth's corner; 0 up to the edge."""
     lost = (chip.height_mm, 0.0) if side == 1 else (0.0, chip.height_mm)
     return corner_separation_m(pair, progress, lost) - corner_separation_m(pair, progress)

@@ -1,4 +1,4 @@
-"""How flanks depart from the involute, positive where metal is missing: relief, wear, helix, crowning, roughness."""
+"""Flank deviations, positive where metal is missing: relief, wear, helix, crowning and roughness."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ class FlankDeviation:
     Parameters
     ----------
     tip_relief_um : float
-        Metal taken off at the tip, 0 for none.
+        Metal removed at the tip, 0 for none.
     tip_relief_length_mm : float
-        Length of the relief along the line of action, from the tip down; straight.
+        Length of the linear relief along the line of action, from the tip down.
     pitch_um : tuple of float
-        Cumulative pitch deviation of each tooth, as many as the gear has teeth. Empty: none.
+        Cumulative pitch deviation of each tooth, one value per tooth. Empty: none.
     wear_um : float
-        Greatest depth of wear by sliding, 0 for none; see `sims.mesh` for its shape over the flank.
+        Maximum depth of wear by sliding, 0 for none; see `wear_profile` for its shape over the flank.
     """
 
     tip_relief_um: float = 0.0
@@ -47,7 +47,7 @@ IDEAL_FLANK = FlankDeviation()
 
 
 def check_deviation(gear: GearGeometry, deviation: FlankDeviation) -> None:
-    """Refuse a relief longer than the flank and a number of pitch deviations that is not the number of teeth."""
+    """Reject a relief longer than the flank, or a number of pitch deviations that is not the number of teeth."""
     flank = (gear.tip_roll_rad - gear.form_roll_rad) * gear.base_radius_mm
     if deviation.tip_relief_um > 0.0 and deviation.tip_relief_length_mm > flank:
         raise InputError(
@@ -59,12 +59,12 @@ def check_deviation(gear: GearGeometry, deviation: FlankDeviation) -> None:
 
 
 def flank_separation_m(gear: GearGeometry, deviation: FlankDeviation, roll_length_mm: FloatArray) -> FloatArray:
-    """Missing metal at the given places of the flank, in m; without wear, which depends on the mate.
+    """Missing metal at the given positions on the flank, in m; without wear, which depends on the mate.
 
     Parameters
     ----------
     roll_length_mm : array
-        ρ of the gear, distance from its base tangent point. Beyond the tip the relief goes on growing.
+        ρ of the gear, distance from its base tangent point. Beyond the tip the relief continues to grow.
     """
     rho = np.asarray(roll_length_mm, dtype=np.float64)
     tip = gear.tip_roll_rad * gear.base_radius_mm
@@ -73,7 +73,7 @@ def flank_separation_m(gear: GearGeometry, deviation: FlankDeviation, roll_lengt
 
 
 def pitch_separation_m(gear: GearGeometry, deviation: FlankDeviation) -> FloatArray:
-    """One value per tooth, in m."""
+    """Cumulative pitch deviation of each tooth, (z,), in m."""
     if not deviation.pitch_um:
         return np.zeros(gear.teeth)
     return np.asarray(deviation.pitch_um, dtype=np.float64) * 1e-6
@@ -82,19 +82,19 @@ def pitch_separation_m(gear: GearGeometry, deviation: FlankDeviation) -> FloatAr
 # Wear of all flanks of a gear by sliding.
 
 MIN_RADIUS = 0.1
-"""In modules: below this radius of curvature specific sliding no longer grows, as the zone of contact is wider."""
+"""In modules: below this radius of curvature specific sliding is held constant, as the contact zone is wider."""
 
 
 def wear_profile(pair: PairGeometry, side: int, roll_length_mm: FloatArray) -> FloatArray:
-    """Depth of wear over the flank, 1 where it is greatest, 0 at the pitch point.
+    """Depth of wear over the flank relative to its maximum: 1 at the maximum, 0 at the pitch point.
 
     h ∝ p · s = |1 − u_mate/u_own|,  u = ω ρ
 
-    By Archard's law a point wears in proportion to pressure times the distance slid past it. A zone of contact of width
-    2a rolls over the point at its own surface's speed u_own, while the surfaces slide at |u_own − u_mate|: s = 2a |1 −
-    u_mate/u_own|. Mean pressure times width is the load per width, F/b, taken here as the same all along the path of
-    contact. What is left is the specific sliding: 0 in pure rolling at the pitch point, rising to both ends, the more
-    so to the root, where a flank is slow. The law's constant is in the depth that is given.
+    By Archard's law the wear at a point is proportional to pressure times the distance slid past it. A contact zone of
+    width 2a rolls over the point at its own surface's speed u_own, while the surfaces slide at |u_own − u_mate|:
+    s = 2a |1 − u_mate/u_own|. Mean pressure times width is the load per width, F/b, assumed constant along the path of
+    contact. This leaves the specific sliding: 0 in pure rolling at the pitch point, increasing towards both ends, more
+    so towards the root, where a flank is slow. The law's constant is part of the given depth.
 
     Parameters
     ----------
@@ -106,8 +106,8 @@ def wear_profile(pair: PairGeometry, side: int, roll_length_mm: FloatArray) -> F
 
     Notes
     -----
-    Load sharing and the change of pressure as the flank wears are left out: in truth double contact halves the wear at
-    the ends.
+    Load sharing, and the change of pressure as the flank wears, are neglected: in reality double contact halves the
+    wear at the ends.
 
     Source: J. F. Archard, Contact and rubbing of flat surfaces, Journal of Applied Physics 24 (1953), for the law.
     """
@@ -123,17 +123,17 @@ def _specific_sliding(pair: PairGeometry, side: int, roll_length_mm: FloatArray)
 
 
 # --------------------
-# Along the face width: helix, crowning and misalignment, each slice of the face with its own phase and gap.
+# Along the face width: helix, crowning and misalignment; each slice of the face has its own phase and gap.
 # --------------------
 
 
 MAX_SLICES = 64
-"""Of the face width; compiled code holds as many."""
+"""Maximum number of slices of the face width, for which compiled code reserves space."""
 
 
 @dataclass(frozen=True)
 class Lead:
-    """How the flanks of a pair run along the face width, both gears together.
+    """Flank lines of a pair along the face width, both gears combined.
 
     Parameters
     ----------
@@ -141,16 +141,16 @@ class Lead:
         β on the reference circle, −45 to 45; above 0: the driver is right-handed. The gears of the pair are those of
         the transverse section, see `transverse_section`.
     crowning_um : float
-        Metal taken off at both ends of the face, a parabola from its middle; along the line of action.
+        Metal removed at both ends of the face, a parabola from its middle; along the line of action.
     error_um : float
-        Misalignment: by how much the flanks are further apart at the far end of the face (+z) than at the near one,
-        in the plane of action (F_β of ISO 6336-1).
+        Misalignment: gap at the far end of the face (+z) minus that at the near end, in the plane of action (F_β of
+        ISO 6336-1).
     n_slices : int
-        Of equal width; 1 for straight, even flanks.
+        Number of slices of equal width; 1 for a spur pair without crowning and misalignment.
 
     Notes
     -----
-    Slices yield each for themselves, as in ISO 6336-1: a slice that carries does not bend its neighbours.
+    Slices deflect independently, as in ISO 6336-1: a loaded slice does not bend its neighbours.
     """
 
     helix_angle_deg: float = 0.0
@@ -167,7 +167,7 @@ class Lead:
 
     @property
     def even(self) -> bool:
-        """Whether all of the face carries alike: no helix, no crowning, no misalignment."""
+        """Whether the load is uniform along the face: no helix, crowning or misalignment."""
         return self.helix_angle_deg == 0.0 and self.crowning_um == 0.0 and self.error_um == 0.0
 
     @property
@@ -176,24 +176,24 @@ class Lead:
         return (np.arange(self.n_slices) + 0.5) / self.n_slices - 0.5
 
     def gap_m(self, places: FloatArray) -> FloatArray:
-        """Missing metal by crowning and misalignment at places −½ to ½ of the face; 0 in its middle."""
+        """Missing metal from crowning and misalignment at places −½ to ½ of the face, in m; 0 in its middle."""
         return 1e-6 * (self.crowning_um * (2.0 * places) ** 2 + self.error_um * places)
 
     def late(self, pair: PairGeometry, places: FloatArray) -> FloatArray:
-        """Base pitches by which places −½ to ½ of the face enter after the end that enters first, 0 to ε_β.
+        """Delay in base pitches with which places −½ to ½ of the face enter after the first end, 0 to ε_β.
 
-        The driver turns counter-clockwise, seen from +z: the far end of a right-handed tooth runs ahead.
+        The driver turns counter-clockwise, seen from +z: the far end of a right-handed tooth leads.
         """
         hand = 1.0 if self.helix_angle_deg >= 0.0 else -1.0
         return self.overlap_ratio(pair) * (0.5 - hand * places)
 
     def overlap_ratio(self, pair: PairGeometry) -> float:
-        """ε_β = b tan β/(π m_t), how many pitches one end of the face is behind the other."""
+        """Overlap ratio ε_β = b tan β/(π m_t): pitches by which one end of the face lags the other."""
         turn = pair.face_width_mm * tan(radians(abs(self.helix_angle_deg)))
         return turn / (pi * pair.driver.module_mm)
 
     def base_helix_rad(self, pair: PairGeometry) -> float:
-        """β_b of tan β_b = tan β cos α_t."""
+        """Base helix angle β_b, with tan β_b = tan β cos α_t."""
         return atan(tan(radians(self.helix_angle_deg)) * cos(pair.driver.pressure_angle_rad))
 
     def axial_share(self, pair: PairGeometry) -> float:
@@ -202,7 +202,7 @@ class Lead:
 
 
 STRAIGHT = Lead()
-"""A spur pair whose flanks touch all along the face."""
+"""A spur pair whose flanks are in contact over the whole face."""
 
 
 def transverse_section(
@@ -212,20 +212,20 @@ def transverse_section(
     helix_angle_deg: float,
     **normal: float | None,
 ) -> GearGeometry:
-    """Return the transverse section of a helical gear that a rack of normal sizes cuts.
+    """Return the transverse section of a helical gear cut by a rack of the given normal dimensions.
 
-    m_t = m_n/cos β,  tan α_t = tan α_n/cos β; profile shift, addendum, dedendum and the tip round keep their lengths.
+    m_t = m_n/cos β,  tan α_t = tan α_n/cos β; profile shift, addendum, dedendum and tip rounding keep their lengths.
 
     Parameters
     ----------
     teeth, normal_module_mm, normal_pressure_angle_deg, helix_angle_deg
         z, m_n, α_n, β.
     **normal
-        Further fields of `GearGeometry`, in normal modules or mm.
+        Other fields of `GearGeometry`, in normal modules or mm.
 
     Notes
     -----
-    In the transverse section the rack's round tip is an ellipse; a circle of the same radius stands for it.
+    In the transverse section the rack's rounded tip is an ellipse; it is approximated by a circle of the same radius.
 
     Source: ISO 21771, *Gears – Cylindrical involute gears and gear pairs* (2007).
     """
@@ -242,15 +242,15 @@ def transverse_section(
 
 @dataclass(frozen=True)
 class NormalSection(GearGeometry):
-    """Spur gear whose teeth are those of a helical gear's normal section; see `normal_section`.
+    """Spur gear with the teeth of a helical gear's normal section; see `normal_section`.
 
-    Its number of teeth is no whole number, and nothing is checked: the gear that it stands for has been.
+    Its number of teeth is not an integer. Nothing is checked, as the gear it represents has been.
     """
 
     teeth: float  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
-        """Leave it as it is."""
+        """Skip the checks."""
 
 
 def normal_section(gear: GearGeometry, helix_angle_deg: float) -> GearGeometry:
@@ -264,7 +264,7 @@ def normal_section(gear: GearGeometry, helix_angle_deg: float) -> GearGeometry:
 
     Notes
     -----
-    The bore is as large a part of the root circle as in the gear itself: so the body below a tooth keeps its shape.
+    The ratio of bore to root circle is that of the gear itself, so the body below a tooth keeps its shape.
 
     Source: ISO 6336-3, *Calculation of tooth bending strength* (2019), for the virtual spur gear.
     """
@@ -287,7 +287,7 @@ def normal_section(gear: GearGeometry, helix_angle_deg: float) -> GearGeometry:
 
 
 def normal_roll_rad(gear: GearGeometry, virtual: GearGeometry, roll_rad: FloatArray) -> FloatArray:
-    """Roll angle on the virtual gear at the height where the transverse section has `roll_rad`."""
+    """Roll angle on the virtual gear at the height where the roll angle of the transverse section is `roll_rad`."""
     if virtual is gear:
         return roll_rad
     height = gear.base_radius_mm * np.hypot(1.0, roll_rad) - gear.pitch_radius_mm
@@ -296,7 +296,7 @@ def normal_roll_rad(gear: GearGeometry, virtual: GearGeometry, roll_rad: FloatAr
 
 
 # --------------------
-# Roughness: a Weierstrass–Mandelbrot profile, locked to time or to the flank. Source: A. Majumdar, B. Bhushan, *Role of
+# Roughness: a Weierstrass–Mandelbrot profile, fixed to time or to the flank. Source: A. Majumdar, B. Bhushan, *Role of
 # fractal geometry in roughness characterization and contact mechanics of surfaces*, Journal of Tribology 112 (1990).
 # --------------------
 
@@ -305,9 +305,9 @@ CYCLES_PER_METRE = 1.5 ** np.arange(7.0, 19.0)
 """γⁿ of the profile's lines, (n_lines,)."""
 
 LISTED_TRAVEL_MPS = 1.0312
-"""Speed along the profile that puts lines 7 … 18 at 17.6 … 1524 Hz: γⁿ cycles per metre times this.
+"""Speed along the profile at which lines 7 … 18 are at 17.6 … 1524 Hz: γⁿ cycles per metre times this.
 
-Derived from a published list of lines, whose lowest is 17.9 Hz. It is near the entrainment speed of a 55/75 pair of
+Derived from a published list of lines, the lowest at 17.9 Hz. It is close to the entrainment speed of a 55/75 pair of
 module 2 at 500 rpm, 0.95 to 1.02 m/s.
 """
 
@@ -319,7 +319,7 @@ class FractalSurface:
     Parameters
     ----------
     scale_m : float
-        G, not below 0; 0 is a smooth flank.
+        G, not below 0; 0 for a smooth flank.
     dimension : float
         D, above 1 and below 2: low for wavy, high for jagged profiles.
     """
@@ -354,7 +354,7 @@ class FractalSurface:
 
     @property
     def rms_m(self) -> float:
-        """Root mean square height, √(G^(2(D-1))/2 · Σγ^(-2(2-D)n)): of a long profile, or over phases."""
+        """Root mean square height, √(G^(2(D-1))/2 · Σγ^(-2(2-D)n)), of a long profile or over random phases."""
         return float(np.sqrt(0.5 * np.sum(self.amplitudes_m**2)))
 
     def draw_phases(self, rng: np.random.Generator, n_profiles: int = 1) -> FloatArray:
@@ -364,10 +364,10 @@ class FractalSurface:
 
 @dataclass(frozen=True)
 class TimeLockedRoughness:
-    """Δb(t) = z(vt): the flanks met one after the other, spliced to one endless profile.
+    """Δb(t) = z(vt): successive flanks spliced into one endless profile.
 
-    Its lines stand at fixed frequencies γⁿv, whatever the shaft does, and it never comes back with a tooth: it shows a
-    roughness's strength, not its place. Where a line must follow a gear, use `FlankRoughness`.
+    Its lines are at fixed frequencies γⁿv, independent of the shaft, and it never repeats with a tooth: it represents
+    the strength of the roughness, not its location. Where a line must follow a gear, use `FlankRoughness`.
 
     Parameters
     ----------
@@ -383,16 +383,16 @@ class TimeLockedRoughness:
 
     @classmethod
     def draw(cls, surface: FractalSurface, rng: np.random.Generator) -> TimeLockedRoughness:
-        """Draw the phases."""
+        """Draw the phases of one profile."""
         return cls(surface, surface.draw_phases(rng)[0])
 
     @property
     def frequencies_hz(self) -> FloatArray:
-        """γⁿ v, (n_lines,)."""
+        """Frequency of each line, γⁿ v, (n_lines,)."""
         return CYCLES_PER_METRE * LISTED_TRAVEL_MPS
 
     def height_m(self, time_s: ArrayLike) -> FloatArray:
-        """Δb at the given times."""
+        """Height Δb at the given times."""
         t = np.asarray(time_s, dtype=np.float64)
         total = np.zeros(t.shape)
         lines = zip(self.surface.amplitudes_m, 2 * np.pi * self.frequencies_hz, self.phases_rad, strict=True)
@@ -401,12 +401,12 @@ class TimeLockedRoughness:
         return total
 
     def phasors(self, step_s: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-        """What `roughness_kernel.height_now` and `advance` work on, from time 0.
+        """Phasors at time 0 for `height_now` and `advance`.
 
         Returns
         -------
         real, imaginary, omega_rad_s, step_cos, step_sin : arrays, (n_lines,)
-            For steps of `step_s`, which is half the solver's step for a fourth-order Runge–Kutta method.
+            For steps of `step_s`, half the solver's step for a fourth-order Runge–Kutta method.
         """
         positive(step_s, "step_s", "s")
         omega, a = 2 * np.pi * self.frequencies_hz, self.surface.amplitudes_m
@@ -421,7 +421,7 @@ class TimeLockedRoughness:
 
 @dataclass(frozen=True, eq=False)  # two drawn profiles are never the same, and arrays compare element by element
 class FlankRoughness:
-    """z of every tooth of one gear over the position on its flank: it returns with the tooth.
+    """Roughness profile of every tooth of one gear over the position on its flank; it repeats with the tooth.
 
     The lines of a whole gear are orders of its shaft. Wavelengths longer than the flank act as pitch errors.
 
@@ -444,24 +444,23 @@ class FlankRoughness:
 
     @property
     def n_teeth(self) -> int:
-        """Teeth of the gear."""
+        """Number of teeth of the gear."""
         return int(self.phases_rad.shape[0])
 
     def height_m(self, tooth: NDArray[np.integer] | int, position_m: ArrayLike) -> FloatArray:
-        """Height of a tooth's flank, above 0 into the gap; tooth numbers count on through revolutions.
+        """Height of a tooth's flank in m, positive into the gap; tooth numbers continue over revolutions.
 
         Parameters
         ----------
         tooth : int or array
-            Any whole number; taken modulo the number of teeth.
+            Any integer; taken modulo the number of teeth.
         position_m : array
-            Arc length along the flank, from the root end of the contact, in the shape of `tooth` or one that goes with
-            it.
+            Arc length along the flank from the root end of the contact, in a shape that broadcasts with `tooth`.
         """
         s = np.asarray(position_m, dtype=np.float64)
         row = np.mod(tooth, self.n_teeth)
         total = np.zeros(np.broadcast_shapes(np.shape(row), s.shape))
-        # cos(ks + φ) by the cosines and sines of both: one profile of positions serves all teeth.
+        # cos(ks + φ) by the addition theorem: the cosines and sines of positions serve all teeth.
         for n, cycles in enumerate(CYCLES_PER_METRE):
             place, phase = 2 * np.pi * cycles * s, self.phases_rad[row, n]
             a = self.surface.amplitudes_m[n]
@@ -474,12 +473,12 @@ def _phases(phases_rad: FloatArray, ndim: int, n_lines: int) -> FloatArray:
     phases = frozen_array(phases_rad, "phases_rad of the roughness", ndim=ndim)
     if phases.shape[-1] != n_lines:
         raise InputError(
-            f"{phases.shape[-1]} phases", where="phases_rad of the roughness", allowed=f"{n_lines}, per line"
+            f"{phases.shape[-1]} phases", where="phases_rad of the roughness", allowed=f"{n_lines}, one per line"
         )
     return phases
 
 
-# Compiled roughness for right-hand sides: phasors stepped in time, tables looked up on the flank.
+# Compiled roughness for right-hand sides: phasors stepped in time.
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
@@ -494,7 +493,7 @@ def height_now(real, imaginary, omega_rad_s):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def advance(real, imaginary, step_cos, step_sin):  # type: ignore[no-untyped-def]
-    """Turn the phasors by one step, in place; exact up to rounding, about 1e-16 per step."""
+    """Rotate the phasors by one step, in place; exact up to rounding, about 1e-16 per step."""
     for n in range(real.shape[0]):
         re = real[n] * step_cos[n] - imaginary[n] * step_sin[n]
         imaginary[n] = real[n] * step_sin[n] + imaginary[n] * step_cos[n]

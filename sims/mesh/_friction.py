@@ -1,4 +1,4 @@
-"""Friction of a lubricated tooth contact: the regression of Xu and Kahraman, and the pressure it needs."""
+"""Friction of a lubricated tooth contact: the regression of Xu and Kahraman, and the contact pressure it needs."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from sims.mesh._mesh_stiffness import share_torque
 from sims.mesh._stiffness import GearMesh
 
 MAX_FRICTION = 0.3
-"""Cap of the coefficient."""
+"""Upper limit of the coefficient."""
 COEFFICIENTS = (-8.916465, 1.03303, 1.036077, -0.354068, 2.812084, -0.100601, 0.752755, -0.390958, 0.620305)
 """b1 … b9 of the regression."""
 
-# The roughness limit is the one that matters, as exp(S) sits in an exponent. The other limits are assumed: those of
-# contacts that such a regression is commonly used for, not a statement of its authors.
+# The roughness limit matters most, as exp(S) is in an exponent. The other limits are assumed: they cover contacts for
+# which such a regression is commonly used, and are not stated by its authors.
 _LIMITS = {
     "roughness_um": (0.0, 0.6, "um"),
     "slide_to_roll": (0.0, 2.0, ""),
@@ -35,14 +35,14 @@ _LIMITS = {
 
 @dataclass(frozen=True)
 class FrictionResult:
-    """Friction coefficient and what to know about it.
+    """Friction coefficient, with notes on the range of the regression.
 
     Parameters
     ----------
     coefficient : array
-        From 0 to `MAX_FRICTION`, in the common shape of what was given.
+        From 0 to `MAX_FRICTION`, in the broadcast shape of the inputs.
     notes : tuple of str
-        One per quantity that leaves the regression's range, with value and limit; empty inside.
+        One per quantity outside the regression's range, with value and limit; empty inside.
     """
 
     coefficient: FloatArray
@@ -68,7 +68,7 @@ def friction_coefficient(
     slide_to_roll : array
         SR, sliding speed over entrainment speed; its sign is ignored, and 0 gives 0.
     pressure_gpa : array
-        Greatest Hertz pressure P, not below 0.
+        Maximum Hertz pressure P, not below 0.
     viscosity_cp : float
         Dynamic viscosity ν of the oil at its inlet temperature, in cP = mPa·s, above 0.
     roughness_um : float
@@ -81,17 +81,17 @@ def friction_coefficient(
     Returns
     -------
     FrictionResult
-        Outside the range (roughness above 0.6 µm above all) the coefficient is still given, with a note.
+        Outside the range (above all, roughness above 0.6 µm) the coefficient is still given, with a note.
 
     Raises
     ------
     InputError
-        On a value that has no meaning.
+        If a value has no physical meaning.
 
     Notes
     -----
-    The regression stands for one oil (a 75W-90) and full or mixed film. It does not know start and stop, where the
-    film is gone: there, use a friction law with a stick phase.
+    The regression applies to one oil (a 75W-90) and full or mixed film. It does not cover start and stop, where the
+    film is lost: there, use a friction law with a stick phase.
 
     Source: H. Xu, *Development of a generalized mechanical efficiency prediction methodology for gear pairs*,
     dissertation, The Ohio State University, 2005.
@@ -118,7 +118,7 @@ def friction_coefficient(
 def line_contact_pressure_gpa(
     normal_force_n: ArrayLike, face_width_m: float, radius_m: ArrayLike, reduced_modulus_pa: float
 ) -> FloatArray:
-    """Greatest Hertz pressure of a line contact, p = √(N E*/(π b R)), in GPa.
+    """Maximum Hertz pressure of a line contact, p = √(N E*/(π b R)), in GPa.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def _regression(
 ) -> FloatArray:
     b1, b2, b3, b4, b5, b6, b7, b8, b9 = COEFFICIENTS
     s = SR * P * np.log10(nu)
-    # Beyond an exponent of 700 a double overflows; the cap has long been reached.
+    # A double overflows beyond an exponent of about 700; the upper limit is reached long before.
     f = np.minimum(b1 + b4 * s + b5 * np.exp(-s) + b9 * np.exp(np.minimum(S, 50.0)), 700.0)
     mu: FloatArray = np.exp(f) * P**b2 * SR**b3 * V**b6 * nu**b7 * R**b8
     return mu
@@ -159,7 +159,7 @@ def _range_notes(inputs: dict[str, FloatArray]) -> tuple[str, ...]:
     notes = []
     for name, (low, high, unit) in _LIMITS.items():
         smallest, largest = float(np.min(inputs[name])), float(np.max(inputs[name]))
-        # No load and no sliding give exactly zero friction: that is no extrapolation.
+        # No load and no sliding give exactly zero friction, which is not an extrapolation.
         if name == "pressure_gpa" and smallest == 0.0:
             smallest = low
         for value, outside in ((smallest, smallest < low), (largest, largest > high)):
@@ -188,7 +188,7 @@ B1, B2, B3, B4, B5, B6, B7, B8, B9 = COEFFICIENTS
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def oil_terms(viscosity_cp, roughness_um):  # type: ignore[no-untyped-def]
-    """(log₁₀ν₀, b1 + b9·exp(S) + b7·ln ν₀): the terms that stay the same during a simulation."""
+    """(log₁₀ν₀, b1 + b9·exp(S) + b7·ln ν₀): the terms that are constant during a simulation."""
     return log(viscosity_cp) / log(10.0), B1 + B9 * exp(roughness_um) + B7 * log(viscosity_cp)
 
 
@@ -204,8 +204,8 @@ def hertz_pressure_gpa(normal_force_n, width_m, radius_m, reduced_modulus_pa):  
 def film_coefficient(slide_to_roll, pressure_gpa, entrainment_mps, radius_m, log10_oil, constant):  # type: ignore[no-untyped-def]
     """μ of the regression, from 0 to MAX_FRICTION.
 
-    Powers are added as logarithms: two exponentials and four logarithms in all. No sliding and no load give 0; an
-    entrainment speed of zero with sliding gives the cap, as V^b6 grows without bound.
+    Powers are summed as logarithms: two exponentials and four logarithms in all. No sliding or no load gives 0; zero
+    entrainment speed with sliding gives the upper limit, as V^b6 grows without bound.
     """
     if slide_to_roll <= 0.0 or pressure_gpa <= 0.0:
         return 0.0
@@ -221,7 +221,7 @@ def film_coefficient(slide_to_roll, pressure_gpa, entrainment_mps, radius_m, log
         + B6 * log(entrainment_mps)
         + B8 * log(radius_m)
     )
-    # exp(-1.204) = 0.3: saves the exponential, and its overflow, where the cap holds.
+    # exp(-1.204) = 0.3: avoids the exponential, and its overflow, at the upper limit.
     return exp(exponent) if exponent < -1.2039728043259361 else MAX_FRICTION
 
 
@@ -249,8 +249,8 @@ def contact_friction_n(  # type: ignore[no-untyped-def]
     """Friction of one tooth pair, μ N sgn(v_s), with v_s = u2 - u1 + vibration, u = ωρ; subtract it from body 1's x.
 
     μ is `film_factor` times the regression's coefficient, plus `dry_coefficient` at every sliding speed.
-    Slide-to-roll ratio and entrainment use the rolling speeds u alone: the film takes no notice of the vibration
-    within its own length, and near the pitch point a vibrating sign would make the ratio chatter.
+    Slide-to-roll ratio and entrainment use the rolling speeds u alone: the film does not respond to vibration within
+    its own length, and near the pitch point an alternating sign would make the ratio chatter.
     """
     if normal_force_n <= 0.0:
         return 0.0
@@ -265,15 +265,15 @@ def contact_friction_n(  # type: ignore[no-untyped-def]
 # Friction of each tooth pair over the mesh at a steady load and speed.
 
 MIN_RADIUS = 1e-3
-"""In modules: radius of curvature below which a contact, on the base circle, is taken as this curved."""
+"""In modules: lower limit of the radius of curvature, which is 0 on the base circle."""
 
 MIN_PART = 0.2
-"""Part of the load from which a contact's range is told."""
+"""Fraction of the load above which a contact is checked against the regression's range."""
 
 
 @dataclass(frozen=True)
 class MeshFriction(Result):
-    """Friction over the mesh; column j is pair ⌊c + ramp/2⌋ − j, 0 where a pair does not touch.
+    """Friction over mesh cycles; column j is pair ⌊c + ramp/2⌋ − j, 0 where a pair is not in contact.
 
     Parameters
     ----------
@@ -288,7 +288,7 @@ class MeshFriction(Result):
     sliding_mps : array, (n, n_slots)
         v_s = ω2 ρ2 − ω1 ρ1.
     notes : tuple of str
-        Where contacts that carry a fifth of the load or more leave the range of the friction regression.
+        Where contacts that carry at least a fifth of the load are outside the range of the friction regression.
     """
 
     mesh_cycles: FloatArray
@@ -321,7 +321,7 @@ def friction_over_mesh(
 
     Notes
     -----
-    Friction does not act back on the load sharing here. The pressure is that of smooth flanks of full width. A pair of
+    The effect of friction on load sharing is neglected. The pressure is that of smooth flanks of full width. A pair of
     helical teeth counts as in contact where the middle of its face is.
     """
     shared = share_torque(mesh, torque_nm, mesh_cycles)
@@ -342,7 +342,7 @@ def friction_over_mesh(
         )
 
     coefficient = friction_where(np.ones(normal.shape, dtype=np.bool_)).coefficient.reshape(normal.shape)
-    # A pair that takes up its load passes every small pressure, of which there is nothing to say.
+    # A pair that is being loaded passes through every small pressure; no note on those.
     notes = friction_where(normal >= MIN_PART * normal.sum(axis=1, keepdims=True)).notes
     friction = coefficient * normal * np.sign(sliding)
     return MeshFriction(shared.mesh_cycles, coefficient, friction, normal, sliding, notes)

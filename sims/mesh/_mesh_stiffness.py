@@ -20,10 +20,10 @@ from sims.mesh._stiffness import GearMesh
 
 
 def separation_table(mesh: GearMesh, progress: FloatArray) -> tuple[ToothRows, FloatArray]:
-    """Metal missing on the flanks of each tooth along the line of action over ζ, and pitch deviations, (2, z), in m.
+    """Missing metal on each tooth's flank over ζ, along the line of action, and pitch deviations, (2, z), in m.
 
-    It is below 0 where metal stands out. The first row of a gear is an ordinary tooth: tip relief, profile deviation,
-    wear; each tooth with a damaged flank has a row of its own. With roughness, row i is tooth i.
+    Values are below 0 where metal protrudes. The first row of a gear is an ordinary tooth (tip relief, profile
+    deviation, wear); each tooth with a damaged flank has its own row. With roughness, row i is tooth i.
     """
     rows = tooth_rows(_separation_rows(mesh, 1, progress), _separation_rows(mesh, 2, progress))
     pitch_m = np.zeros(rows.of.shape)
@@ -33,7 +33,7 @@ def separation_table(mesh: GearMesh, progress: FloatArray) -> tuple[ToothRows, F
 
 
 def _separation_rows(mesh: GearMesh, number: int, progress: FloatArray) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Rows of one gear, and the row of each tooth."""
+    """Rows of one gear, and the row index of each tooth."""
     side, rho = mesh.side(number), mesh.roll_length_mm(number, progress)
     ordinary = _ordinary(mesh, number, progress)
     n_teeth = side.gear.teeth
@@ -57,10 +57,10 @@ def _separation_rows(mesh: GearMesh, number: int, progress: FloatArray) -> tuple
 def roughness_heights_m(
     mesh: GearMesh, number: int, roughness: FlankRoughness, roll_length_mm: FloatArray
 ) -> FloatArray:
-    """Heights of all teeth of a gear, (z, n), above 0 into the gap.
+    """Roughness heights of all teeth of a gear, (z, n), in m, positive into the gap.
 
     The position on a flank is the arc length from the root end of its contact: a profile is fixed to the metal, over
-    which the contact moves slower than along the line of action, and faster towards the tip.
+    which the contact moves more slowly than along the line of action, and faster towards the tip.
     """
     gear = mesh.side(number).gear
     origin = arc_length_mm(gear, contact_ends_mm(mesh.pair, number)[0])
@@ -75,15 +75,15 @@ def _ordinary(mesh: GearMesh, number: int, progress: FloatArray) -> FloatArray:
 
 
 class ToothRows(NamedTuple):
-    """Curves of single teeth over ζ, those of the driver's teeth first, as compiled code reads them.
+    """Curves of single teeth over ζ, the driver's first, in the form that compiled code reads.
 
     Attributes
     ----------
     rows : array, (n_rows, n, ...)
     of : int array, (2, z)
-        Row of each tooth of the driver and of the driven gear; z is the greater number of teeth.
+        Row index of each tooth of the driver and of the driven gear; z is the larger number of teeth.
     n_driver : int
-        Rows of the driver.
+        Number of rows that belong to the driver.
     """
 
     rows: FloatArray
@@ -101,7 +101,7 @@ def tooth_rows(
     *,
     share_first: bool = False,
 ) -> ToothRows:
-    """Put the rows of both gears, each with the row of its teeth, together; `share_first`: row 0 is that of both."""
+    """Combine both gears' rows and the row index of each tooth; `share_first`: row 0 is common to both."""
     (first, of_1), (second, of_2) = driver, driven
     of = np.zeros((2, max(len(of_1), len(of_2))), dtype=np.int64)
     of[0, : len(of_1)] = of_1
@@ -113,35 +113,35 @@ def tooth_rows(
 
 @dataclass(frozen=True)
 class MeshTable(Result):
-    """Compliance and separation of a tooth pair over ζ, base pitches since its ideal entry.
+    """Compliance and separation of a tooth pair over ζ, in base pitches from its ideal entry.
 
-    A pair made of tooth i of the driver and tooth j of the driven gear has the sums of both teeth's compliance,
-    separation and pitch deviation, and the compliance of the contact besides.
+    The compliance, separation and pitch deviation of a pair are the sums over its two teeth; the contact compliance is
+    added to the first.
 
     Parameters
     ----------
     start, step : float
-        ζ of the first column and between columns; one column lies beyond either end, for cubic interpolation. All
-        rows share the columns: n = `n_points` + 2.
+        ζ of the first column, and the spacing of columns; one column lies beyond either end, for cubic interpolation.
+        All rows share the columns: n = `n_points` + 2.
     compliance : ToothRows
-        Tooth and foundation, m/N. The first row of a gear is a healthy tooth, each further row a faulty one.
+        Of tooth and foundation, m/N. The first row of a gear is a healthy tooth, each further row a faulty one.
     separation : ToothRows
         m; see `separation_table`.
     pitch_m : array, (2, z)
-        Cumulative pitch deviation of each tooth; not in the rows above.
+        Cumulative pitch deviation of each tooth; not included in `separation`.
     contact_coefficient : float
         m/N, or m/N^0.9 if `load_dependent`.
     load_dependent : bool
-        Whether the approach grows with the 0.9th power of the force.
+        Whether the approach grows with the force to the power 0.9.
     contact_ratio : float
         ε.
     ramp : float
-        Base pitches over which a pair takes up and gives up its stiffness, centred on ζ = 0 and ζ = ε.
+        Base pitches over which a pair gains and loses its stiffness, centred on ζ = 0 and ζ = ε.
     n_slots : int
-        Most pairs that carry load at once.
+        Maximum number of pairs that carry load at the same time.
     teeth : (int, int)
     late, gap_m : array, (n_slices,)
-        Of each slice of the face: base pitches by which it enters late, and its separation; see `Lead`. A slice has
+        For each slice of the face: delay of its entry in base pitches, and its separation; see `Lead`. A slice has
         `n_slices` times the compliance of the whole face.
     """
 
@@ -161,25 +161,25 @@ class MeshTable(Result):
 
     @property
     def slice_contact(self) -> float:
-        """Compliance of the contact of one slice, so that all of them, evenly loaded, yield as the whole face does."""
+        """Contact compliance of one slice, such that all slices, evenly loaded, deflect as the whole face does."""
         return float(self.contact_coefficient * len(self.late) ** (0.9 if self.load_dependent else 1.0))
 
 
 def mesh_table(mesh: GearMesh, n_points: int = 512) -> MeshTable:
-    """Tabulate a mesh.
+    """Tabulate the compliance and separation of a mesh.
 
     Parameters
     ----------
     mesh : GearMesh
     n_points : int
-        Columns over the path of contact, ramps included. With 512 the interpolated compliance is right to 1e-9
-        and the height of roughness to 1e-4 of its rms. At the edges of spalls and chips and at the pitch point of worn
-        flanks the interpolation rounds over one or two columns.
+        Columns over the path of contact, ramps included. With 512 the interpolated compliance is accurate to 1e-9 and
+        the roughness height to 1e-4 of its rms. At the edges of spalls and chips and at the pitch point of worn flanks
+        the interpolation smooths over one or two columns.
     """
     return _tabulated(mesh, count(n_points, "n_points", minimum=16))
 
 
-@lru_cache(maxsize=4)  # a run asks for that of one mesh several times, healthy and not
+@lru_cache(maxsize=4)  # a run needs the table of one mesh several times, healthy and faulty
 def _tabulated(mesh: GearMesh, n: int) -> MeshTable:
     low, high = -mesh.ramp / 2.0, mesh.pair.contact_ratio + mesh.ramp / 2.0
     step = (high - low) / (n - 1)
@@ -203,7 +203,7 @@ def _tabulated(mesh: GearMesh, n: int) -> MeshTable:
 
 
 def _compliance_rows(mesh: GearMesh, number: int, progress: FloatArray) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Row 0 for healthy teeth, one row for each faulty one, and the row of each tooth."""
+    """Row 0 for healthy teeth, one row for each faulty tooth, and the row index of each tooth."""
     side = mesh.side(number)
     rows = [mesh.gear_compliance(number, progress)]
     variant = np.zeros(side.gear.teeth, dtype=np.int64)
@@ -215,7 +215,7 @@ def _compliance_rows(mesh: GearMesh, number: int, progress: FloatArray) -> tuple
 
 @dataclass(frozen=True)
 class MeshStiffness(Result):
-    """Stiffness along the line of action over the mesh.
+    """Mesh stiffness along the line of action over mesh cycles.
 
     Parameters
     ----------
@@ -224,7 +224,7 @@ class MeshStiffness(Result):
     total_n_per_m : array, (n,)
         dF/dδ of all pairs together.
     pairs_n_per_m : array, (n, n_slots)
-        Of each pair; column j is pair ⌊c + ramp/2⌋ − j, 0 where it does not touch.
+        dF/dδ of each pair; column j is pair ⌊c + ramp/2⌋ − j, 0 where it is not in contact.
     """
 
     mesh_cycles: FloatArray
@@ -239,19 +239,19 @@ class MeshStiffness(Result):
 
 @dataclass(frozen=True)
 class LoadSharing(Result):
-    """Static equilibrium over the mesh.
+    """Load sharing and transmission error in static equilibrium over mesh cycles.
 
     Parameters
     ----------
     mesh_cycles : array, (n,)
     transmission_error_m : array, (n,)
-        δ = r_b1 θ1 − r_b2 θ2: how far the driver runs ahead along the line of action; 0 for unloaded ideal flanks.
+        δ = r_b1 θ1 − r_b2 θ2, the driver's lead along the line of action; 0 for unloaded ideal flanks.
     pair_forces_n : array, (n, n_slots)
         N_i ≥ 0, columns as in `MeshStiffness`.
     stiffness_n_per_m : array, (n,)
         dF/dδ at this load.
     slice_forces_n : array, (n, n_slots, n_slices)
-        What each slice of the face carries.
+        Force on each slice of the face.
     """
 
     mesh_cycles: FloatArray
@@ -262,7 +262,7 @@ class LoadSharing(Result):
 
 
 def one_mesh_cycle(n_points: int = 200) -> FloatArray:
-    """Middles of `n_points` equal parts of the first mesh cycle: their mean is the mean over the cycle."""
+    """Midpoints of `n_points` equal parts of the first mesh cycle: their mean is the mean over the cycle."""
     n = count(n_points, "n_points")
     return (np.arange(n) + 0.5) / n
 
@@ -280,9 +280,9 @@ def mesh_stiffness(
     mesh_cycles : array or None
         c; None: 200 points of one cycle.
     force_n : float or None
-        Mesh force, above 0. None: every pair on the path of contact touches (separations do not count, so that a chip
-        or a spall over the whole face does not show), for the linear contact law only. Given: the tangent stiffness of
-        the pairs that carry at that force.
+        Mesh force, above 0. None: every pair on the path of contact is in contact (separations are ignored, so a chip
+        or a spall over the whole face does not show); for the linear contact law only. Given: the tangent stiffness of
+        the pairs that carry load at that force.
 
     Returns
     -------
@@ -291,7 +291,7 @@ def mesh_stiffness(
     Raises
     ------
     InputError
-        Without a force if the contact stiffens with the load.
+        If no force is given and the contact stiffens with the load.
     """
     cycles = one_mesh_cycle() if mesh_cycles is None else frozen_array(mesh_cycles, "mesh_cycles", ndim=1)
     table = mesh_table(mesh)
@@ -314,7 +314,7 @@ def mesh_stiffness(
 def share_torque(
     mesh: GearMesh, torque_nm: float, mesh_cycles: FloatArray | None = None, *, table: MeshTable | None = None
 ) -> LoadSharing:
-    """Which pair carries how much, and the static transmission error, at a torque on the driver.
+    """Static load sharing between pairs, and the transmission error, at a torque on the driver.
 
     Σ N_i(δ − E_i) = T1/r_b1, without friction.
 
@@ -324,10 +324,10 @@ def share_torque(
     torque_nm : float
         T1, above 0.
     mesh_cycles : array or None
-        c; None: 200 points of one cycle. With faulty teeth, pitch deviations or roughness give a whole revolution or
+        c; None: 200 points of one cycle. With faulty teeth, pitch deviations or roughness, give a whole revolution or
         more.
     table : MeshTable or None
-        Of this mesh, if it is at hand.
+        The table of this mesh, if already made.
     """
     cycles = one_mesh_cycle() if mesh_cycles is None else frozen_array(mesh_cycles, "mesh_cycles", ndim=1)
     force = positive(torque_nm, "torque_nm", "N m") / mesh.pair.base_radii_m[0]
@@ -338,12 +338,11 @@ def share_torque(
 
 
 def back_stiffness_n_per_m(mesh: GearMesh) -> float:
-    """Mean stiffness of the mesh with the back flanks pressed, by the linear contact law, N/m.
+    """Mean mesh stiffness in back-flank contact, by the linear contact law, N/m.
 
-    A symmetric tooth is as stiff on either flank, and back flanks touch along the mirrored path: the mean over a mesh
-    cycle is that of healthy drive flanks. A crack of the drive side closes and spalls are not touched. A piece broken
-    off a tip would be missing on both flanks; a constant for the whole gear leaves it out, as it does roughness and
-    wear.
+    A symmetric tooth is equally stiff on both flanks, and back flanks meet along the mirrored path: the mean over a
+    mesh cycle is that of healthy drive flanks. A crack on the drive side closes, and spalls are not touched. A chipped
+    tip would be missing on both flanks; a constant for the whole gear neglects it, as it does roughness and wear.
     """
     smooth = replace(mesh.healthy, contact_law="linear", roughness_1=None, roughness_2=None)
     return mesh_stiffness(smooth).mean_n_per_m
@@ -352,7 +351,7 @@ def back_stiffness_n_per_m(mesh: GearMesh) -> float:
 def pair_states(table: MeshTable, mesh_cycles: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Compliance without contact (m/N), separation (m) and engagement (0 to 1) at each c, (n, n_slots × n_slices).
 
-    The slices of a pair stand one after the other.
+    The slices of a pair are adjacent columns.
     """
     shape = (len(mesh_cycles), table.n_slots * len(table.late))
     compliance, separation, weight = np.empty(shape), np.empty(shape), np.empty(shape)
@@ -378,7 +377,7 @@ def pair_states(table: MeshTable, mesh_cycles: FloatArray) -> tuple[FloatArray, 
 
 
 def _by_pair(table: MeshTable, values: FloatArray) -> FloatArray:
-    """Values of slices, (n, n_slots, n_slices)."""
+    """Reshape values per slice to (n, n_slots, n_slices)."""
     return values.reshape(len(values), table.n_slots, len(table.late))
 
 
@@ -393,21 +392,21 @@ def _equilibrium(
 
 
 def _tangents(table: MeshTable, compliance: FloatArray, weight: FloatArray, forces: FloatArray) -> FloatArray:
-    """dN/dδ of each pair that carries a force."""
+    """dN/dδ of each pair that carries load, 0 for the others."""
     carrying = forces > 0.0
     pair_forces = np.where(carrying, forces / np.where(weight > 0.0, weight, 1.0), 1.0)
     contact = table.slice_contact * (0.9 * pair_forces**-0.1 if table.load_dependent else 1.0)
     return np.where(carrying, weight / (compliance + contact), 0.0)
 
 
-# Compiled: what each pair carries. Imported only where it is used, since it loads the compiler.
+# Compiled: the load on each pair. Imported only where it is used, since it loads the compiler.
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def engagement_and_slope(progress: float, late: float, contact_ratio: float, ramp: float) -> tuple[float, float]:
-    """(w, ∂w/∂ζ): part of its stiffness that a pair has, and its slope; it enters `late` base pitches late.
+    """(w, ∂w/∂ζ): engaged fraction of a pair's stiffness and its slope; the pair enters `late` base pitches late.
 
-    0 outside, 1 inside, with a quintic step of width `ramp` at either end.
+    0 outside, 1 inside, with a quintic step of width `ramp` at each end.
     """
     if ramp <= 0.0:
         return (1.0 if late <= progress <= contact_ratio else 0.0), 0.0
@@ -427,19 +426,19 @@ def _smooth(t: float) -> tuple[float, float]:
 
 
 MAX_CYCLES = 1e12
-"""Mesh cycles beyond which a run has burst; until then, single cycles are resolved to 1e-4."""
+"""Mesh cycles beyond which a run has diverged; up to there, single cycles are resolved to 1e-4."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[untyped-decorator,unused-ignore]
 def out_of_place(cycles, middle, teeth, pitch):  # type: ignore[no-untyped-def]
-    """How far the pair in mid-engagement stands behind, m, and its slope per base pitch: both flanks of a tooth do.
+    """Pitch deviation of the pair in mid-engagement, m, and its slope per base pitch; it applies to both flanks.
 
-    By as much as its driving flanks are further apart, the flanks behind are nearer; smooth from one pair to the next.
+    As the drive flanks are further apart, the back flanks are nearer by the same amount; smooth between pairs.
 
     cycles : base pitches; middle : of a pair's engagement, from its entry.
-    teeth : (z1, z2); pitch : (2, z), m, above 0 where a tooth stands behind.
+    teeth : (z1, z2); pitch : (2, z), m, above 0 where a tooth is late.
     """
-    if not abs(cycles) < MAX_CYCLES:  # a solution that bursts, or NaN, must not be taken for a tooth's number
+    if not abs(cycles) < MAX_CYCLES:  # a diverging solution, or NaN, must not be used as a tooth index
         return np.nan, np.nan
     past = np.floor(cycles - middle)
     z1, z2 = float(teeth[0]), float(teeth[1])
@@ -452,7 +451,7 @@ def out_of_place(cycles, middle, teeth, pitch):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def cubic(row: FloatArray, start: float, step: float, progress: float) -> float:
-    """Lagrange interpolation through the four nearest columns; beyond the ends the last cubic goes on."""
+    """Lagrange interpolation through the four nearest columns; the end cubics extrapolate beyond the table."""
     place = (progress - start) / step
     i = min(max(int(place), 1), row.size - 3)
     t = place - i
@@ -471,10 +470,10 @@ def pair_force(
 ) -> tuple[float, float]:
     """Force N ≥ 0 and its slope dN/dδ of one pair.
 
-    Linear: δ = N (c + c_h).  Load-dependent: δ = c N + B N^0.9. Both times the engagement weight.
+    Linear: δ = N (c + c_h).  Load-dependent: δ = c N + B N^0.9. Force and slope are times the engagement weight.
 
-    With N = u¹⁰ the second is convex and rising in u: Newton's method comes down to the root from above, and from below
-    after one step. It starts from N^-0.1 = 1/2, that of a kilonewton. A step of 1e-8 u leaves an error of some 1e-15.
+    With N = u¹⁰ the second is convex and increasing in u: Newton's method converges from above, or from below after
+    one step. It starts from N^-0.1 = 1/2, the value at 1 kN. A step of 1e-8 u leaves an error of about 1e-15.
     """
     if penetration <= 0.0 or weight <= 0.0:
         return 0.0, 0.0
@@ -503,9 +502,10 @@ def share_loads(
     stiffness: FloatArray,
     pair_forces: FloatArray,
 ) -> None:
-    """Approach δ at which the pairs' forces N_i(δ − E_i) sum to `force`, and dF/dδ, row by row; fills the last three.
+    """Approach δ at which the pairs' forces N_i(δ − E_i) sum to `force`, and dF/dδ, per row; fills the last three.
 
-    The sum is convex in δ, and a pair that carried everything alone gives a δ that is too large: Newton comes down.
+    The sum is convex in δ. The start, a single pair carrying the whole load, is too large, so Newton's method
+    converges from above.
     """
     for row in range(approach.size):
         delta = 1e300
@@ -548,7 +548,7 @@ def fill_pairs(
     separation: FloatArray,
     weight: FloatArray,
 ) -> None:
-    """Look up compliance, separation and weight of the slices of each pair ⌊c + ramp/2⌋ − j at each c."""
+    """Look up compliance, separation and weight of the slices of each pair ⌊c + ramp/2⌋ − j at each c; fills them."""
     n_slices = late.size
     for row in range(mesh_cycles.size):
         newest = int((mesh_cycles[row] + ramp / 2.0) // 1.0)
@@ -557,7 +557,7 @@ def fill_pairs(
             progress = mesh_cycles[row] - k - late[s]
             tooth_1, tooth_2 = k % teeth[0], k % teeth[1]
             weight[row, j] = engagement_and_slope(progress, 0.0, contact_ratio, ramp)[0]
-            if weight[row, j] == 0.0 and n_slices > 1:  # far beyond the table, too
+            if weight[row, j] == 0.0 and n_slices > 1:  # possibly far beyond the table
                 compliance[row, j], separation[row, j] = n_slices * curves[of[0, tooth_1], 1], 0.0
                 continue
             compliance[row, j] = n_slices * (

@@ -1,4 +1,4 @@
-"""A pair of gears with all that decides how stiff its mesh is."""
+"""A gear pair with everything that determines its mesh stiffness."""
 
 from __future__ import annotations
 
@@ -51,26 +51,26 @@ from sims.mesh._geometry import (
 )
 
 # --------------------
-# The gear body below the teeth: neighbouring teeth move each other through it.
+# The gear body below the teeth, through which neighbouring teeth move each other.
 # --------------------
 
 
 BODIES = ("separate", "coupled")
-"""Whether teeth of one gear that carry at once move each other."""
-_RESOLVED = 40.0  # harmonics times the root's half angle: what follows adds less than 1e-3 of a tooth's own compliance
+"""Whether teeth of one gear that carry load at the same time move each other."""
+_RESOLVED = 40.0  # harmonics times the root's half angle: the rest adds less than 1e-3 of a tooth's own compliance
 
 
 def body_compliance(
     gear: GearGeometry, material: Material, load_angle_rad: FloatArray, deflected_rad: FloatArray, offset: int
 ) -> FloatArray:
-    """Deflection of a tooth along its force by the body, for 1 N on 1 m of face width on a tooth `offset` further on.
+    """Deflection of a tooth along its force, through the body, per N on 1 m of face width of a tooth `offset` away.
 
     δ_i = a_iᵀ C(2π k/z) a_j,  a = (−sin α_m, cos α_m, u cos α_m)
 
     C holds the motions of a root arc (mean radial and tangential displacement, rotation) for unit loads of the same
-    kinds on another root arc of an annulus, plane stress, held at the bore: a Fourier series whose terms are solved in
-    closed form. u is the distance from the root circle to the crossing of force and tooth centre line. a turns the
-    force of a contact into loads on the root.
+    kinds on another root arc of an annulus in plane stress, fixed at the bore: a Fourier series whose terms are solved
+    in closed form. u is the distance from the root circle to the intersection of the force and the tooth centre line.
+    a converts the contact force into loads on the root.
 
     Parameters
     ----------
@@ -79,8 +79,8 @@ def body_compliance(
     load_angle_rad, deflected_rad : array, (n,)
         α_m of the tooth that moves, and of the tooth that is loaded.
     offset : int
-        k, teeth from the loaded one towards where its force pushes. 0: the tooth itself, which
-        `foundation_compliance` gives by a published polynomial.
+        k, teeth from the loaded one in the direction of its force. 0: the tooth itself, for which
+        `foundation_compliance` gives a published polynomial.
 
     Returns
     -------
@@ -89,12 +89,12 @@ def body_compliance(
 
     Notes
     -----
-    For gears of 50, 55 and 75 teeth the tooth itself lies within 6 % of `foundation_compliance` (10 % at the tip); what
-    neighbours do, on the mean of both sides, within 6 % of three-dimensional finite elements (14 % near the tips).
+    For gears of 50, 55 and 75 teeth the tooth itself is within 6 % of `foundation_compliance` (10 % at the tip); the
+    effect of neighbours, the mean of both sides, within 6 % of three-dimensional finite elements (14 % near the tips).
 
     Source: P. Sainsot, P. Velex, O. Duverger, Contribution of gear body to tooth deflections – a new bidimensional
-    analytical formula, Journal of Mechanical Design 126 (2004), for the annulus under root loads; the loads' kinds and
-    the neighbours are this package's own.
+    analytical formula, Journal of Mechanical Design 126 (2004), for the annulus under root loads; the kinds of load and
+    the coupling of neighbours are this package's own.
     """
     theta = root_half_angle_rad(gear)
     ratio = gear.root_radius_mm / gear.bore_mm
@@ -105,7 +105,7 @@ def body_compliance(
 
 
 def _root_loads(gear: GearGeometry, load_angle_rad: FloatArray) -> FloatArray:
-    """Radial and tangential force and moment on the root of 1 N on the flank, (3, n), radii of the root circle."""
+    """Radial and tangential force and moment on the root for 1 N on the flank, (3, n); lengths in root radii."""
     alpha = np.atleast_1d(np.asarray(load_angle_rad, dtype=np.float64))
     arm = gear.base_radius_mm / np.cos(alpha) / gear.root_radius_mm - 1.0
     return np.array([-np.sin(alpha), np.cos(alpha), arm * np.cos(alpha)])
@@ -118,9 +118,9 @@ def arc_compliance(radius_ratio: float, half_angle_rad: float, apart_rad: float,
     Parameters
     ----------
     radius_ratio : float
-        h, rim over bore; the bore is held.
+        h, rim over bore; the bore is fixed.
     half_angle_rad : float
-        θ of either arc.
+        θ of each arc.
     apart_rad : float
         From the middle of the loaded arc to that of the other, counter-clockwise.
     poisson_ratio : float
@@ -128,8 +128,8 @@ def arc_compliance(radius_ratio: float, half_angle_rad: float, apart_rad: float,
     Returns
     -------
     array, (3, 3)
-        Rows: mean radial displacement, mean tangential one, rotation. Columns: unit radial force (evenly over the arc),
-        tangential force (evenly), moment (linear radial stress).
+        Rows: mean radial displacement, mean tangential displacement, rotation. Columns: unit radial force (uniform over
+        the arc), tangential force (uniform), moment (linear radial stress).
     """
     theta = half_angle_rad
     total = np.zeros((3, 3))
@@ -139,8 +139,8 @@ def arc_compliance(radius_ratio: float, half_angle_rad: float, apart_rad: float,
         tilt = -3.0 / theta**3 * (sin(n * theta) / n**2 - theta * cos(n * theta) / n) if n else 0.0
         share = 1.0 / pi if n else 0.5 / pi
         c, s = cos(n * apart_rad), sin(n * apart_rad)
-        # Radial loads as σ cos nθ move u = U cos nθ, v = V sin nθ; tangential ones as τ cos nθ, and moments as
-        # σ sin nθ, the same turned by a quarter of a wave: u = U sin nθ, v = −V cos nθ.
+        # Radial loads σ cos nθ cause u = U cos nθ, v = V sin nθ; tangential loads τ cos nθ and moments σ sin nθ the
+        # same, shifted by a quarter wave: u = U sin nθ, v = −V cos nθ.
         u, v = share * mean * rim[:, 0]
         total[:, 0] += u * c * mean, v * s * mean, -tilt * s * u
         if n == 0:
@@ -153,10 +153,10 @@ def arc_compliance(radius_ratio: float, half_angle_rad: float, apart_rad: float,
 
 @lru_cache(maxsize=8192)
 def _rim_of_harmonic(n: int, radius_ratio: float, poisson_ratio: float) -> FloatArray:
-    """(U, V) at the rim, rows, for σ_r = cos nθ and τ = sin nθ there, columns; E = 1, rim radius 1, bore held.
+    """(U, V) at the rim, rows, for σ_r = cos nθ and τ = sin nθ there, columns; E = 1, rim radius 1, bore fixed.
 
-    Solutions of the plane elastic equations are r^p with p = ±(n + 1), ±(n − 1); at n = 1 two of them are a translation
-    and one with ln r.
+    The plane elastic equations are solved by r^p with p = ±(n + 1), ±(n − 1); at n = 1 two of these are replaced by a
+    translation and a solution with ln r.
     """
     nu, bore = poisson_ratio, 1.0 / radius_ratio
     lam, mu = nu / (1.0 - nu**2), 0.5 / (1.0 + nu)  # of plane stress
@@ -188,10 +188,10 @@ def _rim_of_harmonic(n: int, radius_ratio: float, poisson_ratio: float) -> Float
 # --------------------
 
 
-# Compliance of one tooth as a cantilever: bending, shear and axial compression along its true outline.
+# Compliance of one tooth as a cantilever: bending, shear and axial compression along its exact outline.
 
 SHEAR_FACTOR = 1.2
-"""Of a rectangular section."""
+"""Shear correction factor of a rectangular section."""
 
 N_NODES = 24
 """Gauss points on each part of the outline; 96 change the compliance by less than 1e-13."""
@@ -211,7 +211,7 @@ class ToothCompliance(NamedTuple):
 
 
 class _Sections(NamedTuple):
-    """Sections between root and contact, one row per contact; metres, dx times the Gauss weight."""
+    """Sections between root and contact, one row per contact, in m; dx includes the Gauss weight."""
 
     x: FloatArray
     front: FloatArray
@@ -230,8 +230,8 @@ def tooth_compliance(
 
     1/k_b = ∫ M²/(E I) dx,  1/k_s = ∫ 1.2 cos²α_m/(G A) dx,  1/k_a = ∫ sin²α_m/(E A) dx
 
-    over the sections from the root circle to the contact, for unit force. About the tooth's centre line the moment is
-    exactly M = r_b − x cos α_m; behind a crack the section's centroid lies off it by y₀, which adds y₀ sin α_m.
+    over the sections from the root circle to the contact, for unit force. The moment about the tooth's centre line is
+    exactly M = r_b − x cos α_m; behind a crack the section's centroid is offset by y₀, which adds y₀ sin α_m.
 
     Parameters
     ----------
@@ -240,9 +240,9 @@ def tooth_compliance(
     roll_rad : array, (n,)
         τ = tan α at the contact, from the form roll to the tip roll.
     crack : (depth_mm, angle_deg) or None
-        The same over the whole width considered.
+        Constant over the whole width considered.
     law : str
-        What of the tooth carries no load behind the crack; see `effective_flank_mm`.
+        Which part of the tooth behind the crack carries no load; see `effective_flank_mm`.
 
     Returns
     -------
@@ -269,23 +269,23 @@ def tooth_compliance(
 def friction_compliance(
     gear: GearGeometry, material: Material, roll_rad: FloatArray, *, along_itself: bool = False
 ) -> FloatArray:
-    """Deflection of a tooth along the contact's normal for 1 N of friction on 1 m of face width, towards its tip.
+    """Deflection of a tooth along the contact normal, for 1 N of friction towards its tip on 1 m of face width.
 
     c_nt = (1/E) Σ [12 M_n M_t/h³ + 2.4 (1 + ν) sin α_m cos α_m/h − sin α_m cos α_m/h] dx,
     M_n = r_b − x cos α_m,  M_t = (x_c − x) sin α_m + y_c cos α_m
 
-    and along the friction itself, c_tt, with M_t², sin² α_m and cos² α_m.
+    and along the friction force itself, c_tt, with M_t², sin² α_m and cos² α_m.
 
-    Friction μN turns a contact's compliance into c_nn ± μ c_nt: towards the root in approach (stiffer), towards the tip
-    in recess (softer). Squaring M_n ± μ M_t, as is common, doubles that: the work of the friction force, which the
-    normal deflection does not hold, is then in it: c_nn ± 2 μ c_nt + μ² c_tt.
+    Friction μN changes a contact's compliance to c_nn ± μ c_nt: towards the root in approach (stiffer), towards the tip
+    in recess (softer). The common squaring of M_n ± μ M_t doubles this change, because it includes the work of the
+    friction force, which is not part of the normal deflection: c_nn ± 2 μ c_nt + μ² c_tt.
 
     Parameters
     ----------
     gear, material, roll_rad
-        As for `tooth_compliance`; the gear's body is left out.
+        As for `tooth_compliance`; the gear body is not included.
     along_itself : bool
-        The deflection along the friction.
+        Return c_tt, the deflection along the friction force.
 
     Returns
     -------
@@ -314,7 +314,7 @@ def cracked_tooth_compliance(
     crack: RootCrack,
     face_width_m: float,
 ) -> FloatArray:
-    """Compliance of a tooth with a crack over all or part of its width, slices side by side: 1/k = 1/Σ k(w) dw.
+    """Compliance of a tooth with a crack over all or part of its width, as parallel slices: 1/k = 1/Σ k(w) dw.
 
     Parameters
     ----------
@@ -322,7 +322,7 @@ def cracked_tooth_compliance(
         As for `tooth_compliance`.
     crack : RootCrack
     face_width_m : float
-        Loaded width; a crack wider than it counts as all through.
+        Loaded width; a wider crack counts as a through crack.
 
     Returns
     -------
@@ -330,7 +330,7 @@ def cracked_tooth_compliance(
         m/N (not per width).
 
     Source: Z. Chen, Y. Shao, Dynamic simulation of spur gear with tooth root crack propagating along tooth width and
-    crack depth, Engineering Failure Analysis 18 (2011), for the slices, which do not hold each other.
+    crack depth, Engineering Failure Analysis 18 (2011), for the slices, which do not support each other.
     """
     check_crack(gear, crack)
     width = face_width_m if crack.width_mm is None else min(crack.width_mm * 1e-3, face_width_m)
@@ -345,7 +345,7 @@ def _sections(gear: GearGeometry, tau: FloatArray, crack: tuple[float, float] | 
     pieces: list[tuple[FloatArray, ...]] = []
     cuts = _fillet_cuts(gear, crack)
     for low, high in pairwise(cuts):
-        fillet = fillet_outline(gear, low + (high - low) * node)  # below every contact: the same for all of them
+        fillet = fillet_outline(gear, low + (high - low) * node)  # below every contact, so the same for all
         rows = fillet.x_mm, fillet.y_mm, fillet.dx_mm * weight * (high - low)
         pieces.append(tuple(np.broadcast_to(row, (len(tau), N_NODES)) for row in rows))
     span = (tau - gear.form_roll_rad)[:, None]
@@ -357,7 +357,7 @@ def _sections(gear: GearGeometry, tau: FloatArray, crack: tuple[float, float] | 
 
 
 def _fillet_cuts(gear: GearGeometry, crack: tuple[float, float] | None) -> tuple[float, ...]:
-    """γ from the root circle to the involute, split where the sections change abruptly: at a crack's tip and mouth."""
+    """γ from the root circle to the involute, split where the sections jump: at a crack's tip and mouth."""
     root, form = pi / 2.0, gear.pressure_angle_rad
     if crack is None:
         return root, form
@@ -381,7 +381,7 @@ def _gauss(n: int) -> tuple[FloatArray, FloatArray]:
     return (x + 1.0) / 2.0, w / 2.0
 
 
-# Compliance of the contact itself.
+# Contact compliance.
 
 CONTACT_LAWS = ("linear", "load-dependent")
 
@@ -389,7 +389,7 @@ CONTACT_LAWS = ("linear", "load-dependent")
 def linear_contact_compliance(material_1: Material, material_2: Material, face_width_m: float) -> float:
     """1/k_h of two cylinders by the common linear form, 4 (1 − ν²)/(π E b), in m/N.
 
-    It depends neither on load nor on curvature and is stiffer than a real contact at working load.
+    It is independent of load and curvature, and stiffer than a real contact at working load.
 
     Source: D. C. H. Yang, J. Y. Lin, Hertzian damping, tooth friction and bending elasticity in gear impact dynamics,
     Journal of Mechanisms, Transmissions, and Automation in Design 109 (1987).
@@ -448,7 +448,8 @@ def foundation_compliance(gear: GearGeometry, material: Material, load_angle_rad
 
     δ b E/F = cos²α_m [L* (u/S)² + M* u/S + P* (1 + Q* tan²α_m)]
 
-    u is the distance from the root circle to the crossing of force and tooth centre line, S the root thickness.
+    u is the distance from the root circle to the intersection of the force and the tooth centre line, S the root
+    thickness.
 
     Parameters
     ----------
@@ -464,8 +465,8 @@ def foundation_compliance(gear: GearGeometry, material: Material, load_angle_rad
 
     Notes
     -----
-    Teeth of one gear share the body, so that neighbours in contact also move each other: see `body_compliance`. A crack
-    does not change the body's compliance here.
+    Teeth of one gear share the body, so neighbours in contact also move each other: see `body_compliance`. A crack does
+    not change the body's compliance here.
     """
     l_star, m_star, p_star, q_star = foundation_factors(gear.root_radius_mm / gear.bore_mm, root_half_angle_rad(gear))
     cosine, tangent = np.cos(load_angle_rad), np.tan(load_angle_rad)
@@ -477,7 +478,7 @@ def foundation_compliance(gear: GearGeometry, material: Material, load_angle_rad
 
 
 def foundation_notes(gear: GearGeometry) -> tuple[str, ...]:
-    """Say where a gear lies outside the range for which the foundation's polynomial was fitted."""
+    """Return a note for each quantity outside the range for which the foundation's polynomial was fitted."""
     ratio, angle = gear.root_radius_mm / gear.bore_mm, root_half_angle_rad(gear)
     name = f"gear of {gear.teeth} teeth: foundation compliance is extrapolated,"
     notes = []
@@ -489,7 +490,7 @@ def foundation_notes(gear: GearGeometry) -> tuple[str, ...]:
 
 
 class MeshSide(NamedTuple):
-    """One gear of a mesh, and what is its own."""
+    """One gear of a mesh, with its material, flank and faults."""
 
     gear: GearGeometry
     material: Material
@@ -500,13 +501,13 @@ class MeshSide(NamedTuple):
     chips: tuple[ToothChip, ...]
 
     def faults_of(self, tooth: int) -> ToothFaults:
-        """What is wrong with one tooth."""
+        """Faults of one tooth."""
         kinds = (self.cracks, self.spalls, self.chips)
         return ToothFaults(*(next((f for f in kind if f.tooth == tooth), None) for kind in kinds))  # type: ignore[arg-type]
 
     @property
     def faulty_teeth(self) -> tuple[int, ...]:
-        """Teeth with a crack, a spall or a chip, in rising order."""
+        """Teeth with a crack, a spall or a chip, in ascending order."""
         return tuple(sorted(_teeth(self.cracks) | _teeth(self.spalls) | _teeth(self.chips)))
 
 
@@ -531,31 +532,31 @@ class GearMesh:
     pair : PairGeometry
     material_1, material_2 : Material
     contact_law : str
-        "linear": a constant contact stiffness. "load-dependent": approach by the 0.9th power of the force.
+        "linear": a constant contact stiffness. "load-dependent": approach proportional to the force to the power 0.9.
     cracks_1, cracks_2 : tuple of RootCrack
         At most one per tooth.
     flank_1, flank_2 : FlankDeviation
     ramp : float
-        In base pitches, 0 to 0.1: over this length, half before and half after the ideal point, a pair takes up and
-        gives up its stiffness. 0 switches at once, which costs an integrator its order.
+        In base pitches, 0 to 0.1: the length, centred on the ideal point, over which a pair gains or loses its
+        stiffness. 0 switches abruptly, which costs an integrator its order.
     roughness_1, roughness_2 : FlankRoughness or None
-        A profile of its own for each tooth, which returns with the tooth.
+        A separate profile for each tooth, which repeats with that tooth.
     spalls_1, spalls_2 : tuple of ToothSpall
         At most one per tooth.
     chips_1, chips_2 : tuple of ToothChip
         At most one per tooth.
     body : str
-        "separate": no tooth moves another one, as published models have it; double contact then appears stiffer than it
-        is. "coupled": teeth that carry at once move each other through the body.
+        "separate": teeth do not move each other, as in published models; double contact then appears stiffer than it
+        is. "coupled": teeth that carry load at the same time move each other through the body.
     lead : Lead
         Helix, crowning and misalignment along the face. With a helix the gears of the pair are transverse sections;
-        teeth and body are as compliant as those of the normal section, on contact lines 1/cos β_b longer.
+        teeth and body have the compliance of the normal section, on contact lines longer by 1/cos β_b.
 
     Notes
     -----
-    Every pair has its own compliance and separation; pairs act in parallel. Where the body is coupled, the compliance
-    of a pair holds what its neighbours' forces add at the load sharing of healthy teeth. Faults and roughness are
-    alike in every slice of the face. Neglected: heating. Only the driving flanks are described.
+    Every pair has its own compliance and separation; pairs act in parallel. With a coupled body, the compliance of a
+    pair includes the effect of its neighbours' forces at the load sharing of healthy teeth. Faults and roughness are
+    the same in every slice of the face. Heating is neglected. Only the driving flanks are described.
     """
 
     pair: PairGeometry
@@ -594,22 +595,22 @@ class GearMesh:
 
     @property
     def healthy(self) -> GearMesh:
-        """The same without cracks, spalls and chips; flanks and roughness stay."""
+        """The mesh without cracks, spalls and chips; flank deviations and roughness stay."""
         return replace(self, cracks_1=(), cracks_2=(), spalls_1=(), spalls_2=(), chips_1=(), chips_2=())
 
     @property
     def n_slots(self) -> int:
-        """Most pairs that carry load at once, ramps included."""
+        """Maximum number of pairs that carry load at the same time, ramps included."""
         return floor(self.pair.contact_ratio + self.overlap_ratio + self.ramp) + 1
 
     @property
     def overlap_ratio(self) -> float:
-        """ε_β, 0 of a spur pair."""
+        """Overlap ratio ε_β, 0 for a spur pair."""
         return self.lead.overlap_ratio(self.pair)
 
     @property
     def axial_share(self) -> float:
-        """Axial force over the force along the line of action, tan β_b; the driver's, along +z if above 0."""
+        """Axial force on the driver over the force along the line of action, tan β_b; along +z if above 0."""
         return self.lead.axial_share(self.pair)
 
     @cached_property
@@ -617,18 +618,18 @@ class GearMesh:
         """Compliance of the contact in m/N (linear), or B in m/N^0.9 (load-dependent)."""
         linear = self.contact_law == "linear"
         law = linear_contact_compliance if linear else load_dependent_contact_coefficient
-        # Normal force and approach are 1/cos β_b greater, the contact lines 1/cos β_b longer.
+        # Normal force, approach and contact lines are all larger by 1/cos β_b.
         steep = cos(self.lead.base_helix_rad(self.pair)) ** (-1.0 if linear else -1.1)
         return float(law(self.material_1, self.material_2, self.face_width_m) * steep)
 
     @cached_property
     def notes(self) -> tuple[str, ...]:
-        """Where the mesh lies outside the range of its formulas; empty if nowhere."""
+        """Where the mesh is outside the range of its formulas; empty if nowhere."""
         return foundation_notes(self.pair.driver) + foundation_notes(self.pair.driven)
 
     @cached_property
     def contact_compliance(self) -> float:
-        """Compliance of the contact in m/N at working pressure: the constant one, or the secant B N^-0.1 at 1 GPa."""
+        """Contact compliance in m/N at working pressure: the constant, or the secant B N^-0.1 at 1 GPa."""
         if self.contact_law == "linear":
             return self.contact_coefficient
         half_width_m = contact_half_width_mm(self.pair, self.material_1, self.material_2) * 1e-3
@@ -636,22 +637,22 @@ class GearMesh:
         return float(self.contact_coefficient * force**-0.1)
 
     def side(self, number: int) -> MeshSide:
-        """Return gear 1, the driver, or gear 2, the driven one, with what is its own."""
+        """Return gear 1, the driver, or gear 2, the driven gear, with its material, flank and faults."""
         gear = (self.pair.driver, self.pair.driven)[number - 1]
         return MeshSide(gear, *(getattr(self, f"{name}_{number}") for name in MeshSide._fields[1:]))
 
     def roll_length_mm(self, side: int, progress: FloatArray) -> FloatArray:
-        """ρ of gear 1 or 2 at ζ, not below 0: a ramp may begin below the base circle, where there is no flank."""
+        """ρ of gear 1 or 2 at ζ in mm, not below 0: a ramp may begin below the base circle, where there is no flank."""
         rho: FloatArray = self.pair.contact_radii_mm(np.atleast_1d(np.asarray(progress, dtype=np.float64)))[side - 1]
         return np.maximum(rho, 0.0)
 
     def gear_compliance(self, side: int, progress: FloatArray, faults: ToothFaults = HEALTHY) -> FloatArray:
-        """Tooth and foundation of one gear, and what a spall or chip adds to tooth and contact, in m/N.
+        """Compliance of tooth and foundation of one gear, plus the increase by a spall or chip, in m/N.
 
         c = c_tooth/(1 − λ_chip) + c_foundation + Σ_j c_ij N_j/N_i + c_h [λ_spall/(1 − λ_spall) + λ_chip/(1 − λ_chip)]
 
-        with the part λ of the width that the fault takes away, and the neighbours j where the body is coupled. The
-        contact of healthy flanks, c_h, is not in it.
+        where λ is the fraction of the width lost to the fault, and j the neighbours if the body is coupled. The contact
+        compliance of healthy flanks, c_h, is not included.
 
         Parameters
         ----------
@@ -673,10 +674,10 @@ class GearMesh:
         return result + self._neighbour_compliance(side, progress) if self.body == "coupled" else result
 
     def _yielding(self, side: int, rho: FloatArray) -> tuple[GearGeometry, FloatArray, float]:
-        """Gear whose teeth yield, roll angles on it, and width in m: the normal section's where there is a helix.
+        """Gear that determines the compliance, roll angles on it, and width in m; with a helix, of the normal section.
 
-        Along the line of action a tooth of width b yields c_n/(b cos β_b): contact lines are 1/cos β_b longer, the
-        force and the approach normal to the flank 1/cos β_b greater and smaller.
+        Along the line of action a tooth of width b has the compliance c_n/(b cos β_b): contact lines are longer by
+        1/cos β_b, and normal to the flank the force is larger, the approach smaller, by 1/cos β_b.
         """
         gear = self.side(side).gear
         virtual = normal_section(gear, self.lead.helix_angle_deg)
@@ -687,7 +688,7 @@ class GearMesh:
         """Return Σ_j c_ij N_j/N_i over the neighbours of a healthy pair, in m/N.
 
         N_i = w_i (δ − Σ_j c_ij N_j)/c_i, with the compliances c_i of the pairs, the couplings c_ij of both gears, and
-        the weights w_i by which pairs enter and leave; per weight, so that it holds for a pair that just enters.
+        the weights w_i of entry and exit; per weight, so that it holds for a pair that is just entering.
         """
         zeta = np.atleast_1d(np.asarray(progress, dtype=np.float64))
         middle = floor(self.pair.contact_ratio + self.ramp)
@@ -708,14 +709,14 @@ class GearMesh:
         return result
 
     def _coupling(self, side: int, at: FloatArray, places: NDArray[np.int64]) -> FloatArray:
-        """C_ij of one gear through its body, (n, n_pairs, n_pairs), 0 on the diagonal, in m/N."""
+        """Coupling c_ij of one gear through its body, (n, n_pairs, n_pairs), 0 on the diagonal, in m/N."""
         material = self.side(side).material
         gear, roll, width = self._yielding(side, self.roll_length_mm(side, at))
         angle = roll - gear.base_half_angle_rad
         result = np.zeros((*at.shape, at.shape[1]))
         for i, j in product(range(len(places)), repeat=2):
             if i != j:
-                # A pair that entered earlier lies ahead; the driver is pushed back by its mate, the driven gear on.
+                # A pair that entered earlier is ahead; its mate pushes the driver backwards, the driven gear forwards.
                 ahead = int(places[i] - places[j]) * (1 if side == 2 else -1)
                 result[:, i, j] = body_compliance(gear, material, angle[:, i], angle[:, j], ahead) / width
         return result
@@ -746,13 +747,13 @@ class GearMesh:
                 raise InputError(f"two {name}s on one tooth", allowed=f"one {name} per tooth", remedy="give the larger")
 
     def _check_corner_contact(self) -> None:
-        """During the ramps the flank is carried on a little beyond the tip; it must not end in a point there."""
+        """Check that the tooth is not pointed within the ramps, where the flank is extended beyond the tip."""
         for gear in (self.pair.driver, self.pair.driven):
             roll = gear.tip_roll_rad + 0.5 * self.ramp * self.pair.base_pitch_mm / gear.base_radius_mm
             half_angle = gear.base_half_angle_rad - (roll - np.arctan(roll))
             if half_angle <= 0.0:
                 raise InputError(
-                    f"ramp is {self.ramp:g} base pitches: the tooth of the gear of {gear.teeth} teeth ends before",
+                    f"ramp is {self.ramp:g} base pitches: the tooth of the {gear.teeth}-tooth gear ends before that",
                     allowed="a shorter ramp, or 0",
                     remedy="shorten the ramp or lower the addendum",
                 )

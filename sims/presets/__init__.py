@@ -1,4 +1,4 @@
-"""Published and demonstration machines, one TOML each, with sources and what is assumed; and files that people give."""
+"""Published and demonstration machines, one TOML file each with sources and assumptions, and users' preset files."""
 
 from __future__ import annotations
 
@@ -26,25 +26,25 @@ _OPTIONAL = _TABLES[3:]
 
 @dataclass(frozen=True)
 class Preset:
-    """A machine that somebody published or that serves as an example.
+    """A published or demonstration machine.
 
     Parameters
     ----------
     name, model, title : str
     sources : tuple of str
-        Where its numbers come from.
+        Sources of its numbers.
     assumed : tuple of str
-        What no source states.
+        Assumptions that no source states.
     does_not_represent : tuple of str
-        What it must not be taken for.
+        What it must not be taken to represent.
     parameters : mapping
-        What differs from the model's defaults.
+        Values that differ from the model's defaults.
     speed_rpm, torque_nm : float
         Of the input shaft.
     effects : tuple of EffectSetting
-        That the machine has from the start.
+        Effects that the machine has by default.
     installed : mapping
-        What is fitted besides the parameters, as its simulator reads it; empty: what is usual.
+        Fittings in addition to the parameters, as its simulator reads them; empty: the usual ones.
     """
 
     name: str
@@ -61,7 +61,7 @@ class Preset:
 
     @property
     def operation(self) -> Operation:
-        """Its own speed and torque, constant."""
+        """The preset's constant speed and torque."""
         return Operation.steady(self.speed_rpm, self.torque_nm)
 
 
@@ -96,7 +96,7 @@ def presets(model: str) -> dict[str, Preset]:
 
 
 def preset(model: str, name: str) -> Preset:
-    """Return the preset `name` of a model; an empty name is its first, one that ends in .toml is a file."""
+    """Return the preset `name` of a model; an empty name gives its first, a name ending in .toml is a file."""
     if is_file(name):
         candidate = read_preset(Path(name))
         if candidate.model != model:
@@ -117,18 +117,18 @@ def preset(model: str, name: str) -> Preset:
 
 
 def is_file(name: str) -> bool:
-    """Say whether a preset is asked for by its file."""
+    """Say whether a preset name is that of a file."""
     return name.lower().endswith(".toml")
 
 
 def read_preset(path: Path) -> Preset:
-    """Read a preset; its name is that of the file.
+    """Read a preset file; the preset is named after the file.
 
     Raises
     ------
     InputError
-        If the file cannot be read, or a table or key is missing, not known or of another form. Values of parameters,
-        effects and of what is installed are checked by their simulator.
+        If the file cannot be read, or a table or key is missing, unknown or malformed. Values of parameters, effects
+        and fittings are checked by the simulator.
     """
     data, where = read_toml(path), path.name
     for name in data:
@@ -172,17 +172,17 @@ def _table(value: object, where: str) -> dict[str, Any]:
     return value
 
 
-# Writes a preset as a file that `read_preset` reads back to the same machine.
+# Writing a preset as a file that `read_preset` reads back to the same machine.
 
 
 def preset_text(preset: Preset, comments: Sequence[str] = ()) -> str:
-    """Return a preset as TOML; its name is left out: it is that of the file.
+    """Return a preset as TOML, without its name, which is that of the file.
 
     Parameters
     ----------
     preset : Preset
     comments : sequence of str
-        Lines ahead of it.
+        Comment lines at the top.
     """
     import tomli_w
 

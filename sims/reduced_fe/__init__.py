@@ -1,4 +1,4 @@
-"""A pair of reduced finite-element gears: contact, dynamics, and what is computed of it."""
+"""A pair of reduced finite-element gears: contact, dynamics, eigenfrequencies and crack growth."""
 
 from sims.reduced_fe._contact import (
     MARGIN,

@@ -1,4 +1,4 @@
-"""The contact of two reduced gears: its table over the progress of a pair, compiled solution, and static maps."""
+"""The contact of two reduced gears: table over the progress of a pair, compiled solution, and static maps."""
 
 # mypy: allow-untyped-defs, allow-untyped-calls
 
@@ -30,14 +30,14 @@ from sims.mesh import (
     tooth_rows,
 )
 
-# Where a tooth pair touches over its progress.
+# Points of contact of a tooth pair over its progress.
 
 
 def rolls_rad(pair: PairGeometry, progress: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Roll angles τ of driver and driven gear at ζ, held at the ends of the path of contact.
 
-    Before its ideal entry a pair touches at the driven gear's tip, after its ideal end at the driver's; where exactly
-    the corner then stands on the mate's flank is left out.
+    Before its ideal entry a pair is in contact at the driven gear's tip, after its ideal end at the driver's; the exact
+    position of the corner on the mate's flank is neglected.
     """
     inside = np.clip(progress, 0.0, pair.contact_ratio)
     rho_1, rho_2 = pair.contact_radii_mm(inside)
@@ -45,14 +45,14 @@ def rolls_rad(pair: PairGeometry, progress: FloatArray) -> tuple[FloatArray, Flo
 
 
 def slice_progress(pair: PairGeometry, lead: Lead, z_m: FloatArray, progress: FloatArray) -> FloatArray:
-    """ζ of each slice of a pair at ζ of its first end, (n, n_slices)."""
+    """ζ of each slice of a pair, from ζ at its first end, (n, n_slices)."""
     return progress[:, None] - lead.late(pair, z_m * 1e3 / pair.face_width_mm)
 
 
 def over_height(roll: FloatArray, values: FloatArray, heights: FloatArray) -> FloatArray:
-    """Values at the heights of a grid (first axis) between them, by a cubic spline; held beyond the grid's ends.
+    """Interpolate values given at the roll angles of a grid (first axis) by a cubic spline, constant beyond its ends.
 
-    Where `wanted` is (n, n_slices), each slice (second axis) has heights of its own.
+    Where `heights` is (n, n_slices), each slice (second axis) has its own heights.
     """
     from scipy.interpolate import CubicSpline
 
@@ -63,21 +63,21 @@ def over_height(roll: FloatArray, values: FloatArray, heights: FloatArray) -> Fl
     return spline(np.clip(heights, roll[0], roll[-1]))
 
 
-# What faulty teeth add to the compliance between the slices of a tooth pair.
+# Compliance that faulty teeth add between the slices of a tooth pair.
 
 
 def fault_compliance_rows(
     gear: ReducedGear, mesh: GearMesh, side: int, progress: FloatArray
 ) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Added compliance over ζ, (n_variants, n, n_slices, n_slices) in m/N, and the row of each tooth.
+    """Added compliance over ζ, (n_variants, n, n_slices, n_slices) in m/N, and the row index of each tooth.
 
-    Row 0 belongs to healthy teeth. A crack adds what finite elements of the cracked tooth yield more than those of the
-    healthy one, see `sims.reduced_fe`. A spall or chip adds as in `sims.mesh.GearMesh`, alike in every
-    slice.
+    Row 0 belongs to healthy teeth. A crack adds the extra compliance of the cracked tooth's finite elements over those
+    of the healthy one, see `crack_added_m_per_n`. A spall or chip adds compliance as in `sims.mesh.GearMesh`, the same
+    in every slice.
 
     Notes
     -----
-    A crack leaves the gear's modes as they are: one tooth in fifty hardly changes them.
+    A crack does not change the gear's modes here: one tooth in fifty has little effect on them.
     """
     gear_side, n_slices = mesh.side(side), len(gear.grid.z_m)
     if gear_side.faulty_teeth and mesh.overlap_ratio:
@@ -102,13 +102,13 @@ def fault_compliance_rows(
 
 
 POINTS_PER_PITCH = 64
-"""Columns per base pitch; a whole number, so that the columns of the next pair lie on those of this one."""
+"""Columns per base pitch; an integer, so that the columns of successive pairs coincide."""
 MARGIN = 20 / POINTS_PER_PITCH
-"""Base pitches before the ideal entry and after the ideal end within which a loaded pair may touch by a corner."""
+"""Base pitches before the ideal entry and after the ideal end within which a loaded pair may have corner contact."""
 FLANK = 0
-"""Of a `FlankGrid`: the flank that both gears drive with, each seen from its own side."""
+"""Index in a `FlankGrid` of the driving flank of both gears, each seen from its own side."""
 SIGNS = (-1, 1)
-"""The next tooth to touch lies at a smaller angle of the driver (ccw) and at a greater one of the driven gear (cw)."""
+"""The next tooth in contact is at a smaller angle of the driver (ccw) and at a larger one of the driven gear (cw)."""
 
 ToothCompliance = Callable[[ReducedGear, list[int]], FloatArray]
 """Compliance between the points of some teeth, as `ReducedGear.compliance_m_per_n`."""
@@ -116,15 +116,15 @@ ToothCompliance = Callable[[ReducedGear, list[int]], FloatArray]
 
 @dataclass(frozen=True)
 class ContactTable:
-    """Compliance, separation and local contact of tooth pairs and slices over ζ, base pitches since ideal entry.
+    """Compliance, separation and local contact of tooth pairs and slices over ζ, in base pitches from ideal entry.
 
-    Pair k touches at ζ = c − k, c = z1 θ1/2π; it is made of tooth k mod z1 and tooth k mod z2. Slices are counted from
-    the end face at −z.
+    Pair k is at ζ = c − k, c = z1 θ1/2π; it consists of tooth k mod z1 and tooth k mod z2. Slices are counted from the
+    end face at −z.
 
     Parameters
     ----------
     start, step : float
-        Least ζ, and distance of the columns (1/`POINTS_PER_PITCH`). One column lies beyond either end, for cubics.
+        Minimum ζ, and spacing of the columns (1/`POINTS_PER_PITCH`). One column lies beyond either end, for cubics.
     contact_ratio : float
     direct : array, (n, n_slices, n_slices)
         Compliance between the slices of a pair, both gears together, m/N.
@@ -133,7 +133,7 @@ class ContactTable:
     corner_m : array, (n, n_slices)
         Separation of unloaded perfect flanks, with crowning and misalignment.
     extra : ToothRows, (n_rows, n, n_slices, n_slices)
-        What faulty teeth add to the compliance between their slices; row 0, of healthy teeth of both gears, is 0.
+        Compliance added by faulty teeth between their slices; row 0, of healthy teeth of both gears, is 0.
     separation : ToothRows, (n_rows, n, n_slices)
     pitch_m : array, (2, z)
         See `sims.mesh.separation_table`.
@@ -154,26 +154,26 @@ class ContactTable:
 
     @property
     def progress(self) -> FloatArray:
-        """ζ of the columns."""
+        """ζ of the columns, (n,)."""
         return self.start + self.step * np.arange(-1, len(self.direct) - 1)
 
     def column(self, progress: float) -> int:
-        """Column nearest to ζ."""
+        """Index of the column nearest to ζ."""
         return round((progress - self.start) / self.step) + 1
 
     @property
     def n_slices(self) -> int:
-        """Slices of the face width."""
+        """Number of slices of the face width."""
         return int(self.direct.shape[1])
 
     @property
     def n_slots(self) -> int:
-        """Most pairs that may touch at once, corners included."""
+        """Maximum number of pairs in contact at the same time, corners included."""
         return floor((len(self.direct) - 3) * self.step) + 1
 
     @property
     def arrays(self) -> tuple[FloatArray | NDArray[np.int64], ...]:
-        """In the order in which kernels take them; one of each kind for both gears, the driver's rows first."""
+        """Arrays in the order of the kernels' arguments; one of each kind for both gears, the driver's rows first."""
         of = np.vstack((self.extra.of, self.separation.of))
         extra, separation = self.extra.rows, self.separation.rows
         return self.direct, self.cross, self.corner_m, extra, separation, of, self.pitch_m, self.hertz
@@ -187,10 +187,10 @@ def contact_table(gears: tuple[ReducedGear, ReducedGear], mesh: GearMesh, compli
     gears : (ReducedGear, ReducedGear)
         Driver and driven gear, with the same slices.
     mesh : GearMesh
-        Geometry of the pair, its faults and deviations. The compliance of healthy teeth is the gears'. With a helix
-        they are straight gears of the transverse section, of which each slice touches in its turn.
+        Geometry of the pair, its faults and deviations. The compliance of healthy teeth is that of the gears. With a
+        helix these are spur gears of the transverse section, whose slices come into contact one after another.
     compliance : callable
-        Which part of each gear's compliance: all of it for statics, the rest beside the modes for dynamics.
+        Part of each gear's compliance to use: all of it for statics, the residual besides the modes for dynamics.
 
     Raises
     ------
@@ -221,22 +221,22 @@ def contact_table(gears: tuple[ReducedGear, ReducedGear], mesh: GearMesh, compli
         extra=tooth_rows(*faults, share_first=True),
         separation=separation._replace(rows=np.ascontiguousarray(np.broadcast_to(rows, (*rows.shape[:2], len(z_m))))),
         pitch_m=pitch_m,
-        # An evenly loaded pair yields as the whole width does: h(N_s) = B (n N_s)^0.9.
+        # An evenly loaded pair deflects as the whole width does: h(N_s) = B (n N_s)^0.9.
         hertz=np.full(len(z_m), whole * len(z_m) ** 0.9),
     )
 
 
 def static_table(gears: tuple[ReducedGear, ReducedGear], mesh: GearMesh, *, support: str = "hub_held") -> ContactTable:
-    """Return the table for statics: all of the elastic compliance, held at the hubs whose motion is measured."""
+    """Return the table for statics: the whole elastic compliance, relative to the hubs."""
 
     def whole(gear: ReducedGear, teeth: list[int]) -> FloatArray:
-        return gear.compliance_m_per_n(teeth, support)  # type: ignore[arg-type]  # refused there if not one of its words
+        return gear.compliance_m_per_n(teeth, support)  # type: ignore[arg-type]  # rejected there if not allowed
 
     return contact_table(gears, mesh, whole)
 
 
 def check_gears(gears: tuple[ReducedGear, ReducedGear], mesh: GearMesh) -> None:
-    """Refuse reduced gears that are not those of the mesh."""
+    """Reject reduced gears that are not those of the mesh."""
     for name, gear, drawn in zip(("driver", "driven"), gears, (mesh.pair.driver, mesh.pair.driven), strict=True):
         reduced = gear.blank.geometry
         if (
@@ -251,7 +251,7 @@ def check_gears(gears: tuple[ReducedGear, ReducedGear], mesh: GearMesh) -> None:
 def _compliances(
     gears: tuple[ReducedGear, ReducedGear], mesh: GearMesh, progress: FloatArray, compliance: ToothCompliance
 ) -> tuple[FloatArray, FloatArray]:
-    """Own and cross compliance of both gears together; see `ContactTable`."""
+    """Direct and cross compliance of both gears together; see `ContactTable`."""
     n, n_slices = len(progress), len(gears[0].grid.z_m)
     n_offsets = floor((n - 1) / POINTS_PER_PITCH)
     direct = np.zeros((n, n_slices, n_slices))
@@ -262,7 +262,7 @@ def _compliances(
         block = _between(gear, [0], compliance)
         if mesh.overlap_ratio:
             block_direct = _compliance_between(gear.grid.roll_rad, block, roll, roll)
-            itself = np.einsum("hshs->hs", block)  # a slice is at one height, whatever the others'
+            itself = np.einsum("hshs->hs", block)  # a slice has a single height, whatever those of the others
             block_direct[:, range(block_direct.shape[1]), range(block_direct.shape[1])] = over_height(
                 gear.grid.roll_rad, itself, roll
             )
@@ -299,14 +299,14 @@ def _compliance_between(roll: FloatArray, block: FloatArray, first: FloatArray, 
     return between
 
 
-# Slices that mirror each other carry alike where nothing tells the ends of the face apart: then one stands for two.
+# Mirrored slices carry equal load if the two ends of the face do not differ; one then represents both.
 
 ALIKE = 1e-5
-"""Relative difference up to which the two halves of the face count as alike: that of the finite elements' solver."""
+"""Relative difference up to which the two halves of the face count as equal: that of the finite-element solver."""
 
 
 def mirror_groups(n_slices: int) -> FloatArray:
-    """Which group each slice belongs to, from the middle plane's ends inwards, (n_slices, n_groups) of 0 and 1.
+    """Membership of slices in groups of mirrored slices, from the ends inwards, (n_slices, n_groups) of 0 and 1.
 
     Examples
     --------
@@ -321,7 +321,7 @@ def mirror_groups(n_slices: int) -> FloatArray:
 
 
 def mirrors(table: ContactTable) -> bool:
-    """Whether both halves of the face are alike: compliance, faults, and neither helix nor misalignment."""
+    """Whether both halves of the face are equal in compliance and faults, without helix and misalignment."""
     if not np.allclose(table.corner_m, table.corner_m[:, ::-1], rtol=1e-9, atol=1e-16) or table.n_slices < 2:
         return False
     return all(
@@ -331,9 +331,9 @@ def mirrors(table: ContactTable) -> bool:
 
 
 def folded(table: ContactTable) -> ContactTable:
-    """Return the table of groups of slices: the force of a group is the sum of its slices'.
+    """Return the table for groups of slices: the force of a group is the sum over its slices.
 
-    N_s = F_g/|g| gives D_g = Σ_h mean_gh(R) F_h + B |g|^-0.9 F_g^0.9: nothing is lost.
+    N_s = F_g/|g| gives D_g = Σ_h mean_gh(R) F_h + B |g|^-0.9 F_g^0.9, which is exact.
     """
     groups = mirror_groups(table.n_slices)
     size = groups.sum(axis=0)
@@ -353,20 +353,20 @@ def folded(table: ContactTable) -> ContactTable:
     )
 
 
-# Compiled contact of several points on elastic bodies: which carry, and how much.
+# Compiled contact of several points on elastic bodies: which carry load, and how much.
 #
-# Points i at the approach D_i carry N_i ≥ 0 with D = R N + h(N) where they touch; R is the compliance of the bodies and
-# h(N) = B N^0.9 the local approach by Hertz. Below the force `small` the latter is straight, h = B small^-0.1 N, so
-# that a contact that begins has a finite stiffness.
+# Points i at the approach D_i carry N_i ≥ 0, with D = R N + h(N) where in contact; R is the compliance of the bodies
+# and h(N) = B N^0.9 the local Hertzian approach. Below the force `small` the latter is linear, h = B small^-0.1 N, so
+# that an incipient contact has a finite stiffness.
 
 FAST = {"reassoc", "contract", "nsz"}
-"""Sums may be reordered for vector instructions; infinities and NaN keep their meaning."""
+"""Sums may be reordered for vector instructions; infinities and NaN stay valid."""
 MAX_ITERATIONS = 60
 
 
 @njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
 def root(force, small, guess):
-    """max(N, small)^-0.1, by Newton's method from a guess near it."""
+    """max(N, small)^-0.1, by Newton's method from a nearby guess."""
     n = max(force, small)
     w2 = guess * guess
     w4 = w2 * w2
@@ -414,15 +414,15 @@ def back_substituted(a, n, x):
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST, **UNCOUNTED)
 def solve_contacts(r, n, approach, hertz, small, force, w, enough, order, a, x):
-    """Fill `force` (start values on entry) with N ≥ 0; return the number of iterations, or −1 where it fails.
+    """Fill `force` (start values on entry) with N ≥ 0; return the iterations, or −1 if it fails, and m.
 
     r : (≥ n, ≥ n) compliance, symmetric.
     approach : (≥ n,) D.
     hertz : (n_s,) B of the slices; point i is of slice i mod n_s.
-    w : (≥ n,) N^-0.1, carried along.
-    enough : largest change of a force at which an iteration counts as the last. Newton's error falls with the square
-        of the change, as h is almost straight: a change of 5 % leaves 1e-4.
-    order, a, x : scratch; on return order[:m] are the points that touch and `a` the factor of R + h'(N) over them.
+    w : (≥ n,) N^-0.1, updated.
+    enough : maximum change of a force in the last iteration. Newton's error decreases with the square of the change, as
+        h is almost linear: a change of 5 % leaves 1e-4.
+    order, a, x : scratch; on return order[:m] are the points in contact and `a` the factor of R + h'(N) over them.
     """
     n_s = hertz.shape[0]
     for iteration in range(1, MAX_ITERATIONS + 1):
@@ -473,7 +473,7 @@ def hertz_energy(force, hertz, small):
 
 @njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
 def place_of(pair, n):
-    """Remainder of a pair's number by n, as of the teeth of a gear; of floats, a fraction of the time of integers'."""
+    """Remainder of a pair's number by n, e.g. by the teeth of a gear; in floats it is much faster than in integers."""
     return int(pair - n * np.floor(pair / n))
 
 
@@ -495,7 +495,7 @@ def near_pairs(cycles, start, step, corner, separation, rows, pitch, teeth, reac
     for slot in range(pairs.shape[0]):
         pair = newest - slot
         place = (cycles - pair - start) / step
-        i = int(place) + 1  # one column lies ahead of the start
+        i = int(place) + 1  # one column is before the start
         if i > last:
             break
         t = place - int(place)
@@ -507,7 +507,7 @@ def near_pairs(cycles, start, step, corner, separation, rows, pitch, teeth, reac
             e1 = corner[i, s] + separation[a, i, s] + separation[b, i, s]
             e2 = corner[i + 1, s] + separation[a, i + 1, s] + separation[b, i + 1, s]
             e3 = corner[i + 2, s] + separation[a, i + 2, s] + separation[b, i + 2, s]
-            # The cubic with the slopes (e2 − e0)/2 and (e3 − e1)/2: continuous slopes, as the contact's damping needs.
+            # The cubic with slopes (e2 − e0)/2 and (e3 − e1)/2: continuous slopes, as needed for the contact's damping.
             c1, c2, c3 = 0.5 * (e2 - e0), e0 - 2.5 * e1 + 2.0 * e2 - 0.5 * e3, 1.5 * (e1 - e2) + 0.5 * (e3 - e0)
             separation_m = e1 + t * (c1 + t * (c2 + t * c3)) + pitch[0, tooth_1] + pitch[1, tooth_2]
             apart[n, s], slope[n, s] = separation_m, (c1 + t * (2.0 * c2 + t * 3.0 * c3)) / step
@@ -574,9 +574,9 @@ def compliance_slope_energy(n, pairs, columns, teeth, direct, cross, extra, rows
 
 
 SMALL_PART = 1e-4
-"""Of the greatest load on a slice: below it the local contact is straight."""
+"""Fraction of the maximum load on a slice below which the local contact is linear."""
 TORQUES_NM = tuple(float(t) for t in np.linspace(10.0, 500.0, 50))
-"""Of the maps where none are given."""
+"""Default torques of the maps."""
 
 
 @dataclass(frozen=True)
@@ -594,15 +594,15 @@ class MeshMaps:
     force_n : array, (n_c, n_t, n_slots, n_slices)
         N ≥ 0; slot j is the pair ⌊c − start⌋ − j, see `pair_forces_n`.
     tangent_n_per_m : array, (n_c, n_t, n_slots, n_slices)
-        dN/dδ of each slice as the hubs turn on.
+        dN/dδ of each slice as the hubs turn.
     separation_m : array, (n_c, n_slots)
-        Of unloaded flanks, where they are nearest along the face.
+        Of unloaded flanks, minimum along the face.
 
     Notes
     -----
-    *Secant* stiffness is N/δ or N/(δ − E), what a linear spring under this load would have; *tangent* stiffness is
-    dN/dδ, what a small vibration about this load meets. Contact stiffens with the load and corners take part, so that
-    the tangent is the greater.
+    *Secant* stiffness is N/δ or N/(δ − E), that of a linear spring under this load; *tangent* stiffness is dN/dδ, that
+    for a small vibration about this load. Contact stiffens with the load and corners contribute, so the tangent
+    stiffness is the larger.
     """
 
     mesh_cycles: FloatArray
@@ -627,20 +627,20 @@ class MeshMaps:
 
     @property
     def load_sharing(self) -> FloatArray:
-        """Part of the load that each pair carries, (n_c, n_t, n_slots)."""
+        """Fraction of the load on each pair, (n_c, n_t, n_slots)."""
         pairs = self.pair_forces_n
         result: FloatArray = pairs / pairs.sum(axis=2, keepdims=True)
         return result
 
     @property
     def contact_tangent_n_per_m(self) -> FloatArray:
-        """dN_k/dδ of each pair, (n_c, n_t, n_slots): what its neighbours carry counts, as they bend the same body."""
+        """dN_k/dδ of each pair, (n_c, n_t, n_slots), including the effect of its neighbours through the common body."""
         total: FloatArray = self.tangent_n_per_m.sum(axis=3)
         return total
 
     @property
     def contact_secant_n_per_m(self) -> FloatArray:
-        """N_k/(δ − E_k) of each pair, (n_c, n_t, n_slots), 0 where it does not touch."""
+        """N_k/(δ − E_k) of each pair, (n_c, n_t, n_slots), 0 where it is not in contact."""
         depth = self.transmission_error_m[:, :, None] - self.separation_m[:, None, :]
         pairs = self.pair_forces_n
         return np.divide(pairs, depth, out=np.zeros_like(pairs), where=pairs > 0.0)
@@ -687,7 +687,7 @@ def mesh_maps(
 ) -> MeshMaps:
     """Solve the loaded contact over mesh angle and torque.
 
-    Σ N = T1/r_b1,  δ − E_i = Σ_j C_ij N_j + B N_i^0.9 where points touch, N_i = 0 where they do not
+    Σ N = T1/r_b1,  δ − E_i = Σ_j C_ij N_j + B N_i^0.9 at points in contact, N_i = 0 elsewhere
 
     Parameters
     ----------
@@ -698,24 +698,24 @@ def mesh_maps(
     torque_nm : array or None
         On the driver, above 0, ascending; None: 10 to 500 N m.
     mesh_cycles : array or None
-        None: 200 points of one cycle. With faulty teeth or pitch deviations give a revolution.
+        None: 200 points of one cycle. With faulty teeth or pitch deviations, give a whole revolution.
     support : str
-        How the bodies are held, see `ReducedGear.compliance_m_per_n`.
+        Support of the bodies, see `ReducedGear.compliance_m_per_n`.
     table : ContactTable or None
-        Where it is at hand.
+        If already made.
 
     Raises
     ------
     RefusalError
-        If no contact is found: an approach beyond what corners can follow.
+        If no equilibrium of the contact is found.
 
     Notes
     -----
-    No friction; contact stays on the line of action, also where a corner touches; the axes do not yield.
+    No friction; contact stays on the line of action, also at corners; the axes are rigid.
     """
     torques = frozen_array(TORQUES_NM if torque_nm is None else torque_nm, "torque_nm", ndim=1)
     if len(torques) == 0 or torques[0] <= 0.0 or np.any(np.diff(torques) <= 0.0):
-        raise InputError("torques that do not ascend from above 0", where="torque_nm", allowed="ascending, above 0 N m")
+        raise InputError("torques not ascending, or not above 0", where="torque_nm", allowed="ascending, above 0 N m")
     cycles = one_mesh_cycle() if mesh_cycles is None else frozen_array(mesh_cycles, "mesh_cycles", ndim=1)
     table = static_table(gears, mesh, support=support) if table is None else table
     loads = torques / mesh.pair.base_radii_m[0]
@@ -726,12 +726,12 @@ def mesh_maps(
 def force_map(
     table: ContactTable, mesh: GearMesh, approach_m: FloatArray, mesh_cycles: FloatArray | None = None
 ) -> ForceMap:
-    """Tabulate F(z, δ) and dF/dδ.
+    """Tabulate the contact force F(z, δ) and dF/dδ.
 
     Parameters
     ----------
     table : ContactTable
-        E.g. of `static_table`.
+        E.g. from `static_table`.
     mesh : GearMesh
     approach_m : array
         δ, ascending.
@@ -767,17 +767,17 @@ def _solved(
         tangent,
     )
     if not converged:
-        raise RefusalError("no equilibrium of the tooth contact was found", remedy="look at loads and separations")
+        raise RefusalError("no equilibrium of the tooth contact was found", remedy="check loads and separations")
     return delta, force, tangent
 
 
 def teeth_of(mesh: GearMesh) -> FloatArray:
-    """(z1, z2) as kernels take them."""
+    """(z1, z2) as floats for kernels."""
     return np.array([mesh.pair.driver.teeth, mesh.pair.driven.teeth], dtype=np.float64)
 
 
 def _separations(table: ContactTable, mesh: GearMesh, cycles: FloatArray) -> FloatArray:
-    """Separation of the pair in each slot, (n_c, n_slots); infinite where it is beyond the table."""
+    """Separation of the pair in each slot, (n_c, n_slots); infinite beyond the table."""
     newest = np.floor(cycles - table.start)
     apart = np.full((len(cycles), table.n_slots), np.inf)
     for slot in range(table.n_slots):
@@ -794,15 +794,15 @@ def _separations(table: ContactTable, mesh: GearMesh, cycles: FloatArray) -> Flo
 
 
 class ContactState(NamedTuple):
-    """Points of the pairs near contact, slices of a pair one after the other; see `contact_state`.
+    """Points of the pairs near contact, with the slices of a pair adjacent; see `contact_state`.
 
     Attributes
     ----------
     force_n : array, (n,)
     compliance : array, (n, n)
-        R, with h'(N) on the diagonal of the points that touch.
+        R + h'(N), with h'(N) on the diagonal.
     pair, column, part : arrays, (n,)
-        Number of the pair, and its place in the table.
+        Number of the pair, and its position in the table.
     """
 
     force_n: FloatArray
@@ -813,7 +813,7 @@ class ContactState(NamedTuple):
 
 
 def contact_state(table: ContactTable, mesh: GearMesh, force_n: float, mesh_cycles: float) -> ContactState:
-    """Solve the contact at one mesh angle and return what a linear model about it needs."""
+    """Solve the contact at one mesh angle and return the data for a model linearised about it."""
     direct, cross, corner, extra, separation, rows, pitch, hertz = table.arrays
     slots, n_s = table.n_slots, table.n_slices
     pairs, parts = np.zeros(slots), np.zeros(slots)
@@ -840,14 +840,14 @@ def contact_state(table: ContactTable, mesh: GearMesh, force_n: float, mesh_cycl
 # Compiled: loaded contact at given mesh angles, for a given force or a given approach.
 
 ENOUGH = 1e-10
-"""Of the load: change of a force at which the solution counts as found."""
+"""Change of a force, relative to the load, at which the solution has converged."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def loaded_contact(  # noqa: PLR0912  one search, its cases beside each other
+def loaded_contact(  # noqa: PLR0912  one search, with its cases side by side
     cycles, loads, by_force, start, step, teeth, small, n_slots, arrays, delta, force, tangent
 ):
-    """Solve at each c and load; returns whether all were found.
+    """Solve the contact at each c and load; return whether all converged.
 
     loads : (n_loads,) total force in N, or approach δ in m where `by_force` is false; ascending.
     delta : (n_c, n_loads) δ in m, or the total force.
@@ -870,7 +870,7 @@ def loaded_contact(  # noqa: PLR0912  one search, its cases beside each other
         if n <= 0:
             return False
         fill_compliance(n, pairs, columns, parts, teeth, direct, cross, extra, rows, r)
-        # The first load starts from no force, where the nearest flanks touch; each further one from the one before.
+        # The first load starts from zero force at first touch, each further one from the one before.
         nearest = 1e9
         for p in range(n):
             nearest = min(nearest, apart[p].min())
@@ -882,7 +882,7 @@ def loaded_contact(  # noqa: PLR0912  one search, its cases beside each other
             enough = ENOUGH * max(loads[load] if by_force else loads[load] * 1e8, small)
             at = at if by_force else loads[load]
             is_solved = False
-            # Newton's method for the approach whose forces add up to the load; one solution where it is given.
+            # Newton's method for the approach at which the forces sum to the load; one solution if approach is given.
             for _ in range(100):
                 for p in range(n):
                     for s in range(n_s):
@@ -894,7 +894,7 @@ def loaded_contact(  # noqa: PLR0912  one search, its cases beside each other
                 for p in range(m):
                     unit[p] = 1.0
                     total += n_at[order[p]]
-                # dN/dδ of the points that touch: (R + h')⁻¹ 1.
+                # dN/dδ of the points in contact: (R + h')⁻¹ 1.
                 back_substituted(a, m, unit)
                 for p in range(m):
                     stiffness += unit[p]

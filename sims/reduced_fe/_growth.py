@@ -1,4 +1,4 @@
-"""Growth of a root crack: stress intensity from finite elements, Paris' law, turns that are left."""
+"""Growth of a root crack: stress intensity from finite elements, Paris' law, remaining revolutions."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from sims.reduced_fe._contact import over_height, rolls_rad
 
 
 def energy_release_m(depth_m: FloatArray, compliance_m_per_n: FloatArray, at_m: FloatArray) -> FloatArray:
-    """dC/da of a crack's added compliance, from its differences between solved depths.
+    """dC/da of a crack's added compliance, from differences between solved depths.
 
     The energy release rate under a force F on the width b is G = F²/(2b) dC/da, and K = √(G E/(1 − ν²)) in plane
-    strain, of all three modes together.
+    strain, for all three modes together.
 
     Parameters
     ----------
     depth_m : array, (n,)
-        Ascending, above 0; no depth adds nothing.
+        Ascending, above 0; the added compliance at depth 0 is 0.
     compliance_m_per_n : array, (n, …)
     at_m : array, (n_at,)
         Up to the last depth.
@@ -42,7 +42,7 @@ def energy_release_m(depth_m: FloatArray, compliance_m_per_n: FloatArray, at_m: 
     compliance = np.concatenate((np.zeros((1, *compliance_m_per_n.shape[1:])), compliance_m_per_n))
     steps = np.diff(depth).reshape(-1, *(1,) * (compliance.ndim - 1))
     slope = np.diff(compliance, axis=0) / steps
-    # A difference is the slope in the middle, to second order; the last one goes straight on, the first starts from 0.
+    # A difference is the slope at the midpoint, to second order; the end is extrapolated linearly, the start is 0.
     middle = (depth[1:] + depth[:-1]) / 2.0
     beyond = slope[-1] + (slope[-1] - slope[-2]) * (depth[-1] - middle[-1]) / (middle[-1] - middle[-2])
     places = np.concatenate(([0.0], middle, depth[-1:]))
@@ -52,7 +52,7 @@ def energy_release_m(depth_m: FloatArray, compliance_m_per_n: FloatArray, at_m: 
 
 @dataclass(frozen=True)
 class GrowthStage:
-    """da/dN = C ΔK^m, in mm and MPa √m, with the scatter of specimens.
+    """One stage of Paris' law, da/dN = C ΔK^m, in mm and MPa √m, with the scatter of specimens.
 
     Parameters
     ----------
@@ -63,9 +63,9 @@ class GrowthStage:
     scatter : float
         Standard deviation of log10 C.
     exponent_scatter : float
-        Standard deviation of m, about a fixed rate at `pivot`: C and m of one material go together.
+        Standard deviation of m, at a fixed rate at `pivot`: C and m of one material are correlated.
     pivot : float
-        ΔK in MPa √m in the middle of what was measured.
+        ΔK in MPa √m in the middle of the measured range.
     """
 
     coefficient: float
@@ -89,13 +89,13 @@ class GrowthStage:
 
 @dataclass(frozen=True)
 class GrowthLaw:
-    """Crack growth per cycle: the slowest of some stages, none below a threshold, the end at a toughness.
+    """Crack growth per cycle: the slowest of several stages, none below a threshold, fracture at a toughness.
 
     Parameters
     ----------
     stages : tuple of GrowthStage
     threshold : float
-        ΔK in MPa √m below which a crack rests.
+        ΔK in MPa √m below which a crack does not grow.
     toughness : float
         K in MPa √m at which the tooth breaks at once.
     source : str
@@ -128,22 +128,22 @@ STEEL_IN_AIR = GrowthLaw(
     source="BS 7910, steels in air, R below 0.5: two stages, their mean and mean plus two standard deviations; "
     "threshold 63 N/mm^1.5",
 )
-"""Weldable structural steels; no law of case-hardened gear steels is at hand."""
+"""Weldable structural steels; no law for case-hardened gear steels is available."""
 
 
 @dataclass(frozen=True)
 class StressIntensity(Result):
-    """Of a crack through the whole face, greatest over the passage of its tooth through the mesh.
+    """Stress intensity of a crack through the whole face, maximum over the tooth's passage through the mesh.
 
     Parameters
     ----------
     depth_mm : array, (n,)
     k_mpa_sqrt_m : array, (n,)
-        √(K_I² + K_II²) in effect.
+        In effect √(K_I² + K_II²).
     force_n : array, (n,)
-        On the tooth at that moment.
+        Force on the tooth at the maximum.
     mesh_cycles : array, (n,)
-        When, since the tooth's entry.
+        Position of the maximum, from the tooth's entry.
     """
 
     depth_mm: FloatArray
@@ -155,27 +155,27 @@ class StressIntensity(Result):
 def stress_intensity(
     gear: ReducedGear, mesh: GearMesh, side: int, torque_nm: float, depth_mm: FloatArray, angle_deg: float = 45.0
 ) -> StressIntensity:
-    """Stress intensity of a root crack from the energy that the tooth releases as the crack grows straight on.
+    """Stress intensity of a root crack, from the energy released as the crack grows in a straight line.
 
     Parameters
     ----------
     gear : ReducedGear
-        Whose tooth is cracked; its finite elements are solved at up to eleven depths, or were.
+        The gear with the crack; its finite elements are solved at up to eleven depths, unless cached.
     mesh : GearMesh
-        Shares the load among teeth, the cracked one among them.
+        Determines the load sharing between teeth, including the cracked one.
     side : int
         1: the driver's tooth; 2: the driven gear's.
     torque_nm : float
         On the driver, above 0.
     depth_mm : array, (n,)
-        Above 0, up to what finite elements can follow.
+        Above 0, up to the depth that the finite elements can follow.
     angle_deg : float
 
     Notes
     -----
-    Against edge-cracked strips of known K the same finite elements and the same derivative are right to 3 %. The crack
-    runs straight at its angle; beyond the tooth's middle it leaves the bending, and less energy is released. A real one
-    turns to where most is. Its faces do not touch and its front is straight.
+    For edge-cracked strips of known K the same finite elements and derivative are accurate to 3 %. The crack runs
+    straight at its angle; beyond the tooth's middle it leaves the bending zone, and less energy is released. A real
+    crack turns towards the maximum release. The crack faces do not touch and the front is straight.
     """
     if mesh.overlap_ratio:
         raise InputError("a crack in a helical tooth has no straight front", allowed="spur pairs")
@@ -187,7 +187,7 @@ def stress_intensity(
         raise InputError(
             f"depths from {depths.min():g} to {depths.max():g} mm",
             where="depth_mm",
-            allowed=f"above 0, up to {deepest:.3g} mm at {angle_deg:g}°, as far as the finite elements follow",
+            allowed=f"above 0, up to {deepest:.3g} mm at {angle_deg:g}°, the limit of the finite elements",
         )
     solved = deepest_crack_mm(gear.blank.geometry, angle_deg) * np.array(DEPTH_PARTS)
     solved = solved[solved <= deepest * (1.0 + 1e-9)]
@@ -212,20 +212,20 @@ def stress_intensity(
 
 @dataclass(frozen=True)
 class CrackGrowth(Result):
-    """How many turns a crack takes to each depth.
+    """Revolutions in which a crack grows to each depth.
 
     Parameters
     ----------
     depth_mm : array, (n,)
         From the present depth to the end.
     k_mpa_sqrt_m : array, (n,)
-        ΔK; the tooth is free of load in between.
+        ΔK; the tooth is unloaded in between.
     turns : array, (3, n)
-        From now to each depth: 5 %, 50 % and 95 % of the specimens have needed fewer.
+        Revolutions from now to each depth: 5 %, 50 % and 95 % quantiles of the specimens.
     ends : str
-        What ends it: "toughness", or "depth", as far as the finite elements follow.
+        Reason for the end: "toughness", or "depth", the limit of the finite elements.
     resting_share : float
-        Share of the specimens whose crack rests below the threshold.
+        Fraction of the specimens whose crack does not grow, as ΔK is below the threshold.
     """
 
     depth_mm: FloatArray
@@ -236,7 +236,7 @@ class CrackGrowth(Result):
 
     @property
     def remaining_turns(self) -> tuple[float, float, float]:
-        """5 %, 50 %, 95 %; infinite where the crack rests."""
+        """5 %, 50 % and 95 % quantiles at the end; infinite if the crack does not grow."""
         low, middle, high = (float(t) for t in self.turns[:, -1])
         return low, middle, high
 
@@ -250,22 +250,22 @@ def crack_growth(
     first_mm: tuple[float, float] | None = None,
     n_specimens: int = 2000,
 ) -> CrackGrowth:
-    """Turns to each depth: N = ∫ da/(C ΔK^m), one load a turn from nothing to its greatest.
+    """Revolutions to each depth, N = ∫ da/(C ΔK^m), with one load cycle from 0 to its maximum per revolution.
 
     Parameters
     ----------
     depth_mm, k_mpa_sqrt_m : array, (n,)
-        E.g. of `stress_intensity`; the first is the present depth.
+        E.g. from `stress_intensity`; the first is the present depth.
     law : GrowthLaw
     rng : numpy.random.Generator
         Draws specimens of the steel.
     first_mm : (float, float) or None
-        Interval that holds the present depth with 90 %: the depth is then drawn, too, as normal within the depths.
+        90 % interval of the present depth, which is then also drawn, from a normal distribution within the depths.
     n_specimens : int
 
     Notes
     -----
-    Left out: retardation by overloads, residual stress of a hardened case, corrosion, closure, a crack that turns.
+    Neglected: retardation by overloads, residual stress of a hardened case, corrosion, closure, a crack that turns.
     """
     depth, k = np.asarray(depth_mm, dtype=np.float64), np.asarray(k_mpa_sqrt_m, dtype=np.float64)
     count(len(depth), "depths", minimum=3)
@@ -274,7 +274,7 @@ def crack_growth(
     if last < 2:
         raise InputError(f"K is {k[0]:.3g} MPa √m at the present depth", allowed=f"below {law.toughness:g}: it breaks")
     depth, k = depth[:last], k[:last]
-    # Finer steps of depth, K in between by its logarithm: slow stages grow as its eighth power.
+    # Finer steps of depth, with log K interpolated: slow stages grow with the eighth power of K.
     fine = np.linspace(depth[0], depth[-1], max(400, 4 * len(depth)))
     delta_k = np.exp(np.interp(fine, depth, np.log(np.maximum(k, 1e-9))))
     c, m = rng.standard_normal((2, count(n_specimens, "n_specimens", minimum=20), 1))

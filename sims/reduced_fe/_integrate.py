@@ -1,16 +1,17 @@
-"""Compiled: march two sides of modes over the moving contact between them.
+"""Compiled: time integration of the modes of two sides with the moving contact between them.
 
-A step: modes move freely, with the modal force extrapolated; the contact is solved at that place; the modes are
-corrected by the force found. The fast way takes this once; the reference repeats it until the forces stay. The force
-a moment later changes a place by h²/6 times the modal mobility, some 1e-4 of what the contact yields, so that one pass
-leaves an error of third order.
+In a step the modes move freely with the modal force extrapolated, the contact is solved at that position, and the modes
+are corrected by the force found. The fast method does this once; the reference repeats it until the forces converge. A
+change of force at the end of a step changes a position by h²/6 times the modal mobility, about 1e-4 of the contact
+compliance, so that one pass leaves an error of third order.
 
-Forces of the contact are −∂U/∂η with U(D(η, ζ), ζ); ζ follows the driver, which so feels −∂U/∂ζ ∂ζ/∂θ1 as stiffness
-and flank shape move past under load. Without it a pair would take energy from the drive that appears nowhere.
+The contact forces are −∂U/∂η with U(D(η, ζ), ζ); ζ follows the driver, which thus has the torque −∂U/∂ζ ∂ζ/∂θ1 as
+stiffness and flank shape move past under load. Without it a pair would take energy from the drive that appears nowhere.
 
-Damping: the elastic law is taken at D + τ ∂D/∂η·η̇, to first order a damper parallel to the contact with τ times its
-stiffness, which feels the vibration and not the flanks' shape moving past. It never pulls and never adds energy; teeth
-that close at 0.1 m/s feel it 1 µm early, as by an oil film. The torque of moving contact has the elastic part alone.
+Damping: the elastic law is evaluated at D + τ ∂D/∂η·η̇, to first order a damper parallel to the contact with τ times
+its stiffness, which acts on the vibration but not on the flank shape moving past. It never pulls and never adds energy;
+teeth that close at 0.1 m/s feel it 1 µm early, as with an oil film. The torque of the moving contact has only the
+elastic part.
 
 Friction acts on the bodies as a whole, across the line of action and about their axes; teeth do not bend under it.
 """
@@ -40,16 +41,16 @@ from sims.reduced_fe._contact import (
     solve_contacts,
 )
 
-# Compiled: modal coordinates seen from a tooth, and the works of forces on them.
+# Compiled: modal coordinates seen from a tooth, and generalised forces on them.
 #
-# Inlined where they are used, as are the phases of a step: calls with many arrays took a fifth of the time.
+# Inlined where used, as are the phases of a step: calls with many arrays took a fifth of the time.
 
-# Arrays are passed whole, with the places in them: a slice is a new object, whose references are counted at every use.
+# Arrays are passed whole, with indices into them: a slice is a new object, whose references are counted at every use.
 
 
 @njit(inline="always", error_model="numpy", fastmath=FAST)
 def to_tooth(w, side, turn, tooth, n_single, n_pairs, out):
-    """Modal coordinates as the tooth in contact sees them: pairs turned by nψ."""
+    """Modal coordinates seen from the tooth in contact: pairs rotated by nψ."""
     for j in range(n_single):
         out[j] = w[side, j]
     for p in range(n_pairs):
@@ -73,7 +74,7 @@ def add_from_tooth(g, side, turn, tooth, n_single, n_pairs, out):
 
 @njit(inline="always", error_model="numpy", fastmath=FAST)
 def dots(rows, side, i, s, t, q, v):
-    """∂D/∂η · q in columns i and i + 1, and ∂D/∂η · v at the part t between them."""
+    """∂D/∂η · q in columns i and i + 1, and ∂D/∂η · v at the fraction t between them."""
     a, b, c, d = 0.0, 0.0, 0.0, 0.0
     for j in range(rows.shape[3]):
         low, high = rows[side, i, s, j], rows[side, i + 1, s, j]
@@ -86,7 +87,7 @@ def dots(rows, side, i, s, t, q, v):
 
 @njit(inline="always", error_model="numpy", fastmath=FAST)
 def on_input(inputs, side, number, w):
-    """Displacement (of modal coordinates w) that an input works on."""
+    """Displacement at an input, from modal coordinates w."""
     total = 0.0
     for j in range(w.shape[1]):
         total += inputs[side, number, j] * w[side, j]
@@ -95,7 +96,7 @@ def on_input(inputs, side, number, w):
 
 @njit(inline="always", error_model="numpy", fastmath=FAST)
 def signal_of_modes(factors, line, w):
-    """Signal `line` of modal coordinates w of both sides."""
+    """Signal `line` from modal coordinates w of both sides."""
     total = 0.0
     for side in range(2):
         for j in range(w.shape[1]):
@@ -105,7 +106,7 @@ def signal_of_modes(factors, line, w):
 
 @njit(inline="always", error_model="numpy", fastmath=FAST)
 def product(a, b):
-    """Sum of products of all modes of both sides."""
+    """Scalar product over all modes of both sides."""
     total = 0.0
     for side in range(2):
         for j in range(a.shape[1]):
@@ -115,18 +116,18 @@ def product(a, b):
 
 @njit(inline="always", error_model="numpy", fastmath=FAST)
 def spread(rows, side, i, s, t, force, g):
-    """Take force · ∂D/∂η between two columns from g."""
+    """Subtract force · ∂D/∂η, interpolated between two columns, from g."""
     low, high = force * (1.0 - t), force * t
     for j in range(rows.shape[3]):
         g[j] -= low * rows[side, i, s, j] + high * rows[side, i + 1, s, j]
 
 
-# Compiled: what acts on the two sides besides the driving flanks, as modal forces.
+# Compiled: modal forces on the two sides other than those of the driving flanks.
 
 
 @njit(inline="always", error_model="numpy")
 def outer_forces(k, inputs, q, v, angle, omega, rate, load, out):
-    """Fill `out` with drive and load, the turning set speed, unbalance and weight, rolling elements."""
+    """Fill `out` with the modal forces of drive, load, set speed, unbalance, weight and rolling elements."""
     for side in range(2):
         if side == 0:
             drive = load * torque_ripple(k, angle + on_input(inputs, 0, 0, q)) + k.total_inertia * rate
@@ -143,7 +144,7 @@ def outer_forces(k, inputs, q, v, angle, omega, rate, load, out):
 
 @njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
 def _push(k, side, inputs, angle, omega, drive, out):
-    """Add unbalance, weight and a bent coupling, at the set speed."""
+    """Add unbalance, weight and an angled coupling, at the set speed."""
     theta = angle if side == 0 else angle / k.ratio
     rate = omega if side == 0 else omega / k.ratio
     up = 1.0 if side == 0 else -1.0
@@ -167,7 +168,7 @@ def _push(k, side, inputs, angle, omega, drive, out):
 
 @njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
 def _roll(k, side, inputs, angle, load, out):
-    """Add the forces of bearing springs whose feet move as rolling elements pass, under the load of this moment."""
+    """Add the forces of bearing springs whose feet move as rolling elements pass, under the present load."""
     for bearing in range(2):
         row = 2 * side + bearing
         if k.special[row] > 0:
@@ -179,7 +180,7 @@ def _roll(k, side, inputs, angle, load, out):
 
 @njit(inline="always", error_model="numpy")
 def _foot(k, row, angle, load):
-    """Where a bearing spring's foot stands, under the load of this moment."""
+    """Position of a bearing spring's foot, under the present load."""
     part = load / k.nominal_torque
     x = part * k.bearing_yield[row, 0] + k.bearing_play[row, 0]
     y = part * k.bearing_yield[row, 1] + k.bearing_play[row, 1]
@@ -188,14 +189,14 @@ def _foot(k, row, angle, load):
 
 @njit(inline="always", error_model="numpy")
 def _sprung(k, row, x, y):
-    """Return the force of a bearing's spring pressed by x and y."""
+    """Return the force of a bearing's spring deflected by x and y."""
     spring = k.bearing_spring
     return spring[row, 0, 0] * x + spring[row, 0, 1] * y, spring[row, 1, 0] * x + spring[row, 1, 1] * y
 
 
 @njit(cache=True, nogil=True, error_model="numpy", **UNCOUNTED)
 def _yields(k, inputs, q, angle, load, extras):
-    """Fill the yields of the bearings, see `sims.gear_pair.DEFLECTIONS`."""
+    """Fill the deflections of the bearings, see `sims.gear_pair.DEFLECTIONS`."""
     for row in range(4):
         side, number = row // 2, 4 + 2 * (row % 2)
         x, y = on_input(inputs, side, number, q), on_input(inputs, side, number + 1, q)
@@ -207,57 +208,56 @@ def _yields(k, inputs, q, angle, load, extras):
 
 
 START_REACH = 1e-4
-"""Depth up to which flanks count as near at first, m."""
+"""Initial depth up to which flanks count as near, m."""
 REACH_MPS = 4.0
-"""Speed at which flanks may close: what is further apart than a step of it, beyond the present depth, is not near."""
+"""Maximum closing speed: flanks further apart than a step at this speed, beyond the present depth, are not near."""
 FAST_PART = 0.05
-"""Change of a contact force, over the nominal one, after which the fast way takes no second iteration."""
+"""Change of a contact force, over the nominal one, up to which the fast method takes no second iteration."""
 PRECISE_PART = 1e-11
 MAX_PASSES = 50
 N_EXTRAS = 14
 
 
-# Arrays are passed whole, with the places in them: a slice is a new object, whose references are counted at every use.
+# Arrays are passed whole, with indices into them: a slice is a new object, whose references are counted at every use.
 
 
 def room(shape: tuple[int, ...], n_modes: int, n_rows: int) -> tuple[Any, ...]:
-    """Return what `march` writes to besides its results, nothing of which is kept; shape: (n_slots, n_slices)."""
+    """Return scratch arrays for `march`; `shape` is (n_slots, n_slices)."""
     n_slots, n_max = shape[0], shape[0] * shape[1]
     places = np.empty(n_slots), np.empty(n_slots), np.empty(shape), np.empty(shape)
     integers = np.empty(n_slots, dtype=np.int64), np.empty(n_max, dtype=np.int64)
     squares = np.empty((n_max, n_max)), np.empty((n_max, n_max))
-    points = tuple(np.zeros(n_max) for _ in range(8))  # forces of a pair that a later pass finds near start from these
+    points = tuple(np.zeros(n_max) for _ in range(8))  # start values for pairs that a later pass finds near
     seen = tuple(np.empty(n_rows) for _ in range(3))
     modes = tuple(np.empty((2, n_modes)) for _ in range(6))
     return places, integers, squares, points, seen, modes, np.zeros(N_EXTRAS + n_slots + n_max)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST, **UNCOUNTED)
-def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, and the scratch that they share
+def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, with shared scratch
     k, arrays, rows, turn, coefficients, modal, inputs, rigid, back_row, state, speed, torque, time, step, n_steps,
     stride, precise, lines, output, energies, scratch,
 ):  # fmt: skip
-    """Run `n_steps` steps; fill `output` with the wanted signals at every `stride`-th.
+    """Run `n_steps` steps; fill `output` with the requested signals at every `stride`-th step.
 
     k : record, see `sims.reduced_fe`.
     arrays : see `ContactTable.arrays`.
     rows : (2, n, n_slices, n_rows) ∂D/∂η of both sides.
-    turn : (2, z, 2, n_pairs) cosine and sine by which a tooth's pairs are turned.
+    turn : (2, z, 2, n_pairs) cosine and sine of the rotation of a tooth's pairs.
     coefficients : (2, 8, n_modes), see `step_coefficients`.
     modal : (2, 2, n_modes) ω² and 2ζω.
-    inputs : (2, 9, n_modes). rigid, back_row : (2, n_modes) ∂D/∂η of the rigid gears on either flank.
+    inputs : (2, 9, n_modes). rigid, back_row : (2, n_modes) ∂D/∂η of the rigid gears on each flank.
     state : (q, v, f, f_before: (2, n_modes); force, root: (n_slots, n_slices); pair: (n_slots,); rest: (3,)), left at
-        the last step. rest: set angle, whether the flanks touched, whether
-        the state has forces already.
+        the last step. rest: set angle, whether the flanks were in contact, whether the state already has forces.
     speed, torque : (2, n) profiles in rad/s and N m.
     time : of the first step.
-    precise : repeat each step until it stays.
-    lines : (kinds (n,), factors (n, 2, n_modes), set factors (n,)): wanted signals; kind 0, 1, 2: displacement,
-        velocity, acceleration; 3 + i: extra i = mesh force, back force, mesh cycles, nearest depth, torque of moving
-        contact on the driver, friction, then the force of each slot, then of each of its slices.
+    precise : repeat each step until it converges.
+    lines : (kinds (n,), factors (n, 2, n_modes), set factors (n,)): requested signals; kind 0, 1, 2: displacement,
+        velocity, acceleration; 3 + i: extra i, in the order of `sims.reduced_fe._respond.EXTRAS`, then the force of
+        each slot, then of each of its slices.
     output : (n_out, n). energies : (n_out,) or (0,).
     scratch : see `room`.
-    Returns the number of rows filled, fewer where the solution burst.
+    Returns the number of rows filled, fewer if the solution diverges.
     """
     q, v, f, f_before, held, held_root, held_pair, rest = state
     direct, cross, corner, extra, separation, table_rows, pitch, hertz = arrays
@@ -284,7 +284,7 @@ def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, and the scra
         outer_forces(k, inputs, q, v, angle, w1, rate1, load, base)
         cycles, total, back, along_torque, rubbing, n = 0.0, 0.0, 0.0, 0.0, 0.0, 0
         for one_pass in range(passes):
-            # Where the modes are with the force assumed at the step's end, and which pairs are near contact there.
+            # Modes with the force assumed at the step's end, and the pairs near contact there.
             _moved(number, coefficients, free_q, free_v, f1, q, v, q1, v1)
             turned_1, turned_2 = on_input(inputs, 0, 1, q1), on_input(inputs, 1, 1, q1)
             cycles = k.cycles_per_rad * (angle + turned_1)
@@ -309,7 +309,7 @@ def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, and the scra
             if done < 0:
                 return n_out
             _without_damping(k, n * n_s, m, force, viscous, order, a, x, elastic)
-            # The torque by which stiffness and flank shape move past under load, −∂U/∂ζ ∂ζ/∂θ1, and run-out.
+            # The torque due to stiffness and flank shape moving past under load, −∂U/∂ζ ∂ζ/∂θ1, and to run-out.
             reach = max(deepest - off, 0.0) + margin
             total, along_cycles = 0.0, 0.0
             for i in range(n * n_s):
@@ -323,24 +323,24 @@ def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, and the scra
             off_2, across_2 = k.runout[1] * sin(phi_2), k.runout[1] * cos(phi_2)
             torque_1 = along_torque - total * across_1
             torque_2 = -total * across_2
-            # Friction across the line of action, and the flanks behind.
+            # Friction across the line of action, and the back flanks.
             if k.friction:
                 slip_x = on_input(inputs, 0, 2, v1) - on_input(inputs, 1, 2, v1)
                 rubbing, moment_1, moment_2 = _rubbing(k, n, n_s, pairs, cycles, force, w1, slip_x)
                 torque_1, torque_2 = torque_1 + moment_1, torque_2 + moment_2
-            # Those see the run-out along their own line of action: it takes up play by what it brings the gears nearer.
+            # On the back flanks run-out acts along their own line of action: closer gears have less backlash.
             arm_1 = k.cos_back * across_1 + k.sin_back * off_1
             arm_2 = k.cos_back * across_2 - k.sin_back * off_2
             depth = product(back_row, q1) + k.damping_time * product(back_row, v1) - k.backlash
             depth += k.sin_back * (across_1 - across_2) - k.cos_back * (off_1 + off_2)
             depth -= k.damping_time * (arm_1 + arm_2 / k.ratio) * w1
-            # A tooth that is out of its place is so with both flanks.
+            # A pitch deviation shifts both flanks of a tooth.
             behind, behind_slope = out_of_place(cycles, 0.5 * k.contact_ratio, k.teeth, pitch)
             depth += behind + k.damping_time * behind_slope * k.cycles_per_rad * w1
             back = k.back_stiffness * depth if depth > 0.0 else 0.0
             torque_1, torque_2 = torque_1 + back * arm_1, torque_2 + back * arm_2
             torque_1 -= back * behind_slope * k.cycles_per_rad
-            # All forces as modal ones; the reference repeats the pass until the contact's stay.
+            # All forces as modal forces; the reference repeats the pass until the contact forces converge.
             for side in range(2):
                 pull, across = (torque_1, -rubbing) if side == 0 else (torque_2, rubbing)
                 for j in range(n_modes):
@@ -354,7 +354,7 @@ def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, and the scra
                     last_force[i] = force[i]
         if not abs(total) < 1e12:
             return n_out
-        if number > 0 or rest[2] == 0.0:  # a state that another run left is only looked at
+        if number > 0 or rest[2] == 0.0:  # the last state of another run is only evaluated
             _keep(n, n_slots, pairs, force, root, held, held_root)
             _advance(number, coefficients, free_q, free_v, f1, q, v, f, f_before)
         rest[2] = 1.0
@@ -362,7 +362,7 @@ def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, and the scra
         if k.restitution >= 0.0 and rest[1] == 0.0 and touches > 0.0:
             _bounce(k, rigid, v)
         rest[1] = touches
-        # The wanted signals of this step.
+        # The requested signals of this step.
         if number % stride == 0 and n_out < output.shape[0]:
             extras[0], extras[1], extras[2], extras[3], extras[4] = total, back, cycles, reach - margin, along_torque
             extras[5] = rubbing
@@ -387,7 +387,7 @@ def march(  # noqa: PLR0912, PLR0915  the phases of a step in turn, and the scra
 
 @njit(inline="always", error_model="numpy", fastmath=FAST)
 def _predict(number, coefficients, q, v, f, f_before, free_q, free_v, f1):
-    """Where modes move without the force at the step's end, and that force extrapolated."""
+    """Motion of the modes without the force at the step's end, and that force extrapolated."""
     for side in range(2):
         for j in range(q.shape[1]):
             if number > 0:
@@ -402,7 +402,7 @@ def _predict(number, coefficients, q, v, f, f_before, free_q, free_v, f1):
 
 @njit(inline="always", error_model="numpy", fastmath=FAST)
 def _moved(number, coefficients, free_q, free_v, f1, q, v, q1, v1):
-    """Modes at the step's end with a force there; at the start, where they are."""
+    """Modes at the step's end with a given force there; at the start, unchanged."""
     for side in range(2):
         for j in range(q.shape[1]):
             if number > 0:
@@ -414,7 +414,7 @@ def _moved(number, coefficients, free_q, free_v, f1, q, v, q1, v1):
 
 @njit(inline="always", error_model="numpy", fastmath=FAST)
 def _taken_up(k, n, pairs, held, held_root, held_pair, force, root):
-    """Forces of the pairs at the step before, where the solution starts; none of pairs that are new."""
+    """Start values of the solution: the pairs' forces at the step before, 0 for new pairs."""
     n_slots, n_s = held.shape
     for p in range(n):
         ring = place_of(pairs[p], n_slots)
@@ -430,7 +430,7 @@ def _taken_up(k, n, pairs, held, held_root, held_pair, force, root):
 def _approaches(
     k, n, rows, turn, q1, v1, pairs, columns, parts, apart, slope, off, seen, moving, approach, viscous, along
 ):  # fmt: skip
-    """Fill the approach of each slice, damping's part in it and its change per mesh cycle; return the deepest."""
+    """Fill the approach of each slice, its damping part and its change per mesh cycle; return the maximum."""
     n_s, deepest = apart.shape[1], -1.0
     for p in range(n):
         for s in range(n_s):
@@ -454,7 +454,7 @@ def _approaches(
 
 @njit(inline="always", error_model="numpy", fastmath=FAST)
 def _without_damping(k, n, m, force, viscous, order, a, x, elastic):
-    """Elastic part of the forces: less the contact's stiffness times the approach that damping adds."""
+    """Elastic part of the forces: less the contact's stiffness times the damping part of the approach."""
     for i in range(n):
         elastic[i] = force[i]
     if k.damping_time > 0.0:
@@ -467,7 +467,7 @@ def _without_damping(k, n, m, force, viscous, order, a, x, elastic):
 
 @njit(inline="always", error_model="numpy", fastmath=FAST)
 def _rubbing(k, n, n_s, pairs, cycles, force, omega, slip_x):
-    """Sums of friction and its moments about both axes over the pairs."""
+    """Friction force and its moments about both axes, summed over the pairs."""
     rubbing, moment_1, moment_2 = 0.0, 0.0, 0.0
     for p in range(n):
         carried = 0.0
@@ -513,7 +513,7 @@ def _keep(n, n_slots, pairs, force, root, held, held_root):
 
 @njit(inline="always", error_model="numpy", fastmath=FAST)
 def _advance(number, coefficients, free_q, free_v, f1, q, v, f, f_before):
-    """Take the step with the force found; at the start, take only the force."""
+    """Advance the state with the force found; at the start, store only the force."""
     for side in range(2):
         for j in range(q.shape[1]):
             if number > 0:
@@ -527,7 +527,7 @@ def _advance(number, coefficients, free_q, free_v, f1, q, v, f, f_before):
 
 @njit(inline="always", error_model="numpy", fastmath=FAST)
 def _bounce(k, rigid, v):
-    """Turn the gears' closing speed round by the coefficient of restitution."""
+    """Reverse the gears' closing speed with the coefficient of restitution."""
     closing = product(rigid, v)
     if closing > 0.0:
         kick = (1.0 + k.restitution) * closing / product(rigid, rigid)
@@ -572,23 +572,23 @@ def _energy(k, q, v, modal, inputs, angle, load, r, n, force, back, hertz):
     return total
 
 
-# One step of each mode as fixed numbers: (q, v) at the end from (q, v) and the forces at either end.
+# One step of each mode as fixed coefficients: (q, v) at the end from (q, v) at the start and the forces at both ends.
 #
 #     q₁ = a_qq q₀ + a_qv v₀ + b_q0 f₀ + b_q1 f₁,   v₁ = a_vq q₀ + a_vv v₀ + b_v0 f₀ + b_v1 f₁
 #
-# for q̈ + 2ζω q̇ + ω² q = f. Both integrators are of this form; they differ in the numbers.
+# for q̈ + 2ζω q̇ + ω² q = f. Both integrators have this form and differ in the coefficients.
 
 Method = Literal["exponential", "newmark"]
 METHODS: tuple[Method, ...] = ("exponential", "newmark")
 NAMES = ("a_qq", "a_qv", "a_vq", "a_vv", "b_q0", "b_q1", "b_v0", "b_v1")
 BETA, GAMMA = 0.25, 0.5
-"""Newmark's constants of the average acceleration: second order, without numerical damping."""
+"""Newmark's constants for average acceleration: second order, without numerical damping."""
 
 
 def step_coefficients(
     omega_rad_s: FloatArray, damping_rate: FloatArray, step_s: float, method: Method = "exponential"
 ) -> FloatArray:
-    """Return the eight numbers of each mode, (8, n_modes), in the order of `NAMES`.
+    """Return the eight coefficients of each mode, (8, n_modes), in the order of `NAMES`.
 
     Parameters
     ----------
@@ -598,8 +598,8 @@ def step_coefficients(
         2ζω in 1/s.
     step_s : float
     method : str
-        "exponential": exact for a force that runs straight from step to step, however stiff the mode. "newmark": the
-        average acceleration, β = ¼, γ = ½.
+        "exponential": exact for a force that is linear between steps, however stiff the mode. "newmark": average
+        acceleration, β = ¼, γ = ½.
 
     Source: N. M. Newmark, A method of computation for structural dynamics, Journal of the Engineering Mechanics
     Division ASCE 85 (1959); G. F. Franklin, J. D. Powell, M. L. Workman, *Digital Control of Dynamic Systems*, 3rd ed.,
@@ -617,7 +617,7 @@ def step_coefficients(
 def _exponential(w: float, c: float, h: float) -> tuple[float, ...]:
     from scipy.linalg import expm
 
-    # Scaled to v·h and f·h², so that the matrix's entries are of one size.
+    # Scaled to v·h and f·h², so that the matrix's entries have similar magnitude.
     system = np.zeros((4, 4))
     system[0, 1] = 1.0
     system[1, :3] = -((w * h) ** 2), -c * h, 1.0

@@ -1,4 +1,4 @@
-"""The flexible pair as plain numbers, which compiled code reads."""
+"""The flexible pair as plain numbers for compiled code."""
 
 from __future__ import annotations
 
@@ -42,31 +42,31 @@ from sims.reduced_fe._contact import (
     teeth_of,
 )
 
-# Bearings with rolling elements as springs about their static load: softness across it, feet that move.
+# Rolling-element bearings as springs about their static load: softer across it, with moving feet.
 #
-# A bearing with clearance c that its load presses to one side by δ = Q/k is as stiff as it is along the load, and only
-# k δ/(c + δ) across it, as the shaft may roll along the race. Rolling elements that pass move the spring's foot: over a
-# spall it sinks, with clearance it sways (see `sims.gear_pair`). Their load is that of the torque at this moment,
-# without the vibration; a load that lets the shaft lift is refused.
+# A bearing with clearance c, pressed to one side by its load by δ = Q/k, has its stiffness k along the load, but only
+# k δ/(c + δ) across it, as the shaft may roll along the race. Passing rolling elements move the spring's foot: it sinks
+# over a spall, and moves with element passage where there is clearance (see `sims.gear_pair`). Their load is that of
+# the present torque, without vibration; a load that lets the shaft lift is rejected.
 
 ROLLING_FIELDS: list[tuple[str, type, tuple[int, ...]]] = [
     *BEARING_FIELDS,
-    ("bearing_yield", np.float64, (4, 2)),  # by the load of the nominal torque, m
+    ("bearing_yield", np.float64, (4, 2)),  # deflection at the nominal torque, m
     ("bearing_play", np.float64, (4, 2)),  # clearance towards the load, m
     ("bearing_spring", np.float64, (4, 2, 2)),
 ]
-"""Of the kernel's record, one entry per bearing."""
+"""Fields of the kernel's record, one entry per bearing."""
 
 
 class Spring(NamedTuple):
-    """Stiffness in one direction."""
+    """A stiffness in one direction."""
 
     direction: FloatArray
     n_per_m: float
 
 
 def bearing_springs(support: BearingSupport, load_n: FloatArray) -> tuple[Spring, Spring]:
-    """Return a bearing's springs: along x and y, or with clearance along its load and across it."""
+    """Return a bearing's springs: along x and y, or, with clearance, along and across its load."""
     k, clearance, load = support.stiffness_n_per_m, support.clearance_um * 1e-6, float(np.hypot(*load_n))
     if clearance == 0.0:
         return Spring(np.array([1.0, 0.0]), k), Spring(np.array([0.0, 1.0]), k)
@@ -78,12 +78,12 @@ def bearing_springs(support: BearingSupport, load_n: FloatArray) -> tuple[Spring
 def rolling_fields(
     machine: Machine, operation: Operation, force_n: float, loads_n: FloatArray, rng: np.random.Generator
 ) -> dict[str, Any]:
-    """Values of `ROLLING_FIELDS` at the set mesh force; draws the elements' places.
+    """Values of `ROLLING_FIELDS` at the set mesh force; draws the elements' positions in the cage.
 
     Raises
     ------
     InputError
-        If a bearing with clearance is not loaded all the time.
+        If a bearing with clearance is not always loaded.
     """
     _check_load(machine, operation)
     springs = np.zeros((4, 2, 2))
@@ -113,24 +113,24 @@ def _check_load(machine: Machine, operation: Operation) -> None:
             f"torque_nm falls to {smallest_nm:g} N m and {loose.bearing.name!r} has clearance: "
             "the shaft would lift in it",
             where="clearance_um",
-            allowed="a torque above 0 all the time, or no clearance",
+            allowed="a torque always above 0, or no clearance",
             remedy="take the model 'cracked', whose bearings let the shaft lift",
         )
 
 
-# The elastic connection between a gear's body and its hub, where shaft, bearings and hub inertia hold it.
+# The elastic connection between a gear's body and its hub, which carries shaft, bearings and hub inertia.
 
 PLANE = (0, 1, 5)
-"""Of the hub's six motions those in the gear's plane: along x, along y, about z."""
+"""Indices of the hub's motions in the gear's plane: along x, along y, about z."""
 
 
 @dataclass(frozen=True)
 class HubSprings:
-    """What is left of the elastic motion between body, hub and flanks beside the kept modes, in the frame of the gear.
+    """Residual elastic motion between body, hub and flanks, besides the kept modes, in the frame of the gear.
 
-    A force F on the hub and pushes N move the hub by H F + Sᵀ N against the body and its modes. With the hub's place
-    given instead, F = (u_hub − u_body − ψᵀq − SᵀN)/H: springs 1/H, by which the flanks move with S/H and are stiffer by
-    S Sᵀ/H. By symmetry H is diagonal, and alike along x and y.
+    A force F on the hub and pushes N move the hub by H F + Sᵀ N relative to the body and its modes. If the hub's
+    position is given instead, F = (u_hub − u_body − ψᵀq − SᵀN)/H: springs 1/H, through which the flanks move with S/H
+    and are stiffer by S Sᵀ/H. By symmetry H is diagonal, and equal along x and y.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ class HubSprings:
 
     @classmethod
     def of(cls, gear: ReducedGear, kept: NDArray[np.int64]) -> HubSprings:
-        """Return those of a gear beside the kept modes, of which none may move the hub along x or y."""
+        """Return those of a gear besides the kept modes, none of which may move the hub along x or y."""
         hub = gear.hub_modes[kept][:, PLANE]
         soft = hub / gear.angular_frequencies_rad_s[kept, None] ** 2
         compliance = np.diag(gear.hub_compliance)[list(PLANE)] - np.sum(soft * hub, axis=0)
@@ -156,9 +156,9 @@ class HubSprings:
     def seen_from_the_line_of_action(
         self, gear: ReducedGear, mesh: GearMesh, index: int, progress: FloatArray
     ) -> FloatArray:
-        """S over ζ in the frame of the shafts, (n, n_slices, 3): along x, along the line of action, in its own sense.
+        """S over ζ in the frame of the shafts, (n, n_slices, 3): along x, along the line of action, and in rotation.
 
-        The push points into the tooth: against y for the driver, along y for the driven gear.
+        The push is directed into the tooth: against y for the driver, along y for the driven gear.
         """
         tau = gear.grid.roll_rad
         load = tau - gear.blank.geometry.base_half_angle_rad
@@ -179,7 +179,7 @@ def slice_rolls_rad(gear: ReducedGear, mesh: GearMesh, index: int, progress: Flo
 def without_hub(
     table: ContactTable, mesh: GearMesh, gears: tuple[ReducedGear, ReducedGear], hubs: tuple[HubSprings, HubSprings]
 ) -> ContactTable:
-    """Return the table with the hubs' places given: less what flanks move by the springs of their hubs."""
+    """Return the table for given hub positions: less the motion of the flanks through the hub springs."""
     direct, cross = table.direct.copy(), table.cross.copy()
     for index, (gear, hub) in enumerate(zip(gears, hubs, strict=True)):
         of_hub = hub.seen_from_the_line_of_action(gear, mesh, index, table.progress)
@@ -192,11 +192,11 @@ def without_hub(
 
 # One side of the pair as modes: rotor, shaft, bearings, hub, the gear's body, and its elastic modes.
 #
-# The elastic modes stay in the frame of the gear and the contact moves over them: no matrix is ever turned under a
-# state that stays. Modes of nodal diameter n ≥ 2 do not move the hub, so that they stand beside the shaft line's modes;
-# those of n = 0 twist it and are joined with them. Modes of n = 1 move the hub across the shaft, which turns against
-# them; they are left to the static compliance. What is not kept acts between hub and body as springs, see
-# `sims.reduced_fe`.
+# The elastic modes stay in the frame of the gear and the contact moves over them, so that no matrix is ever rotated
+# under a constant state. Modes of nodal diameter n ≥ 2 do not move the hub and are independent of the shaft line's
+# modes; those of n = 0 twist it and are coupled with them. Modes of n = 1 move the hub across the shaft, which rotates
+# relative to them; they are left to the static compliance. What is not kept acts as springs between hub and body, see
+# `HubSprings`.
 
 COORDINATES = (
     "rotor angle",
@@ -211,8 +211,8 @@ COORDINATES = (
     "hub y",
     "hub angle",
 )
-"""Of a side: rad and m; "first" and "second" are its two bearings. Those of the gear are of its body as a whole,
-the hub's of its bore."""
+"""Coordinates of a side in rad and m; "first" and "second" are its two bearings. Those of the gear are for its body as
+a whole, those of the hub for its bore."""
 ROTOR, GEAR, X, Y, HUB_X, HUB = 0, 1, 2, 3, 8, 10
 INPUTS = (
     "rotor torque",
@@ -225,15 +225,16 @@ INPUTS = (
     "second y force",
     "even acceleration",
 )
-"""Generalised forces that act on a side besides the contact, those of bearings on the shaft in them; the last is minus
-one of the whole side turning."""
+"""Generalised forces on a side in addition to the contact, including those of bearings on the shaft; the last is minus
+that of an even rotation of the whole side."""
 MIN_PART = 1e-3
-"""Static part of a mode at the flank, of the greatest one: modes below it are left to the residual compliance."""
+"""Static contribution of a mode at the flank, relative to the largest, below which it is left to the residual
+compliance."""
 ABOUT_Z = 5
 MIN_HUB = 1e-4
-"""Mass and inertia of a hub that has none of its own, of the body's: they let the bore move by itself."""
+"""Minimum mass and inertia of a hub relative to the body's, so that the bore can move by itself."""
 INERTIA_TOLERANCE = 0.02
-"""Part by which a gear's total inertia may be below the finite-element body's before it is refused."""
+"""Fraction by which a gear's total inertia may be below that of the finite-element body."""
 
 
 @dataclass(frozen=True)
@@ -243,9 +244,9 @@ class RetainedModes:
     Parameters
     ----------
     single : int array
-        Places of modes that stand alone (n = 0 or z/2).
+        Indices of single modes (n = 0 or z/2).
     pairs : int array, (n_pairs, 2)
-        Places of cosine and sine modes.
+        Indices of cosine and sine modes.
     """
 
     single: NDArray[np.int64]
@@ -253,7 +254,7 @@ class RetainedModes:
 
     @property
     def all(self) -> NDArray[np.int64]:
-        """Of every kept mode, ascending."""
+        """Indices of all kept modes, ascending."""
         return np.sort(np.concatenate((self.single, self.pairs.ravel())))
 
 
@@ -261,13 +262,13 @@ class RetainedModes:
 class FlexibleSide:
     """Modal model of one side.
 
-    Modes stand in the order: single ones that the contact moves, pairs (all cosine modes, then all sine modes), silent.
+    Order of the modes: single ones excited by the contact, pairs (all cosine modes, then all sine modes), silent ones.
 
     Parameters
     ----------
-    omega_rad_s, damping_ratio : arrays, (n_modes,)
+    omega_rad_s : array, (n_modes,)
     damping_rate : array, (n_modes,)
-        2ζω; of a rigid mode too.
+        2ζω; also given for rigid modes.
     shapes : array, (11, n_modes)
         `COORDINATES` in each mode.
     inputs : array, (9, n_modes)
@@ -277,9 +278,9 @@ class FlexibleSide:
     rows : array, (n, n_slices, n_single + 2 n_pairs)
         ∂D/∂η over ζ, seen from the tooth in contact.
     rigid : array, (n_modes,)
-        ∂D/∂η of the rigid gear alone.
+        ∂D/∂η of the rigid gear.
     diameters : array, (n_pairs,)
-        n of the pairs, with the sign of the side.
+        Nodal diameters n of the pairs, with the sign of the side.
     n_single, n_pairs : int
     """
 
@@ -296,21 +297,21 @@ class FlexibleSide:
 
     @property
     def n_modes(self) -> int:
-        """Of the shaft line and the gear together."""
+        """Number of modes of shaft line and gear."""
         return len(self.omega_rad_s)
 
     @property
     def moving(self) -> NDArray[np.bool_]:
-        """Modes that are the side's own, (n_modes,): not those added so that both sides have as many."""
+        """Whether a mode belongs to the side, (n_modes,), and is not padding to equal numbers of modes."""
         moves: NDArray[np.bool_] = np.any(self.shapes != 0.0, axis=0)
         moves[: self.rows.shape[2]] |= np.any(self.rows != 0.0, axis=(0, 1))
         return moves
 
 
 def kept_modes(gear: ReducedGear, limit_hz: float, groups: FloatArray) -> RetainedModes:
-    """Choose the elastic modes up to a frequency that matter at the driving flank; a pair is kept or left as a whole.
+    """Select the elastic modes up to a frequency that matter at the driving flank; pairs are kept or dropped together.
 
-    `groups`: see `sims.reduced_fe`; modes that bend the face's halves against each other move no group.
+    `groups`: see `mirror_groups`; modes that bend the halves of the face against each other move no group.
     """
     flank = gear.flank_modes.reshape(gear.n_modes, *gear.grid.shape)[:, FLANK] @ (groups / groups.sum(axis=0))
     part = np.max(flank.reshape(gear.n_modes, -1) ** 2, axis=1) / gear.angular_frequencies_rad_s**2
@@ -323,7 +324,7 @@ def kept_modes(gear: ReducedGear, limit_hz: float, groups: FloatArray) -> Retain
 
 
 def residual_compliance(gear: ReducedGear, teeth: list[int], kept: NDArray[np.int64]) -> FloatArray:
-    """Free compliance less that of the modes at these places, C − Σ φφᵀ/ω²; never one of a pair without the other."""
+    """Free compliance less that of the kept modes, C − Σ φφᵀ/ω², (n, n); `kept` must hold both modes of a pair."""
     modes = np.hstack([gear.modes_at(t)[kept] for t in teeth]) / gear.angular_frequencies_rad_s[kept, None]
     return gear.compliance_m_per_n(teeth) - modes.T @ modes
 
@@ -338,7 +339,7 @@ def build_side(
     body_damping_ratio: float,
     loads_n: FloatArray,
 ) -> FlexibleSide:
-    """Return the modes of the driver's side (0) or the driven one (1); `loads_n` (4, 2) press the bearings.
+    """Return the modes of the driver's side (0) or the driven side (1); `loads_n` (4, 2) are the bearing loads.
 
     Raises
     ------
@@ -371,7 +372,7 @@ def build_side(
     elastic_omega = gear.angular_frequencies_rad_s[elastic_modes]
 
     def joined(train: FloatArray, rest: FloatArray) -> FloatArray:
-        """Modes that stand alone, pairs, silent ones; modes along the last axis."""
+        """Join single modes, pairs and silent modes along the last axis."""
         return np.concatenate((train[..., line[0]], rest, train[..., line[1]]), axis=-1)
 
     zero = np.zeros(len(elastic_modes))
@@ -393,7 +394,7 @@ def build_side(
 
 
 def _elastic_rows(machine: Machine, index: int, gear: ReducedGear, table: ContactTable, mean: FloatArray) -> FloatArray:
-    """∂D/∂q of all elastic modes at tooth 0, (n, n_groups, n_modes): minus the push displacement."""
+    """∂D/∂q of all elastic modes at tooth 0, (n, n_groups, n_modes): minus the displacement along the push."""
     roll = slice_rolls_rad(gear, machine.mesh, index, table.progress)
     flank = gear.flank_modes.reshape(gear.n_modes, *gear.grid.shape)[:, FLANK]
     of_slices = over_height(gear.grid.roll_rad, np.moveaxis(flank, 0, -1), roll)
@@ -428,7 +429,7 @@ def _matrices(
     body_damping_ratio: float,
     loads_n: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """M, K and C over `COORDINATES` and the modes that twist the hub."""
+    """M, K and C for `COORDINATES` and the modes that twist the hub."""
     n, n_coordinates = len(COORDINATES) + len(modes), len(COORDINATES)
     shaft, bearings = machine.shafts[index], machine.bearings[2 * index : 2 * index + 2]
     hub_kg, hub_kg_m2 = hub_inertia(machine, index, gear)
@@ -470,7 +471,7 @@ def _matrices(
 
 
 def _modes_of(stiffness: FloatArray, mass: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Squared angular frequencies, rising, rigid ones exactly 0, and mass-normalised shapes."""
+    """Squared angular frequencies, ascending, rigid ones exactly 0, and mass-normalised shapes."""
     from scipy.linalg import eigh
 
     squares, shapes = eigh(stiffness, mass)
@@ -479,7 +480,7 @@ def _modes_of(stiffness: FloatArray, mass: FloatArray) -> tuple[FloatArray, Floa
 
 
 def _input_places(n: int, even: FloatArray) -> FloatArray:
-    """Generalised forces of unit `INPUTS`, (7, n)."""
+    """Generalised forces of unit `INPUTS`, (9, n)."""
     places = np.zeros((len(INPUTS), n))
     for row, coordinate in enumerate((ROTOR, GEAR, X, Y, 4, 5, 6, 7)):
         places[row, coordinate] = 1.0
@@ -488,11 +489,11 @@ def _input_places(n: int, even: FloatArray) -> FloatArray:
 
 
 MODE_LIMIT_HZ = 20000.0
-"""Elastic modes up to here are kept; the others follow at once."""
+"""Elastic modes up to here are kept; the others are quasi-static."""
 SMALL_PART = 1e-3
-"""Of the nominal force on a slice: below it the local contact is straight."""
+"""Fraction of the nominal force on a slice below which the local contact is linear."""
 MIN_FORCE_N = 50.0
-"""Mesh force for which stiffness and damping are taken where the torque is smaller."""
+"""Minimum mesh force for which stiffness and damping are determined."""
 
 _SCALARS = (
     "start",
@@ -516,7 +517,7 @@ RECORD = np.dtype(
     + ROLLING_FIELDS,
     align=True,
 )
-"""SI units; of a side in pairs (driver, driven)."""
+"""Fields in SI units; those per side in pairs (driver, driven)."""
 
 
 @dataclass(frozen=True)
@@ -527,15 +528,14 @@ class FlexiblePair:
     ----------
     machine : Machine
         Masses and inertias of its wheels are those of gear, hub and shaft together; its contact law and the gears'
-        stiffness by potential energy are not used. `mesh_damping_ratio` is that of the torsional mode in all:
-        the contact has the damping that shafts, bearings and bodies leave wanting.
+        stiffness by potential energy are not used. `mesh_damping_ratio` is the total for the torsional mode: the
+        contact supplies the damping that shafts, bearings and bodies lack.
     gears : (ReducedGear, ReducedGear)
     body_damping_ratio : float
         Of the elastic modes of the gears.
     restitution : float or None
-        None: contact by its compliance alone. A number e: at first contact after a loss the closing speed of the gears
-        becomes −e times itself, on top of the compliance. That counts an impact twice; it is here for comparison with
-        models that do.
+        None: contact through its compliance alone. A number e: at first contact after a loss the closing speed of the
+        gears is also multiplied by −e. That counts an impact twice; it serves for comparison with models that do so.
     mode_limit_hz : float
     """
 
@@ -558,13 +558,13 @@ class FlexiblePair:
             )
 
     def maps(self, torque_nm: FloatArray | None = None, mesh_cycles: FloatArray | None = None) -> MeshMaps:
-        """Return the static maps of this pair."""
+        """Return the static contact maps of this pair."""
         return mesh_maps(self.gears, self.machine.mesh, torque_nm, mesh_cycles)
 
 
 @dataclass(frozen=True)
 class FlexiblePairConstants:
-    """What compiled code reads; see `sims.reduced_fe.march`.
+    """Input of compiled code; see `march`.
 
     Parameters
     ----------
@@ -586,11 +586,11 @@ class FlexiblePairConstants:
 
     @property
     def omega_rad_s(self) -> FloatArray:
-        """Of all modes, (2, n_modes)."""
+        """Angular frequencies of all modes, (2, n_modes)."""
         return np.array([s.omega_rad_s for s in self.sides])
 
     def stacked(self, name: str) -> FloatArray:
-        """A field of both sides, driver first, contiguous."""
+        """Stack a field of both sides, driver first, as a contiguous array."""
         return np.ascontiguousarray(np.array([getattr(s, name) for s in self.sides]))
 
     def turn(self) -> FloatArray:
@@ -607,15 +607,15 @@ class FlexiblePairConstants:
 def constants(
     pair: FlexiblePair, operation: Operation, *, rng: np.random.Generator | None = None
 ) -> FlexiblePairConstants:
-    """Turn a flexible pair into plain numbers.
+    """Convert a flexible pair to plain numbers.
 
     Parameters
     ----------
     pair : FlexiblePair
     operation : Operation
-        Its greatest torque sets the scale of forces and the damping of the contact.
+        Its maximum torque sets the scale of forces and the damping of the contact.
     rng : numpy.random.Generator or None
-        Draws the places of rolling elements in bearings with a defect; None: always the same ones.
+        Draws the positions of rolling elements in bearings with a defect; None: always the same ones.
     """
     machine, mesh = pair.machine, pair.machine.mesh
     base = np.array(mesh.pair.base_radii_m)
@@ -659,7 +659,7 @@ def constants(
 
 
 def _contact(pair: FlexiblePair) -> tuple[ContactTable, list[RetainedModes], FloatArray]:
-    """Residual contact, the modes that are kept beside it, and which slices stand together."""
+    """Residual contact table, the kept modes of each gear, and the groups of slices."""
     n_slices = len(pair.gears[0].grid.z_m)
 
     def made(groups: FloatArray) -> tuple[ContactTable, list[RetainedModes]]:
@@ -681,7 +681,7 @@ def _contact(pair: FlexiblePair) -> tuple[ContactTable, list[RetainedModes], Flo
 
 
 def back_rows(machine: Machine, sides: tuple[FlexibleSide, FlexibleSide]) -> FloatArray:
-    """∂D/∂η of the flanks behind, (2, n_modes): along their own line of action, the bodies rigid."""
+    """∂D/∂η of the back flanks, (2, n_modes), along their own line of action, with rigid bodies."""
     alpha = machine.mesh.pair.working_pressure_angle_rad
     rows = []
     for sign, radius, side in zip((1.0, -1.0), machine.mesh.pair.base_radii_m, sides, strict=True):
@@ -691,7 +691,7 @@ def back_rows(machine: Machine, sides: tuple[FlexibleSide, FlexibleSide]) -> Flo
 
 
 def mean_stiffness_n_per_m(pair: FlexiblePair, force_n: float) -> float:
-    """Tangent stiffness of the healthy mesh at a force, mean over a mesh cycle."""
+    """Tangent stiffness of the healthy mesh at a given force, mean over a mesh cycle."""
     healthy = pair.machine.mesh.healthy
     torque = np.array([force_n * healthy.pair.driver.base_radius_mm * 1e-3])
     table = static_table(pair.gears, healthy)
@@ -699,7 +699,7 @@ def mean_stiffness_n_per_m(pair: FlexiblePair, force_n: float) -> float:
 
 
 def _padded(sides: list[FlexibleSide]) -> tuple[FlexibleSide, FlexibleSide]:
-    """Both sides with the same numbers of single, paired and silent modes; what is added never moves."""
+    """Pad both sides to equal numbers of single, paired and silent modes; the padding never moves."""
     single, pairs = (max(getattr(s, name) for s in sides) for name in ("n_single", "n_pairs"))
     silent = max(s.n_modes - s.n_single - 2 * s.n_pairs for s in sides)
     first, second = (_pad(s, single, pairs, silent) for s in sides)
@@ -735,23 +735,23 @@ def _pad(side: FlexibleSide, single: int, pairs: int, silent: int) -> FlexibleSi
     )
 
 
-# The pair as a linear system about its loaded state: its undamped modes, the torsional one among them.
+# The pair linearised about its loaded state: its undamped modes, including the torsional one.
 
 MIN_TORSIONAL_HZ = 200.0
-"""Modes below it are those of rotors on their couplings."""
+"""Lower modes are those of rotors on their couplings."""
 
 
 @dataclass(frozen=True)
 class TorsionalMode:
-    """The mode in which the flanks move most against each other, mean over a mesh cycle.
+    """The mode with the largest relative motion of the flanks, mean over a mesh cycle.
 
     Parameters
     ----------
     frequency_hz : float
     contact_part : float
-        Part of its energy that lies in the compliance of the contact.
+        Fraction of its energy in the compliance of the contact.
     other_damping_ratio : float
-        ζ by shafts, bearings and gear bodies alone.
+        ζ due to shafts, bearings and gear bodies alone.
     """
 
     frequency_hz: float
@@ -759,7 +759,7 @@ class TorsionalMode:
     other_damping_ratio: float
 
     def damping_time_s(self, damping_ratio: float) -> float:
-        """Time τ of the contact's damping, with which the mode has a damping ratio in all; 0 if it has more without.
+        """Time τ of the contact's damping for a total damping ratio of the mode; 0 if the others already exceed it.
 
         2ζω = 2ζ₀ω + τ ω² · contact part
         """
@@ -776,9 +776,9 @@ def torsional_mode(
     ----------
     pair : FlexiblePair
     operation : Operation
-        Its greatest torque loads the contact.
+        Its maximum torque loads the contact.
     ready : FlexiblePairConstants or None
-        Where they are at hand.
+        If already made.
     """
     pair_constants = constants(pair, operation) if ready is None else ready
     modes = torsional_over_cycle(pair, pair_constants, operation, one_mesh_cycle(20))
@@ -788,7 +788,7 @@ def torsional_mode(
 def torsional_over_cycle(
     pair: FlexiblePair, pair_constants: FlexiblePairConstants, operation: Operation, mesh_cycles: FloatArray
 ) -> FloatArray:
-    """Frequency, contact part and damping ratio of others at each mesh angle, (n_c, 3)."""
+    """Fields of `TorsionalMode` at each mesh angle, (n_c, 3)."""
     rates = np.concatenate([side.damping_rate for side in pair_constants.sides])
     modes = []
     for c in mesh_cycles:
@@ -804,7 +804,7 @@ def torsional_over_cycle(
 def undamped_modes(
     pair: FlexiblePair, pair_constants: FlexiblePairConstants, operation: Operation, cycles: float
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Squared angular frequencies, shapes, and what `contact_rows` returns, at one mesh angle."""
+    """Squared angular frequencies, shapes, and the results of `contact_rows`, at one mesh angle."""
     rows, stiff = contact_rows(pair, pair_constants, operation, cycles)
     k = np.diag(np.concatenate([side.omega_rad_s for side in pair_constants.sides]) ** 2) + rows.T @ stiff @ rows
     squares, shapes = np.linalg.eigh(k)
@@ -814,7 +814,7 @@ def undamped_modes(
 def contact_rows(
     pair: FlexiblePair, pair_constants: FlexiblePairConstants, operation: Operation, cycles: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return ∂D/∂η of the points that touch under the set torque, (n, n_modes), and their stiffness, (n, n)."""
+    """Return ∂D/∂η of the points in contact at the set torque, (n, n_modes), and their stiffness, (n, n)."""
     force = max(operation.torque_nm.largest / pair_constants.base_radius_m[0], MIN_FORCE_N)
     at = contact_state(pair_constants.table, pair.machine.mesh, force, cycles)
     driver, driven = pair_constants.sides

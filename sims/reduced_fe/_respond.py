@@ -31,25 +31,25 @@ from sims.reduced_fe._pair import (
     undamped_modes,
 )
 
-# Whether a step can be followed: errors must not grow from step to step.
+# Stability of a step: errors must not grow from step to step.
 #
-# A contact that is stiff or strongly damped against the light parts behind it answers a step by more than it was taken
-# with. What comes of it is bounded by the loss of contact and looks like impacts.
+# A contact that is stiff or strongly damped relative to the light parts behind it amplifies errors at each step. The
+# result is bounded by the loss of contact and looks like impacts.
 
 MAX_GROWTH = 1e-4
-"""Of errors in a step. Without any damping steps of 5 µs have 4e-7; those that cannot be followed 1e-2 and more."""
+"""Maximum growth of errors per step. Without damping, steps of 5 µs have 4e-7; unstable steps have 1e-2 and more."""
 N_POINTS = 5
 MAX_HALVINGS = 3
 USUAL_HUB = 2.0
-"""Inertia of a hub over its toothed body's."""
+"""Upper end of usual hub inertias, relative to the toothed body."""
 
 
 def followed_step_s(
     pair: FlexiblePair, pair_constants: FlexiblePairConstants, operation: Operation, longest_s: float
 ) -> float:
-    """Return the step, or its half, quarter or eighth, that the contact can be followed with in one pass.
+    """Return the step, or its half, quarter or eighth, with which one pass can follow the contact.
 
-    Where none can, the longest: `check_step` then says why.
+    If none can, return the longest; `check_step` then gives the reason.
     """
     for halvings in range(MAX_HALVINGS + 1):
         step = longest_s * 0.5**halvings
@@ -62,10 +62,10 @@ def followed_step_s(
 def growth(
     pair: FlexiblePair, pair_constants: FlexiblePairConstants, operation: Operation, coefficients: FloatArray
 ) -> float:
-    """Return by how much errors of the loaded, linear pair grow in a step of one pass, at the worst of some angles.
+    """Return the growth of errors of the loaded, linear pair in a one-pass step, at the worst of several mesh angles.
 
-    The spectral radius, less 1, of the map of (q, v, f, f of the step before) that `integrate_kernel.march` makes, with
-    the contact as springs S and dampers τS between ∂D/∂η·q.
+    It is the spectral radius, less 1, of the map of (q, v, f, f of the step before) by `march`, with the contact as
+    springs S and dampers τS between ∂D/∂η·q.
 
     Parameters
     ----------
@@ -100,12 +100,12 @@ def check_step(
     coefficients: FloatArray,
     method: Method,
 ) -> None:
-    """Refuse a step in which errors grow, or, of the method that repeats its passes, one whose passes do not settle.
+    """Reject a step in which errors grow, or, for the method with repeated passes, one whose passes do not converge.
 
     Raises
     ------
     InputError
-        Where hubs are too heavy for their teeth, the damping ratio is too great, or the step too long.
+        If hubs are too heavy for their teeth, the damping ratio is too high, or the step is too long.
     """
     if method == "exponential" and growth(pair, pair_constants, operation, coefficients) <= MAX_GROWTH:
         return
@@ -114,10 +114,10 @@ def check_step(
     hubs = [hub_inertia(pair.machine, i, gear)[1] / gear.polar_inertia_kg_m2 for i, gear in enumerate(pair.gears)]
     worst = int(np.argmax(hubs))
     raise InputError(
-        f"the contact is stiffer or damped more than its gears can follow: hubs turn with {hubs[0]:.2g} and "
+        f"the contact is too stiff or too strongly damped for its gears: hubs have {hubs[0]:.2g} and "
         f"{hubs[1]:.2g} times the inertia of the toothed bodies, damping ratio {pair.machine.mesh_damping_ratio:g}",
         where=f"hub_inertia_{('driver', 'driven')[worst]}_kg_m2" if hubs[worst] > USUAL_HUB else "mesh_damping_ratio",
-        allowed="6 times at a damping ratio of 0.08, or 0.2 with lighter hubs, or so",
+        allowed="about 6 times at a damping ratio of 0.08, or 0.2 with lighter hubs",
         remedy="give hubs that suit the gears, lower mesh_damping_ratio, or give a shorter step",
     )
 
@@ -125,7 +125,7 @@ def check_step(
 def _pass_gain(
     pair: FlexiblePair, pair_constants: FlexiblePairConstants, operation: Operation, coefficients: FloatArray
 ) -> float:
-    """Change of a contact force over that of the force that a pass was made with: below 1 passes settle."""
+    """Change of a contact force over that of the force assumed in a pass: passes converge if it is below 1."""
     moved = np.concatenate(coefficients[:, 5] + float(pair_constants.record["damping_time"]) * coefficients[:, 7])
     gain = 0.0
     for cycles in one_mesh_cycle(N_POINTS):
@@ -135,13 +135,13 @@ def _pass_gain(
 
 
 STEP_S = 5e-6
-"""Step where none is given; see `sims.reduced_fe` for what it costs in accuracy."""
+"""Default step; see `check_convergence` for its accuracy."""
 STEPS_PER_CALL = 100_000
-"""Compiled code cannot be interrupted: it comes back for a look every quarter of a second or so."""
+"""Compiled code cannot be interrupted, so it returns about every quarter of a second."""
 MOVING = COORDINATES
-"""Places in rad and m, each also with " velocity" and " acceleration". Those of gears are of their hubs."""
+"""Coordinates in rad and m, each also with " velocity" and " acceleration". Those of gears are of their hubs."""
 EXTRAS = ("mesh_force_n", "back_force_n", "mesh_cycles", "approach_m", "contact_torque_nm", "friction_n", *DEFLECTIONS)
-"""Sum of the contact forces, the force behind, c, the greatest approach of flanks, torque of moving stiffness, friction
+"""Sum of the contact forces, back-flank force, c, maximum approach of flanks, torque of the moving stiffness, friction
 along x on the driven gear, and `sims.gear_pair.DEFLECTIONS`."""
 TRANSMISSION_ERROR = "transmission_error_m"
 """r_b1 θ1 − r_b2 θ2 of the hubs."""
@@ -149,7 +149,7 @@ KINDS = ("", " velocity", " acceleration")
 
 
 class FlexState(NamedTuple):
-    """Where a flexible pair is: what a later run needs to go on from there; see `integrate_kernel.march`."""
+    """State of a flexible pair from which a later run can continue; see `march`."""
 
     q: FloatArray
     v: FloatArray
@@ -162,7 +162,7 @@ class FlexState(NamedTuple):
 
 
 FlexResponse = PairResponse[FlexState]
-"""Of a run: signals of `signal_names`, and where it ended."""
+"""Response of a run: signals of `signal_names`, and its last state."""
 
 
 @one_thread()
@@ -180,7 +180,7 @@ def respond(
     first: FlexState | None = None,
     ready: FlexiblePairConstants | None = None,
 ) -> FlexResponse:
-    """Integrate from the static balance on, or from where another run ended.
+    """Integrate a flexible pair from static equilibrium, or from the end of another run.
 
     Parameters
     ----------
@@ -189,28 +189,28 @@ def respond(
         Set speed and torque; time 0 of their profiles is time 0 here.
     duration_s : float
     signals : sequence of str
-        Of `signal_names`.
+        From `signal_names`.
     start_s : float
         First time; below 0 for a lead-in.
     step_s : float
     stride : int
-        Every how many steps a point is kept.
+        Steps per kept point.
     method : str
-        "exponential": fast, each step taken once. "newmark": the reference; average acceleration, each step repeated
-        until forces stay to 1e-11.
+        "exponential": fast, one pass per step. "newmark": the reference; average acceleration, each step repeated
+        until forces converge to 1e-11.
     with_energy : bool
         Meaningful without set speed, damping, governor and weight.
     first : FlexState or None
-        `FlexResponse.last` of another run; None: the static balance at `start_s`.
+        `FlexResponse.last` of another run; None: static equilibrium at `start_s`.
     ready : FlexiblePairConstants or None
-        Of this pair and operation, where they are at hand.
+        Those of this pair and operation, if already made.
 
     Raises
     ------
     InputError
-        On an unknown signal, a run of too many steps, or a contact damped more than its gears can follow.
+        For an unknown signal, a run of too many steps, or a contact too strongly damped for its gears.
     RefusalError
-        If the solution grows beyond all bounds.
+        If the solution diverges.
     """
     step = positive(step_s, "step_s", "s")
     plan = RunPlan(start_s, duration_s, step, stride, STEPS_PER_CALL)
@@ -246,19 +246,19 @@ def respond(
         part,
         signals,
         with_energy=with_energy,
-        remedy="lower mesh_damping_ratio, look for inertias that do not go together, or give a shorter step",
+        remedy="lower mesh_damping_ratio, check that the inertias are consistent, or give a shorter step",
     )
     return FlexResponse(start_s, step * stride, kept, step, energies, FlexState(*state))
 
 
 def signal_names(ready: FlexiblePairConstants) -> tuple[str, ...]:
-    """Return all signals a run can give."""
+    """Return the names of all signals of a run."""
     moving = [f"{name}{kind}" for kind in KINDS for name in (*MOVING, TRANSMISSION_ERROR)]
     return (*moving, *EXTRAS, *slot_names(ready))
 
 
 def slot_names(ready: FlexiblePairConstants) -> tuple[str, ...]:
-    """Forces of the pairs that may touch, the newest first, then of their slices."""
+    """Names of the forces of the pairs that may be in contact, the newest first, then of their slices."""
     slots, slices = range(ready.table.n_slots), range(ready.table.n_slices)
     return (
         *(f"pair {j} force_n" for j in slots),
@@ -269,7 +269,7 @@ def slot_names(ready: FlexiblePairConstants) -> tuple[str, ...]:
 def _lines(
     pair_constants: FlexiblePairConstants, signals: Sequence[str]
 ) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
-    """Kind, factors and factor of the set angle of each signal."""
+    """Kind, modal factors and factor of the set angle of each signal."""
     shape = (len(signals), 2, pair_constants.sides[0].n_modes)
     kinds, factors, along = np.zeros(len(signals), dtype=np.int64), np.zeros(shape), np.zeros(len(signals))
     extras = (*EXTRAS, *slot_names(pair_constants))
@@ -288,7 +288,7 @@ def _lines(
 
 
 def _place(pair_constants: FlexiblePairConstants, name: str, factors: FloatArray) -> float:
-    """Fill the modal factors of a place; return that of the set angle."""
+    """Fill the modal factors of a coordinate; return that of the set angle."""
     driver, driven = pair_constants.sides
     if name == TRANSMISSION_ERROR:
         factors[0], factors[1] = driver.hub, -driven.hub
@@ -310,20 +310,20 @@ def _place(pair_constants: FlexiblePairConstants, name: str, factors: FloatArray
     return 0.0
 
 
-# Where a run starts: the static balance at the first torque, so that no blow has to die out.
+# Start of a run: static equilibrium at the initial torque, so that no initial impact has to decay.
 
 DEEPEST_M = 1e-3
-"""Beyond any approach of flanks."""
+"""Bound above any approach of flanks."""
 MIN_HZ = 1.0
-"""Of modes that the balance bends; slower ones are rigid motion."""
+"""Minimum frequency of modes that deflect in the equilibrium; slower ones are rigid motion."""
 
 
 def start_state(
     pair: FlexiblePair, pair_constants: FlexiblePairConstants, operation: Operation, start_s: float
 ) -> FlexState:
-    """Return the state in which the flanks carry the first torque, everything turning evenly, tooth 0 at its entry.
+    """Return the state in which the flanks carry the initial torque in steady rotation, with tooth 0 at its entry.
 
-    The modes take the deflection of the mean contact force; the driven side is turned back until the contact carries.
+    The modes have the deflection under the mean contact force; the driven side is turned until the contact carries it.
     """
     torque = float(operation.torque_nm.at(start_s))
     q = np.zeros((2, pair_constants.sides[0].n_modes))
@@ -351,7 +351,7 @@ def start_state(
 
 
 def _closed(pair: FlexiblePair, pair_constants: FlexiblePairConstants, state: FlexState, force: float) -> FlexState:
-    """Turn the driven side as a whole until the flanks carry `force` at ζ = 0."""
+    """Return the state with the driven side turned rigidly until the flanks carry `force` at ζ = 0."""
     from scipy.optimize import brentq
 
     table = pair_constants.table
@@ -370,7 +370,7 @@ def _closed(pair: FlexiblePair, pair_constants: FlexiblePairConstants, state: Fl
     def missing(depth: float) -> float:
         return float(force_map(table, pair.machine.mesh, np.array([depth]), np.zeros(1)).force_n[0, 0]) - force
 
-    # Below 0: a tooth that stands ahead of its place carries before the others would touch.
+    # Below 0: a tooth that is ahead of its position carries before the others would touch.
     depth = float(brentq(missing, -DEEPEST_M, DEEPEST_M, xtol=1e-12))
     q = state.q.copy()
     per_unit = float(rigid.rows[column].mean(axis=0)[free])
@@ -378,29 +378,29 @@ def _closed(pair: FlexiblePair, pair_constants: FlexiblePairConstants, state: Fl
     return state._replace(q=q)
 
 
-# Slow sweeps over speed, up and down: rms of the dynamic transmission error, contact loss, jumps.
+# Slow sweeps over speed, up or down: rms of the dynamic transmission error, contact loss, jumps.
 
 STRIDE = 10
 """Steps per kept point."""
 JUMP = 1.4
-"""Ratio of rms values from which on one is a jump."""
+"""Ratio of rms values from which a change counts as a jump."""
 
 
 @dataclass(frozen=True)
 class SpeedSweep(Result):
-    """What a sweep gives in equal parts of its time.
+    """Results of a sweep in equal parts of its time.
 
     Parameters
     ----------
     speed_rpm : array, (n,)
-        Mean of each part, in the order of time.
+        Mean of each part, in time order.
     mesh_hz : array, (n,)
     rms_m : array, (n,)
-        Of the dynamic transmission error without its mean in the part.
+        Of the dynamic transmission error about its mean in each part.
     minimum_force_n : array, (n,)
         Minimum of the mesh force.
     lost_part : array, (n,)
-        Part of the time without contact on the driving flanks.
+        Fraction of the time without contact on the driving flanks.
     n_steps : int
     step_s : float
     """
@@ -414,14 +414,14 @@ class SpeedSweep(Result):
     step_s: float
 
     def peak_hz(self, low_hz: float, high_hz: float) -> float:
-        """Mesh frequency of the greatest rms value between two others."""
+        """Mesh frequency of the maximum rms value between two frequencies."""
         inside = (self.mesh_hz >= low_hz) & (self.mesh_hz <= high_hz)
         if not np.any(inside):
             raise InputError(f"no part of the sweep lies in {low_hz:g} to {high_hz:g} Hz", where="peak_hz")
         return float(self.mesh_hz[inside][np.argmax(self.rms_m[inside])])
 
     def jump_hz(self, low_hz: float, high_hz: float) -> float | None:
-        """Mesh frequency of the greatest jump of rms, over the part it happens in; None where none exceeds `JUMP`."""
+        """Mesh frequency of the largest jump of the rms value in a range; None if none reaches `JUMP`."""
         inside = np.flatnonzero((self.mesh_hz >= low_hz) & (self.mesh_hz <= high_hz))
         level = np.log(self.rms_m[inside])
         change = np.abs(level[2:] - level[:-2])
@@ -445,11 +445,11 @@ def speed_sweep(
     ----------
     pair : FlexiblePair
     torque_nm : float
-        On the driver. The drive also gives what the rotors need to speed up.
+        On the driver. The drive also supplies the torque that accelerates the rotors.
     first_rpm, last_rpm : float
         Of the driver; up or down.
     duration_s : float
-        Jumps move with the rate of a quick sweep: 100 to 400 rpm/s is slow for a pair of a few kHz.
+        Jumps shift with the rate of a fast sweep: 100 to 400 rpm/s is slow for a pair with a few kHz.
     n_parts : int
     step_s : float
     """
@@ -479,22 +479,23 @@ def speed_sweep(
 
 
 ALLOWED = 0.01
-"""Part by which rms values may differ: those of a motion that loses contact are known no better."""
+"""Allowed relative difference of rms values: with contact loss they are not known more accurately."""
 
 
 def check_convergence(pair: FlexiblePair, operation: Operation, step_s: float, time_s: float = 0.05) -> StepConvergence:
-    """Run a pair the fast way, and by Newmark's method at a quarter of the step, from the same static balance on.
+    """Compare the fast method with Newmark's method at a quarter of the step, from the same static equilibrium.
 
-    Where teeth lose contact and the motion is chaotic, single values part after a while at any step; rms values do not.
+    Where teeth lose contact and the motion is chaotic, single values diverge after a while at any step; rms values do
+    not.
 
     Parameters
     ----------
     pair : FlexiblePair
     operation : Operation
     step_s : float
-        Longest of the fast way, see `followed_step_s`.
+        Maximum step of the fast method, see `followed_step_s`.
     time_s : float
-        Over which runs are compared.
+        Duration of the compared runs.
     """
     pair_constants = constants(pair, operation)
     step = followed_step_s(pair, pair_constants, operation, positive(step_s, "step_s", "s"))
@@ -504,7 +505,7 @@ def check_convergence(pair: FlexiblePair, operation: Operation, step_s: float, t
 
 
 # --------------------
-# Eigenfrequencies of the pair over the mesh angle, as a linear system about its loaded state.
+# Eigenfrequencies of the pair over the mesh angle, linearised about its loaded state.
 # --------------------
 
 
@@ -515,19 +516,19 @@ def eigenfrequencies_hz(
     *,
     ready: FlexiblePairConstants | None = None,
 ) -> FloatArray:
-    """Undamped eigenfrequencies of small motions about the loaded state at each mesh angle, (n_c, n), rising.
+    """Undamped eigenfrequencies of small motions about the loaded state at each mesh angle, (n_c, n), ascending.
 
-    K = diag(ω²) + Σ rows S rowsᵀ with S = (R + h'(N))⁻¹ over the points that touch at the set torque.
+    K = diag(ω²) + Σ rows S rowsᵀ with S = (R + h'(N))⁻¹ over the points in contact at the set torque.
 
     Parameters
     ----------
     pair : FlexiblePair
     operation : Operation
-        Its greatest torque loads the contact.
+        Its maximum torque loads the contact.
     mesh_cycles : array or None
         None: 50 points of a cycle.
     ready : FlexiblePairConstants or None
-        Where they are at hand.
+        If already made.
     """
     pair_constants = constants(pair, operation) if ready is None else ready
     cycles = one_mesh_cycle(50) if mesh_cycles is None else mesh_cycles
@@ -537,29 +538,29 @@ def eigenfrequencies_hz(
 
 
 # --------------------
-# What the way a contact force is spread over nodes does to them: the check of RBE3 patches.
+# Effect of the way in which contact forces are distributed over nodes: the check of RBE3 patches.
 # --------------------
 
 
 SPREADS: tuple[Spread, ...] = ("node", "patch", "section")
 SIZE = MeshSize(n_across=3, n_gap=1, n_up=6, n_rim=2, n_body=2, n_along=1)
-"""A coarse mesh shows best what nodes do: some six rows of cells up the flank."""
+"""A coarse mesh shows the influence of nodes best: about six rows of cells up the flank."""
 N_HEIGHTS = 41
-"""Some three points between two rows of nodes."""
+"""About three points between two rows of nodes."""
 DEGREE = 4
-"""Of the polynomial in the mesh angle that is taken as smooth."""
+"""Degree of the polynomial in the roll angle that counts as smooth."""
 
 
 @dataclass(frozen=True)
 class SpreadingCheck:
-    """The torsional mode over the mesh angle, by how contact forces reach the nodes.
+    """The torsional mode over the mesh angle for each distribution of contact forces over nodes.
 
     Parameters
     ----------
     mesh_cycles : array, (n_c,)
     frequency_hz : mapping of "node", "patch", "section" to arrays, (n_c,)
     ripple : mapping
-        Part by which a tooth's compliance departs from a smooth curve over the height of its flank, rms.
+        Relative rms deviation of a tooth's compliance from a smooth curve over the height of its flank.
     """
 
     mesh_cycles: FloatArray
@@ -568,21 +569,21 @@ class SpreadingCheck:
 
 
 def spreading_check(pair: FlexiblePair, operation: Operation, mesh_cycles: FloatArray) -> SpreadingCheck:
-    """Reduce the pair's gears anew, coarsely, once per way of spreading, and follow the torsional mode.
+    """Reduce the pair's gears again on a coarse mesh, once per distribution, and follow the torsional mode.
 
     Parameters
     ----------
     pair : FlexiblePair
     operation : Operation
-        Its greatest torque loads the contact.
+        Its maximum torque loads the contact.
     mesh_cycles : array
 
     Notes
     -----
     "node": force and motion of one line of nodes across the face, interpolated between lines: the local indentation
-    depends on where between nodes the contact is. "patch": RBE3 over the flank's nodes around the point. "section": the
-    whole cross-section at that height, what the simulations use; its frequencies are higher, as Hertz alone is the
-    indentation there, while nodes and patches add one of their own.
+    depends on the contact's position between nodes. "patch": RBE3 over the flank's nodes around the point. "section":
+    the whole cross-section at that height, as used in the simulations; its frequencies are higher, as the indentation
+    is that of Hertz alone, while nodes and patches add their own.
     """
     frequency: dict[Spread, FloatArray] = {}
     ripple: dict[Spread, float] = {}

@@ -47,7 +47,7 @@ from sims.reduced_fe._respond import (
 )
 from sims.simulator import Parameter, ParameterValue, ParameterValues, SimulationRequest, Values
 
-# The parameters of the flexible pair: those it shares with the 16-DOF pair, and those of its gear bodies.
+# The parameters of the flexible pair: those shared with the 16-DOF pair, and those of its gear bodies.
 
 MEANINGLESS: dict[str, ParameterValue | None] = {
     "contact_law": "linear",
@@ -59,11 +59,11 @@ MEANINGLESS: dict[str, ParameterValue | None] = {
     "inertia_driver_kg_m2": None,
     "inertia_driven_kg_m2": None,
 }
-"""Parameters of the 16-DOF pair that this model lacks, and the values with which its machine is built all the same."""
+"""Parameters of the 16-DOF pair that this model lacks, with the values used to build its machine."""
 
 _CHANGED = {
     "mesh_damping_ratio": {
-        "meaning": "damping ratio of the torsional mode, rotors standing still; the contact gives what others do not",
+        "meaning": "damping ratio of the torsional mode with the rotors fixed; the contact supplies what others do not",
         "default": 0.08,
     },
     "friction": {"default": "off"},
@@ -80,22 +80,20 @@ def _bodies() -> tuple[Parameter, ...]:
             Parameter(f"web_thickness_{side}_mm", "mm", f"web of {whose}; none: a full disc", 0.1, 500, None),
             Parameter(f"rim_thickness_{side}_mm", "mm", f"rim of {whose}; none: 3 modules", 0.1, 500, None),
             Parameter(f"hub_thickness_{side}_mm", "mm", f"hub of {whose}; none: 3 modules", 0.1, 500, None),
-            Parameter(
-                f"hub_inertia_{side}_kg_m2", "kg m^2", f"what hub and shaft add to the inertia of {whose}", 0, 1e5, 0.0
-            ),
-            Parameter(f"hub_mass_{side}_kg", "kg", f"what hub and shaft add to the mass of {whose}", 0, 1e5, 0.0),
+            Parameter(f"hub_inertia_{side}_kg_m2", "kg m^2", f"inertia that hub and shaft add to {whose}", 0, 1e5, 0.0),
+            Parameter(f"hub_mass_{side}_kg", "kg", f"mass that hub and shaft add to {whose}", 0, 1e5, 0.0),
         ]
     return tuple(parameters)
 
 
 _DYNAMICS = (
     Parameter("body_damping_ratio", "", "damping ratio of the elastic modes of the gears", 0, 0.5, 0.08),
-    Parameter("mode_limit_hz", "Hz", "elastic modes up to here move; those above follow at once", 500, 1e5, 20000.0),
+    Parameter("mode_limit_hz", "Hz", "limit of dynamic elastic modes; higher ones are quasi-static", 500, 1e5, 20000.0),
     Parameter(
         "restitution",
         "",
-        "of the gears' impact at first contact after a loss, on top of the compliance, which counts it twice; none: "
-        "the compliance alone",
+        "of the gears' impact at first contact after a loss, in addition to the compliance, which counts it twice; "
+        "none: the compliance alone",
         0,
         1,
         None,
@@ -103,7 +101,7 @@ _DYNAMICS = (
     Parameter(
         "step_us",
         "us",
-        "longest step of the integrator; shortened to what the contact needs and to a part of the sampling interval",
+        "maximum integration step; shortened to what the contact needs and to a fraction of the sampling interval",
         0.1,
         20,
         5.0,
@@ -111,7 +109,7 @@ _DYNAMICS = (
     Parameter(
         "mesh_dof",
         "",
-        "degrees of freedom of each gear's finite elements, where no ready-made gear fits; kept on disk once reduced",
+        "degrees of freedom of each gear's finite elements if no ready-made gear fits; kept on disk once reduced",
         5000,
         1e6,
         277200,
@@ -124,9 +122,9 @@ PARAMETERS: tuple[Parameter, ...] = (
     *_bodies(),
     *_DYNAMICS,
 )
-"""All of them."""
+"""All parameters of the model."""
 FLEXIBLE = frozenset(p.name for p in (*_bodies(), *_DYNAMICS))
-"""Those that the 16-DOF pair does not have."""
+"""Parameters that the 16-DOF pair does not have."""
 
 NAME = "reduced-fe"
 
@@ -144,7 +142,7 @@ class PreparedPair(ReadyPair):
 
     @property
     def step_s(self) -> float:
-        """Longest step of the integrator."""
+        """Maximum integration step."""
         return 1e-6 * float(self.values["step_us"] or 0.0)
 
 
@@ -152,9 +150,9 @@ class PreparedPair(ReadyPair):
 class ReducedPair(PairModel[PreparedPair]):
     """Spur pair of reduced finite-element gears between two rotors; see `sims.reduced_fe`.
 
-    Does not represent: gyroscopic and centrifugal terms, tilting of the gears, oil churning, heating, teeth bent by
-    friction, a shaft that lifts in its bearings or vibrates within their clearance, a change of the gears' modes by a
-    crack, contact off the line of action at corners.
+    Not represented: gyroscopic and centrifugal terms, tilting of the gears, oil churning, heating, bending of teeth by
+    friction, a shaft that lifts in its bearings or vibrates within their clearance, a change of the gears' modes due to
+    a crack, contact off the line of action at corners.
     """
 
     name: str = NAME
@@ -162,7 +160,7 @@ class ReducedPair(PairModel[PreparedPair]):
     parameters: tuple[Parameter, ...] = field(default=PARAMETERS, repr=False)
     effects: tuple[str, ...] = field(default_factory=lambda: tuple(effects()), repr=False)
     meaningless: tuple[str, ...] = (
-        "surface_roughness with locked_to=time: flanks are shapes here, which return with their teeth.",
+        "surface_roughness with locked_to=time: flanks are shapes here, which repeat with their teeth.",
     )
 
     def _healthy(self, values: Values, sampling_rate_hz: float, installed: Installed | None) -> Machine:
@@ -171,7 +169,7 @@ class ReducedPair(PairModel[PreparedPair]):
     def _ready(self, request: SimulationRequest, machine: Machine) -> PreparedPair:
         if machine.roughness.locked_to == "time" and machine.roughness.rms_um > 0.0:
             raise InputError(
-                "a roughness locked to time has no meaning here: flanks are shapes that return with their teeth",
+                "a roughness locked to time has no meaning here: flanks are shapes that repeat with their teeth",
                 where="locked_to of surface_roughness",
                 allowed="'flank'",
             )
@@ -193,13 +191,13 @@ class ReducedPair(PairModel[PreparedPair]):
 # From a flexible pair to a recording: run the model, then measure it.
 
 MAX_DEPTH_PART = 0.5
-"""Of what corners are apart at the table's ends: the most the static approach may take, to leave room to vibrate."""
+"""Maximum static approach over the corner separation at the table's ends; it leaves room for vibration."""
 
 
 def simulate_pair(
     pair: FlexiblePair, operation: Operation, run: MeasuredRun[FlexState]
 ) -> tuple[Recording, FlexResponse]:
-    """Simulate a flexible pair and measure it; return the recording and the motion behind it.
+    """Simulate a flexible pair and measure it; return the recording and the underlying motion.
 
     Parameters
     ----------
@@ -207,14 +205,14 @@ def simulate_pair(
     operation : Operation
         Its time 0 is the recording's start.
     run : MeasuredRun
-        Without a step of its own it has `sims.reduced_fe.STEP_S`; either is shortened to what the contact can be
-        followed with. "machine", "gears" and "solver" are added to its truth; its further signals are of
-        `sims.reduced_fe.signal_names`. Its machine's stream draws the roughness.
+        Its default step is `sims.reduced_fe.STEP_S`; the step is shortened to one with which the contact can be
+        followed. "machine", "gears" and "solver" are added to its truth; its further signals are those of
+        `signal_names`. The machine's random stream draws the roughness.
 
     Raises
     ------
     InputError
-        If the teeth yield further under the load than their corners are apart.
+        If the deflection of the teeth under load exceeds half of their corner separation.
     """
     machine_rng, chain_rng = run.streams()
     machine, _ = draw_roughness(pair.machine, machine_rng)
@@ -236,27 +234,27 @@ def simulate_pair(
 
 
 def model_notes(pair: FlexiblePair, operation: Operation, pair_constants: FlexiblePairConstants) -> tuple[str, ...]:
-    """Where the model is used near its limits."""
+    """Notes on use of the model near its limits."""
     notes = []
     mesh_hz = operation.speed_rpm.largest / 60.0 * pair.machine.mesh.pair.driver.teeth
     if mesh_hz > 0.25 * pair.mode_limit_hz:
         notes.append(
-            f"the mesh frequency reaches {mesh_hz:.0f} Hz: its fourth harmonic lies above {pair.mode_limit_hz:.0f} Hz, "
-            "up to where the gears' elastic modes move"
+            f"the mesh frequency reaches {mesh_hz:.0f} Hz: its fourth harmonic is above {pair.mode_limit_hz:.0f} Hz, "
+            "the limit of the gears' dynamic modes"
         )
     if pair.machine.mesh_damping_ratio > 0.0 and float(pair_constants.record["damping_time"]) == 0.0:
-        notes.append("shafts, bearings and gear bodies damp the torsional mode more than mesh_damping_ratio asks for")
+        notes.append("shafts, bearings and gear bodies damp the torsional mode by more than mesh_damping_ratio")
     return tuple(notes)
 
 
 def _known(
     pair: FlexiblePair, operation: Operation, pair_constants: FlexiblePairConstants, response: FlexResponse
 ) -> dict[str, Any]:
-    """What is worth knowing of the machine and the run."""
+    """Data of the machine and the run for the truth."""
     mode = torsional_mode(pair, operation, ready=pair_constants)
     frequencies = eigenfrequencies_hz(pair, operation, np.array([0.5]), ready=pair_constants)[0]
     return {
-        "machine": plain(replace(pair.machine, chain=None)),  # type: ignore[arg-type]  # it stands under "measurement"
+        "machine": plain(replace(pair.machine, chain=None)),  # type: ignore[arg-type]  # it is under "measurement"
         "gears": [
             {"key": gear.key, "degrees_of_freedom": gear.n_dof, "frequencies_hz": gear.frequencies_hz.tolist()}
             for gear in pair.gears
@@ -271,7 +269,7 @@ def _known(
 
 
 def check_depth(pair: FlexiblePair, operation: Operation) -> None:
-    """Refuse a torque under which the teeth yield further than half of what their corners are apart."""
+    """Reject a torque under which the deflection of the teeth exceeds half of their corner separation."""
     torque = operation.torque_nm.largest
     if torque <= 0.0:
         return
@@ -281,9 +279,9 @@ def check_depth(pair: FlexiblePair, operation: Operation) -> None:
     apart = MAX_DEPTH_PART * float(corner_separation_m(geometry, ends).min())
     if deepest > apart:
         raise InputError(
-            f"the teeth yield by {1e6 * deepest:.0f} µm under {torque:g} N m",
+            f"the teeth deflect by {1e6 * deepest:.0f} µm under {torque:g} N m",
             where="torque_nm",
-            allowed=f"up to {1e6 * apart:.0f} µm: beyond, corners touch further out than the model follows them",
+            allowed=f"up to {1e6 * apart:.0f} µm: beyond it, corners touch further out than the model covers",
             remedy="lower the torque or widen the face",
         )
 
@@ -294,12 +292,12 @@ Gears = tuple[ReducedGear, ReducedGear]
 
 
 def reduced_gears(values: Values) -> Gears:
-    """Return both gears: ready-made where they fit, else from the cache, else reduced now, which takes a minute.
+    """Return both gears: ready-made if they fit, else from the cache, else reduced now, which takes a minute.
 
     Raises
     ------
     InputError
-        If a gear cannot be made or meshed, or memory does not suffice.
+        If a gear cannot be made or meshed, or memory is insufficient.
     """
     parameters = ParameterValues(values)
     n_dof = parameters.whole("mesh_dof")
@@ -309,7 +307,7 @@ def reduced_gears(values: Values) -> Gears:
 def healthy_machine(
     values: Values, gears: Gears, *, sampling_rate_hz: float = 20480.0, installed: Installed | None = None
 ) -> Machine:
-    """Return the machine without effects: that of the 16-DOF pair, with masses and inertias of gears and hubs."""
+    """Return the machine without effects: that of the 16-DOF pair, with the masses and inertias of gears and hubs."""
     parameters = ParameterValues(values)
     shared: Values = {name: value for name, value in values.items() if name not in FLEXIBLE}
     shared.update(MEANINGLESS)
@@ -346,27 +344,28 @@ def _blank(values: ParameterValues, side: int) -> GearBlank:
     )
 
 
-@lru_cache(maxsize=8)  # a healthy machine and the flexible pair that is made of it ask for both
+@lru_cache(maxsize=8)  # needed for the healthy machine and for the flexible pair made from it
 def reduced_gear(blank: GearBlank, n_dof: int) -> ReducedGear:
-    """Return a gear: ready-made where one fits, else from the cache, else reduced now with about `n_dof`."""
+    """Return a gear: ready-made if one fits, else from the cache, else reduced now with about `n_dof`."""
     for name, ready in READY.items():
         if ready == blank:
             return ready_gear(name)
     return cached_gear(blank, plan_for(blank, n_dof))
 
 
-# The pair of finite-element gears set to a rig, for the gap diagnosis: see `gearsig.gap`.
+# The pair of finite-element gears adapted to a rig, for the gap diagnosis: see `gearsig.gap`.
 
 MESH_DOF, MESH_DOF_PER_TOOTH = 40_000, 900
-"""Of a twin's gears: their compliance is within a few per cent of that of finer meshes, less than a rig file knows."""
+"""Mesh of a twin's gears: their compliance is within a few per cent of that of finer meshes, less than the uncertainty
+of a rig file."""
 TWIN_STEP_S = 8.2e-6
-"""Longer than that of a single simulation: six steps for a sample at 20480 Hz. Up to 10 kHz lines of acceleration miss
-0.2 dB (median; 95 % of them less than 0.8 dB), those of the transmission error 0.01 dB: far less than one specimen's
-housing differs from another's."""
+"""Longer than that of a single simulation: six steps per sample at 20480 Hz. Up to 10 kHz the error of acceleration
+lines is 0.2 dB (median; 95 % of them below 0.8 dB), that of transmission-error lines 0.01 dB: far less than the
+difference between the housings of two specimens."""
 
 
 def twin_parameters(values: Mapping[str, ParameterValue], teeth: tuple[int, int]) -> dict[str, ParameterValue]:
-    """Return those parameters of the 16-DOF pair that this model has, with the mesh of a twin's gears."""
+    """Return the parameters of the 16-DOF pair that this model also has, with the mesh size of a twin's gears."""
     known = {p.name for p in PARAMETERS}
     known_values = {name: value for name, value in values.items() if name in known}
     return known_values | {"mesh_dof": float(max(MESH_DOF, MESH_DOF_PER_TOOTH * max(teeth)))}

@@ -58,7 +58,7 @@ def test_figures_table_and_summary_are_written(study):
 def test_a_torque_beyond_what_corners_follow_is_refused_before_anything_is_written(tmp_path):
     found = CliRunner().invoke(app, ["flexible", "-o", str(tmp_path / "x"), "--torques", "170,5000Nm"])
     assert isinstance(found.exception, InputError)
-    assert "the teeth yield by" in str(found.exception)
+    assert "the teeth deflect by" in str(found.exception)
     assert not (tmp_path / "x").exists()
 
 

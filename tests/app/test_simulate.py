@@ -124,7 +124,7 @@ def test_a_run_up(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
         ("time_s,speed_rpm\n0,1\n1\n", "line 3"),
         ("time_s,speed_rpm\n0,1\n1,x\n", "line 3"),
         ("time_s,speed_rpm\n0,1\n1,nan\n", "finite"),
-        ("time_s,speed_rpm\n1,1\n0,2\n", "rise"),
+        ("time_s,speed_rpm\n1,1\n0,2\n", "do not increase"),
     ],
 )
 def test_bad_profiles(tmp_path: Path, text: str, named: str) -> None:

@@ -80,7 +80,7 @@ def test_step_limit_of_stability() -> None:
     rng = np.random.default_rng
     stable = respond(machine, operation, duration_s=0.05, rng=rng(1), step_s=70e-6)
     assert np.abs(stable["driver y"]).max() < 1e-3
-    with pytest.raises(RefusalError, match="beyond all bounds"):
+    with pytest.raises(RefusalError, match="the solution diverges"):
         respond(machine, operation, duration_s=0.5, rng=rng(1), step_s=95e-6)
 
 
@@ -292,7 +292,7 @@ def test_endless_runs_are_refused() -> None:
 @pytest.mark.parametrize("torque_nm", [1e5, 1e12])
 def test_a_solution_that_bursts_is_refused(torque_nm: float) -> None:
     """Not a number must not be taken for a tooth's number: that once read beyond the tables."""
-    with pytest.raises(RefusalError, match="beyond all bounds"):
+    with pytest.raises(RefusalError, match="the solution diverges"):
         respond(
             spur_pair_machine(),
             Operation.steady(500.0, torque_nm),

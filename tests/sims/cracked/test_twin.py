@@ -95,7 +95,7 @@ def test_what_the_rig_does_not_state_is_usual() -> None:
         (replace(RIG, pairs=()), "no gear pair"),
         (replace(RIG, pairs=(replace(RIG.pairs[0], module_mm=None),)), "module_mm"),
         (replace(RIG, pairs=(replace(RIG.pairs[0], driven_teeth=None),), operating_point=OperatingPoint()), "teeth"),
-        (replace(RIG, pairs=(replace(RIG.pairs[0], driver_teeth=5),)), "cannot be set to this rig"),
+        (replace(RIG, pairs=(replace(RIG.pairs[0], driver_teeth=5),)), "cannot be adapted to this rig"),
         (replace(RIG, operating_point=replace(RIG.operating_point, torque_nm=5e6)), "would break teeth of module 2 mm"),
     ],
 )

@@ -277,7 +277,7 @@ def test_a_twin_tries_it_about_its_typical_severity_on_each_gear(file: Path) -> 
         ("EFFECT = 3", "defines no effect"),
         ("x = ", "does not run .SyntaxError"),
         ("1 / 0", "does not run .ZeroDivisionError"),
-        (FILE.replace("NAME", "clipping"), "an effect 'clipping' already"),
+        (FILE.replace("NAME", "clipping"), "already an effect 'clipping'"),
         (FILE.replace("NAME", "<b>a, b</b>"), "allowed: letters, digits and underscores"),
     ],
 )
@@ -290,7 +290,7 @@ def test_a_file_of_no_use_is_an_error_and_leaves_the_catalogue_as_it_was(file: P
 
 
 def test_a_file_that_is_not_there_is_an_error(file: Path) -> None:
-    with pytest.raises(InputError, match="is no Python file"):
+    with pytest.raises(InputError, match="is not a Python file"):
         add_effect(file.with_name("other.py"))
 
 

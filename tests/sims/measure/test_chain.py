@@ -159,7 +159,7 @@ def test_lead_in_of_zero_keeps_what_the_filter_allows():
 
 
 def test_misfits_are_refused():
-    with pytest.raises(InputError, match="whose angle the simulation does not give"):
+    with pytest.raises(InputError, match="whose angle the simulation does not provide"):
         record(replace(CHAIN, tachometer=Tachometer("gear")))
     with pytest.raises(InputError, match="no channel"):
         MeasurementChain(RATE, ())
@@ -221,7 +221,7 @@ def test_same_rate_passes_through():
 def test_ratios_of_rates():
     assert ratio_of_rates(4e-6, 20480.0) == (256, 3125)
     assert ratio_of_rates(1 / (12 * FAST_HZ), FAST_HZ) == (1, 12)
-    with pytest.raises(InputError, match="does not go into"):
+    with pytest.raises(InputError, match="does not fit"):
         ratio_of_rates(np.pi * 1e-6, FAST_HZ)
     with pytest.raises(InputError, match="at most the solver's rate"):
         ratio_of_rates(1e-4, FAST_HZ)

@@ -182,7 +182,7 @@ def test_ring_down_is_over_after_the_settling_time():
 def test_unknown_position_and_unresolved_mode_are_refused():
     with pytest.raises(InputError, match="did you mean bearing 1"):
         ModalPath({"bearing1": 1.0}).apply(np.zeros((4, 1)), ("bearing 1",), STEP)
-    with pytest.raises(InputError, match="steps a cycle"):
+    with pytest.raises(InputError, match="steps per cycle"):
         ModalPath({}, (PathMode(60e3, 0.03, {"y": 1.0}),)).apply(np.zeros((4, 1)), ("y",), STEP)
     with pytest.raises(InputError, match="no source"):
         ModalPath()

@@ -116,7 +116,7 @@ def test_bad_values_are_refused():
     rough = EffectSetting("surface_roughness", 0.8, {"locked_to": "time"})
     with pytest.raises(InputError, match="locked to time"):
         sims.simulate(MODEL, effects=(rough,), **SHORT)
-    with pytest.raises(InputError, match="teeth yield by"):
+    with pytest.raises(InputError, match="teeth deflect by"):
         sims.simulate(MODEL, torque_nm=1500.0, **SHORT)
     with pytest.raises(InputError, match="did you mean hub_inertia_driver_kg_m2"):
         sims.simulate(MODEL, parameters={"hub_inertia_drver_kg_m2": 0.0}, **SHORT)
