@@ -1,5 +1,6 @@
 """The dashboard's pages, run without a browser."""
 
+import ast
 import errno
 import json
 import re
@@ -16,7 +17,7 @@ from app.dashboard import compiled, state
 from app.dashboard.analysis import VIEWS
 from app.dashboard.cached import command_of
 from app.dashboard.state import ChosenFile
-from app.dashboard.widgets.texts import in_page_text
+from app.dashboard.widgets.texts import PAGE_TEXTS, in_page_text
 from gearsig.recording import write_recording
 from gearsig.rig import write_rig
 from sims import simulate
@@ -352,6 +353,16 @@ def test_what_a_recording_lacks_is_said_in_the_words_of_the_form() -> None:
 
 
 @pytest.mark.slow
+def test_phrases_that_pages_replace_occur_in_messages() -> None:
+    root = Path(__file__).parents[2]
+    sources = [path for room in ("app", "gearsig", "sims") for path in (root / room).rglob("*.py")]
+    trees = [ast.parse(path.read_text("utf-8")) for path in sources if path.name != "texts.py"]
+    constants = (node.value for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Constant))
+    messages = "\n".join(text for text in constants if isinstance(text, str))
+    of_the_reference = messages.replace("--fs", "--reference-fs")
+    assert [text for text in PAGE_TEXTS if text not in messages and text not in of_the_reference] == []
+
+
 def test_units_are_written_as_in_print() -> None:
     page = opened(tab="Machine")  # whose rig file says m/s^2
     assert any("unit" in table.value and "m/s²" in set(table.value["unit"]) for table in page.dataframe)

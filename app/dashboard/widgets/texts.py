@@ -97,7 +97,7 @@ FORM_LABELS = {
     "sampling_rate_hz": "Sampling rate (Hz)",
 }
 """What the form of the machine calls the keys of a rig file; other keys keep their own names."""
-_PLACES = {
+PAGE_TEXTS = {
     "--fs or sampling_rate_hz in the rig file": "the sampling rate, below or under Machine",
     "--fs": "the sampling rate, below or under Machine",
     "gearsig analyze RECORDING --tach-times FILE (in Python speed=gearsig.recording.read_pulse_times(path))": "open "
@@ -171,7 +171,7 @@ def place_in_form(where: str) -> str:
     key = whole[1] if whole is not None else None
     if whole is not None and (key is None or key in FORM_LABELS):
         return FORM_LABELS[key] if key is not None else "Machine"
-    return _PLACES.get(where, where)
+    return PAGE_TEXTS.get(where, where)
 
 
 def in_page_text(text: str) -> str:
@@ -182,7 +182,7 @@ def in_page_text(text: str) -> str:
     >>> in_page_text("add a [[shaft]] with that name"), in_page_text("speed_rpm must be given")
     ('add a row of Shafts with that name', 'Speed (rpm) must be given')
     """
-    for option, place in _PLACES.items():
+    for option, place in PAGE_TEXTS.items():
         text = text.replace(option, place)
     text = _ROW.sub(lambda match: place_in_form(match[0]), text)
     text = _TABLE.sub(lambda match: f"{'a row of ' if match[1] else ''}{FORM_TABLES.get(match[2], match[2])}", text)
