@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
+from typing import TypeGuard
 
 import numpy as np
 
@@ -27,6 +28,7 @@ from gearsig.gap._reduction import ReducedRecording
 from gearsig.gap._report import (
     NAMING,
     GapCause,
+    GapOutcome,
     GapPlace,
     GapReport,
     Interval,
@@ -38,6 +40,7 @@ from gearsig.gap._report import (
     likeliest_first,
     most_probable_two,
     named_cause,
+    named_effects,
     unbounded_fits,
 )
 from gearsig.gap._simulator import CanRunUp, DriveSimulator, GapEffect, GapSimulator, Twin, as_tried
@@ -57,7 +60,7 @@ from gearsig.prepared import PreparedRecording
 from gearsig.processes import one_pool, start_early
 from gearsig.recording import Recording, check_recording, metres_per_second_squared
 from gearsig.rig import Rig
-from gearsig.severity import CrackEstimate, estimate_crack
+from gearsig.severity import CrackEstimate, NoCrackSeen, estimate_crack
 
 USER_EFFECT_MESSAGE = (
     "The recognition has never seen “{title}”: it was simulated, fitted and scored on held-out data like the likeliest "
@@ -80,10 +83,12 @@ OF_THE_WAVEFORM = (
     "simulator is as like the machine as one of its own specimens is to another."
 )
 
+BY_THE_CRACK_ESTIMATE = (
+    "The crack estimate (`gearsig crack`) says of {name}: {text} {depth}It rests on the shape of one tooth's event, "
+    "the probability here on all features and on trials on the twin, so that the two can differ."
+)
 OF_THE_DEPTH = (
-    "The depth is that of the crack estimate, {depth:.2g} mm, with the interval that held nine in ten of the machines "
-    "it was calibrated on, {low:.2g} to {high:.2g} mm. It rests on the shape of one tooth's event, the probability "
-    "here on all features and on trials on the twin, so that the two can differ."
+    "A crack's depth here is that one; its interval held nine in ten of the machines that it was calibrated on. "
 )
 
 NOT_NEARER = (
@@ -204,6 +209,7 @@ def diagnose_gap(
     )
     clearest = max(conditions, key=lambda condition: condition.size.structural.value)
     recording = next(item for item in prepared if item.recording.name == clearest.facts.name)
+    reference = {item.recording.name: item for item in healthy}.get(clearest.facts.reference)
 
     # 4. Which effect: what the forests and labelled recordings say, and of the likeliest what trials on the twin say.
     tell("recognising", 0.2)
@@ -211,6 +217,7 @@ def diagnose_gap(
     tooth_errors = _tooth_error_evidences(conditions, recordings, references)
     with ThreadPoolExecutor(1) as executor:  # step 5 has time while other processes simulate
         unexpected_job = executor.submit(unexpected_findings, recording, healthy)
+        crack_job = executor.submit(_crack_answer, recording, reference)
         attribution = attribute(
             conditions,
             known,
@@ -234,10 +241,14 @@ def diagnose_gap(
 
     # 6. Where, and of each cause where it sits, how severe it is and what speaks for it.
     places = ranked_places(gap, [place_of_unexpected(item, recording.rig) for item in unexpected])
-    cause_list = [_cause(name, p, known, tried, conditions, places) for name, p in probabilities.items()]
-    reference_of = {item.recording.name: item for item in healthy}.get(clearest.facts.reference)
-    cause_list, depths = _with_crack_depth(cause_list, recording, reference_of, tried)
-    causes = in_order(cause_list, outcome)
+    crack = crack_job.result()
+    causes = in_order(
+        [
+            _with_depth(_cause(name, p, known, tried, conditions, places), crack, tried)
+            for name, p in probabilities.items()
+        ],
+        outcome,
+    )
     named = causes[0] if outcome in NAMING else None
     fitted = None if named is None else named.fitted
 
@@ -289,7 +300,8 @@ def diagnose_gap(
             ),
             *effects_without_place(twin, allowed),
             *unexpected_messages,
-            *(depths or _fit_messages(named, tried)),
+            *_crack_messages(crack, clearest.facts.name, causes, outcome),
+            *_fit_messages(named, tried, crack),
             *_waveform_messages(tried, known, clearest),
             *(_encoder_messages(tooth_errors, known) if named is not None else ()),
         ),
@@ -480,9 +492,11 @@ def _encoder_messages(evidences: Sequence[ToothErrorEvidence], known: Mapping[st
     return [f"{changed}{where}; by its profile alone, all faults of teeth as likely before: {likely}."]
 
 
-def _fit_messages(named: GapCause | None, tried: Mapping[str, TriedEffect]) -> list[str]:
-    """Say what the stated severity is worth, or that there is none."""
-    if named is None:
+def _fit_messages(
+    named: GapCause | None, tried: Mapping[str, TriedEffect], crack: CrackEstimate | NoCrackSeen | None
+) -> list[str]:
+    """Say what the stated severity is worth, or that there is none; nothing of a crack whose depth was estimated."""
+    if named is None or (named.name == CRACK and _is_depth(crack)):
         return []
     if named.name in tried and tried[named.name].is_shown:
         return [OF_THE_WAVEFORM]
@@ -535,33 +549,48 @@ def _cause(
     )
 
 
-def _with_crack_depth(
-    causes: Sequence[GapCause],
-    recording: PreparedRecording,
-    reference: PreparedRecording | None,
-    tried: Mapping[str, TriedEffect],
-) -> tuple[list[GapCause], list[str]]:
-    """Return the causes with the depth of a crack as `estimate_crack` measures it, and what is to be said of it.
+def _crack_answer(
+    recording: PreparedRecording, reference: PreparedRecording | None
+) -> CrackEstimate | NoCrackSeen | None:
+    """Return what `gearsig crack` says of the same files; None where it says nothing."""
+    try:
+        return estimate_crack(recording, reference=reference)
+    except GearsigError:
+        return None
+
+
+def _is_depth(crack: CrackEstimate | NoCrackSeen | None) -> TypeGuard[CrackEstimate]:
+    return isinstance(crack, CrackEstimate) and crack.with_reference
+
+
+def _with_depth(
+    cause: GapCause, crack: CrackEstimate | NoCrackSeen | None, tried: Mapping[str, TriedEffect]
+) -> GapCause:
+    """Return a cause, that of a crack with the depth as `estimate_crack` measures it.
 
     A fit to the twin hangs on the path to a sensor; the estimate takes the cracked tooth relative to the mesh.
     """
-    crack = next((cause for cause in causes if cause.name == CRACK), None)
-    if crack is None or CRACK not in tried or reference is None:
-        return list(causes), []
-    try:
-        estimate = estimate_crack(recording, reference=reference)
-    except GearsigError:
-        return list(causes), []
-    if not isinstance(estimate, CrackEstimate):
-        return list(causes), []
-    depth = Interval(estimate.depth_mm, *estimate.interval_mm)
+    if cause.name != CRACK or CRACK not in tried or not _is_depth(crack):
+        return cause
     simulated_mm = [float(path.severities[-1]) for path in tried[CRACK].paths]
-    fitted = crack.fitted
-    if fitted is not None and depth.value <= max(simulated_mm, default=0.0):
-        fitted = replace(fitted, severity=depth.value)
-    changed = replace(crack, severity=depth, fitted=fitted)
-    message = OF_THE_DEPTH.format(depth=depth.value, low=depth.low, high=depth.high)
-    return [changed if cause is crack else cause for cause in causes], [message]
+    fitted = cause.fitted
+    if fitted is not None and crack.depth_mm <= max(simulated_mm, default=0.0):
+        fitted = replace(fitted, severity=crack.depth_mm)
+    return replace(cause, severity=Interval(crack.depth_mm, *crack.interval_mm), fitted=fitted)
+
+
+def _crack_messages(
+    crack: CrackEstimate | NoCrackSeen | None, name: str, causes: Sequence[GapCause], outcome: GapOutcome
+) -> list[str]:
+    """Say what `gearsig crack` says of the same files: where it sees damage, or where a crack is named and it does not.
+
+    Whoever asks both is told why they differ.
+    """
+    if crack is None or (isinstance(crack, NoCrackSeen) and CRACK not in named_effects(causes, outcome)):
+        return []
+    has_depth = any(cause.name == CRACK and cause.severity is not None for cause in causes)
+    depth = OF_THE_DEPTH if has_depth and _is_depth(crack) else ""
+    return [BY_THE_CRACK_ESTIMATE.format(name=name, text=crack.text, depth=depth)]
 
 
 def _after_and_next(

@@ -856,9 +856,16 @@ def is_settled(causes: Sequence[GapCause]) -> bool:
     return len(probabilities) > 1 and probabilities[1] < SETTLED <= probabilities[0]
 
 
+def named_effects(causes: Sequence[GapCause], outcome: GapOutcome) -> tuple[str, ...]:
+    """Return the effects that an answer names: the first, or those that cannot be told apart."""
+    if outcome is GapOutcome.CANNOT_SEPARATE:
+        return rivals(causes)
+    return (causes[0].name,) if outcome in NAMING else ()
+
+
 def unbounded_fits(causes: Sequence[GapCause], outcome: GapOutcome) -> list[str]:
     """Say of what is named which effects the fit can give no size, not even tell from nothing at all."""
-    named = rivals(causes) if outcome is GapOutcome.CANNOT_SEPARATE else [causes[0].name] if outcome in NAMING else ()
+    named = named_effects(causes, outcome)
     return [
         f"{cause.title[0].upper()}{cause.title[1:]}: on the twin any severity fits the recordings about as well, none "
         "at all included. How the recordings changed speaks for it, the simulation does not."
