@@ -60,7 +60,7 @@ from gearsig.prepared import PreparedRecording
 from gearsig.processes import one_pool, start_early
 from gearsig.recording import Recording, check_recording, metres_per_second_squared
 from gearsig.rig import Rig
-from gearsig.severity import CrackEstimate, NoCrackSeen, estimate_crack
+from gearsig.severity import TEETH_COUNT, CrackEstimate, NoCrackSeen, estimate_crack
 
 USER_EFFECT_MESSAGE = (
     "The recognition has never seen “{title}”: it was simulated, fitted and scored on held-out data like the likeliest "
@@ -86,6 +86,10 @@ OF_THE_WAVEFORM = (
 BY_THE_CRACK_ESTIMATE = (
     "The crack estimate (`gearsig crack`) says of {name}: {text} {depth}It rests on the shape of one tooth's event, "
     "the probability here on all features and on trials on the twin, so that the two can differ."
+)
+NO_CRACK_ESTIMATE = (
+    "The crack estimate (`gearsig crack`) says nothing of a crack in {name}: {reason}. The probability here rests on "
+    "all features and on trials on the twin."
 )
 OF_THE_DEPTH = (
     "A crack's depth here is that one; its interval held nine in ten of the machines that it was calibrated on. "
@@ -302,6 +306,7 @@ def diagnose_gap(
             *unexpected_messages,
             *_crack_messages(crack, clearest.facts.name, causes, outcome),
             *_fit_messages(named, tried, crack),
+            *([TEETH_COUNT] if named is not None and named.place.startswith("tooth") else ()),
             *_waveform_messages(tried, known, clearest),
             *(_encoder_messages(tooth_errors, known) if named is not None else ()),
         ),
@@ -492,9 +497,7 @@ def _encoder_messages(evidences: Sequence[ToothErrorEvidence], known: Mapping[st
     return [f"{changed}{where}; by its profile alone, all faults of teeth as likely before: {likely}."]
 
 
-def _fit_messages(
-    named: GapCause | None, tried: Mapping[str, TriedEffect], crack: CrackEstimate | NoCrackSeen | None
-) -> list[str]:
+def _fit_messages(named: GapCause | None, tried: Mapping[str, TriedEffect], crack: CrackAnswer) -> list[str]:
     """Say what the stated severity is worth, or that there is none; nothing of a crack whose depth was estimated."""
     if named is None or (named.name == CRACK and _is_depth(crack)):
         return []
@@ -549,23 +552,23 @@ def _cause(
     )
 
 
-def _crack_answer(
-    recording: PreparedRecording, reference: PreparedRecording | None
-) -> CrackEstimate | NoCrackSeen | None:
-    """Return what `gearsig crack` says of the same files; None where it says nothing."""
+CrackAnswer = CrackEstimate | NoCrackSeen | GearsigError
+"""What `gearsig crack` says, or why it says nothing."""
+
+
+def _crack_answer(recording: PreparedRecording, reference: PreparedRecording | None) -> CrackAnswer:
+    """Return what `gearsig crack` says of the same files."""
     try:
         return estimate_crack(recording, reference=reference)
-    except GearsigError:
-        return None
+    except GearsigError as error:
+        return error
 
 
-def _is_depth(crack: CrackEstimate | NoCrackSeen | None) -> TypeGuard[CrackEstimate]:
+def _is_depth(crack: CrackAnswer) -> TypeGuard[CrackEstimate]:
     return isinstance(crack, CrackEstimate) and crack.with_reference
 
 
-def _with_depth(
-    cause: GapCause, crack: CrackEstimate | NoCrackSeen | None, tried: Mapping[str, TriedEffect]
-) -> GapCause:
+def _with_depth(cause: GapCause, crack: CrackAnswer, tried: Mapping[str, TriedEffect]) -> GapCause:
     """Return a cause, that of a crack with the depth as `estimate_crack` measures it.
 
     A fit to the twin hangs on the path to a sensor; the estimate takes the cracked tooth relative to the mesh.
@@ -579,15 +582,15 @@ def _with_depth(
     return replace(cause, severity=Interval(crack.depth_mm, *crack.interval_mm), fitted=fitted)
 
 
-def _crack_messages(
-    crack: CrackEstimate | NoCrackSeen | None, name: str, causes: Sequence[GapCause], outcome: GapOutcome
-) -> list[str]:
+def _crack_messages(crack: CrackAnswer, name: str, causes: Sequence[GapCause], outcome: GapOutcome) -> list[str]:
     """Say what `gearsig crack` says of the same files: where it sees damage, or where a crack is named and it does not.
 
     Whoever asks both is told why they differ.
     """
-    if crack is None or (isinstance(crack, NoCrackSeen) and CRACK not in named_effects(causes, outcome)):
+    if not isinstance(crack, CrackEstimate) and CRACK not in named_effects(causes, outcome):
         return []
+    if isinstance(crack, GearsigError):
+        return [NO_CRACK_ESTIMATE.format(name=name, reason=getattr(crack, "reason", crack))]
     has_depth = any(cause.name == CRACK and cause.severity is not None for cause in causes)
     depth = OF_THE_DEPTH if has_depth and _is_depth(crack) else ""
     return [BY_THE_CRACK_ESTIMATE.format(name=name, text=crack.text, depth=depth)]

@@ -2,6 +2,7 @@
 
 from gearsig.severity._estimate import (
     LARGEST_TORQUE_CHANGE,
+    TEETH_COUNT,
     GearEvidence,
     estimate_crack,
     gear_evidence,
@@ -78,6 +79,7 @@ __all__ = [
     "SHAPE",
     "SHAPED",
     "SPALLED",
+    "TEETH_COUNT",
     "WITH_REFERENCE",
     "Calibration",
     "Conditions",
