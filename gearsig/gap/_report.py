@@ -864,11 +864,11 @@ def named_effects(causes: Sequence[GapCause], outcome: GapOutcome) -> tuple[str,
 
 
 def unbounded_fits(causes: Sequence[GapCause], outcome: GapOutcome) -> list[str]:
-    """Say of what is named which effects the fit can give no size, not even tell from nothing at all."""
+    """Say of what is named which effects the fit can give no size."""
     named = named_effects(causes, outcome)
     return [
-        f"{cause.title[0].upper()}{cause.title[1:]}: on the twin any severity fits the recordings about as well, none "
-        "at all included. How the recordings changed speaks for it, the simulation does not."
+        f"{cause.title[0].upper()}{cause.title[1:]}: the fit to the twin bounds its severity neither above nor below. "
+        "How the recordings changed speaks for it, the simulation hardly does."
         for cause in causes
         if cause.name in named and cause.severity is not None and cause.severity.is_unbounded
     ]
