@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from typing import TypeGuard
@@ -54,6 +55,7 @@ from gearsig.gap._trials import (
     run_for_a_moment,
     start_healthy_trial,
     steps_of,
+    try_effects,
 )
 from gearsig.gap.start_stop._diagnose import diagnose_start_stop, refuse_start_stop
 from gearsig.prepared import PreparedRecording
@@ -272,7 +274,9 @@ def diagnose_gap(
         repeatability=clearest.size.repeatability.value,
         places=places,
         causes=causes,
-        steps=steps_of(conditions, tried, causes) if tried and named is not None else (),
+        steps=steps_of(conditions, tried, causes, partial(_tried_beside, known, twin, conditions, cache, fresh=fresh))
+        if tried and named is not None
+        else (),
         next_recordings=next_ones,
         spectra=spectrum_curves(
             clearest.now,
@@ -594,6 +598,23 @@ def _crack_messages(crack: CrackAnswer, name: str, causes: Sequence[GapCause], o
     has_depth = any(cause.name == CRACK and cause.severity is not None for cause in causes)
     depth = OF_THE_DEPTH if has_depth and _is_depth(crack) else ""
     return [BY_THE_CRACK_ESTIMATE.format(name=name, text=crack.text, depth=depth)]
+
+
+def _tried_beside(
+    known: Mapping[str, GapEffect],
+    twin: Twin,
+    conditions: Sequence[Condition],
+    cache: Path | None,
+    name: str,
+    *,
+    fresh: bool,
+) -> TriedEffect | None:
+    """Try one effect more; None where the rig has no place for it, or it cannot be simulated there."""
+    effects = [known[name]] if name in known else []  # what only labelled recordings know cannot be simulated
+    try:
+        return try_effects(effects, twin, conditions, cache, lambda *_: None, fresh=fresh).get(name)
+    except RefusalError:
+        return None
 
 
 def _after_and_next(

@@ -906,7 +906,16 @@ def _shrinkage_text(report: GapReport) -> str:
         shrinks = "does not shrink"
     elif shrinkage.after.high < 1.0:
         shrinks = f"shrinks {sizes}, within what healthy machines show,"
-    return f"How far: with the effect added, the gap on the features that it changes {shrinks} on {shrinkage.held_out}."
+    far = f"How far: with the effect added, the gap on the features that it changes {shrinks} on {shrinkage.held_out}."
+    if len(report.steps) <= MAX_ALONE:
+        return far
+    *_, one, both = report.steps
+    left = f"from {one.remaining.value:.2g} to {both.remaining.value:.2g} structural floors"
+    return f"{far} It leaves much; {both.label} beside it takes the whole gap {left}, and may be there as well."
+
+
+MAX_ALONE = 2
+"""Steps of a gap that one effect explains: before, and with it."""
 
 
 SLOW_RPM = 300.0

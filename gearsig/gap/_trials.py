@@ -666,25 +666,53 @@ def _left_out_changes(condition: Condition, index: int, n: int) -> tuple[tuple[O
 MIN_CLOSED = 0.05
 """Share of the gap that a further effect must take away to be shown."""
 
-MAX_ADDED = 2
+MUCH_LEFT = 1.0
+"""Structural floors of the whole gap that one effect must leave for another beside it to be tried."""
 
 
 def steps_of(
-    conditions: Sequence[Condition], tried: dict[str, TriedEffect], causes: Sequence[GapCause]
+    conditions: Sequence[Condition],
+    tried: Mapping[str, TriedEffect],
+    causes: Sequence[GapCause],
+    try_further: Callable[[str], TriedEffect | None],
 ) -> tuple[GapStep, ...]:
-    """Return the gap before, and what is left with the likeliest effect, then with the next one as well."""
+    """Return the whole gap before, what is left with the likeliest effect, and with one of another kind as well.
+
+    Parameters
+    ----------
+    conditions : sequence of Condition
+    tried : mapping
+        Effect → how it was tried.
+    causes : sequence of GapCause
+        In their order.
+    try_further : callable
+        Effect → how it was tried, None where it cannot be: asked where the likeliest leaves much, of the likeliest one
+        that is no rival of it but may be there beside it.
+    """
     folds = folds_of(conditions)
-    names = [c.name for c in causes if c.name in tried][:MAX_ADDED]
     steps = [GapStep("before", _remaining_gap(conditions, folds, []))]
     added: list[TriedEffect] = []
-    for name in names:
-        remaining = _remaining_gap(conditions, folds, [*added, tried[name]])
-        if added and remaining.value > (1.0 - MIN_CLOSED) * steps[-1].remaining.value:
-            break
-        added.append(tried[name])
-        title = next(c.title for c in causes if c.name == name)
-        steps.append(GapStep(title, remaining))
+
+    def add(cause: GapCause, effect: TriedEffect | None) -> None:
+        if effect is None:
+            return
+        remaining = _remaining_gap(conditions, folds, [*added, effect])
+        if not added or remaining.value <= (1.0 - MIN_CLOSED) * steps[-1].remaining.value:
+            added.append(effect)
+            steps.append(GapStep(cause.title, remaining))
+
+    first = next((cause for cause in causes if cause.name in tried), None)
+    if first is not None:
+        add(first, tried[first.name])
+        beside = next((cause for cause in causes if cause.is_effect and not _are_rivals(cause, first)), None)
+        if beside is not None and steps[-1].remaining.value > MUCH_LEFT:
+            add(beside, tried.get(beside.name) or try_further(beside.name))
     return tuple(steps)
+
+
+def _are_rivals(cause: GapCause, first: GapCause) -> bool:
+    """Whether one is taken for the other, so that it is there instead of it: of one kind, or both faults of a tooth."""
+    return cause.group == first.group or {cause.name, first.name}.issubset(TOOTH_FAULTS)
 
 
 def _remaining_gap(conditions: Sequence[Condition], folds: Sequence[Fold], added: Sequence[TriedEffect]) -> Interval:
