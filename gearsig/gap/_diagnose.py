@@ -15,7 +15,7 @@ import numpy as np
 from gearsig.checks import closest_match_hint, listed, short
 from gearsig.errors import GearsigError, InputError, RefusalError
 from gearsig.formatting import odds_text
-from gearsig.gap._attribution import Attribution, attribute, counted_against, within_the_floor
+from gearsig.gap._attribution import Attribution, attribute, counted_against, likely_beside, within_the_floor
 from gearsig.gap._conditions import Condition, Stage, conditions_of, simulated, warnings_of
 from gearsig.gap._curves import angle_curves, average_curves, spectrum_curves
 from gearsig.gap._evidence import CRACK, evidence_of
@@ -274,9 +274,15 @@ def diagnose_gap(
         repeatability=clearest.size.repeatability.value,
         places=places,
         causes=causes,
-        steps=steps_of(conditions, tried, causes, partial(_tried_beside, known, twin, conditions, cache, fresh=fresh))
-        if tried and named is not None
-        else (),
+        steps=()
+        if named is None or not tried
+        else steps_of(
+            conditions,
+            tried,
+            causes,
+            likely_beside(causes, known, gap, clearest.now.frame),
+            partial(_tried_beside, known, twin, conditions, cache, fresh=fresh),
+        ),
         next_recordings=next_ones,
         spectra=spectrum_curves(
             clearest.now,
@@ -610,9 +616,8 @@ def _tried_beside(
     fresh: bool,
 ) -> TriedEffect | None:
     """Try one effect more; None where the rig has no place for it, or it cannot be simulated there."""
-    effects = [known[name]] if name in known else []  # what only labelled recordings know cannot be simulated
     try:
-        return try_effects(effects, twin, conditions, cache, lambda *_: None, fresh=fresh).get(name)
+        return try_effects([known[name]], twin, conditions, cache, lambda *_: None, fresh=fresh).get(name)
     except RefusalError:
         return None
 

@@ -911,7 +911,9 @@ def _shrinkage_text(report: GapReport) -> str:
         return far
     *_, one, both = report.steps
     left = f"from {one.remaining.value:.2g} to {both.remaining.value:.2g} structural floors"
-    return f"{far} It leaves much; {both.label} beside it takes the whole gap {left}, and may be there as well."
+    return (
+        f"{far} It cannot make all lines; {both.label} beside it takes the whole gap {left}, and may be there as well."
+    )
 
 
 MAX_ALONE = 2

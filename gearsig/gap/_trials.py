@@ -674,9 +674,10 @@ def steps_of(
     conditions: Sequence[Condition],
     tried: Mapping[str, TriedEffect],
     causes: Sequence[GapCause],
+    beside: GapCause | None,
     try_further: Callable[[str], TriedEffect | None],
 ) -> tuple[GapStep, ...]:
-    """Return the whole gap before, what is left with the likeliest effect, and with one of another kind as well.
+    """Return the whole gap before, what is left with the likeliest effect, and with another one beside it as well.
 
     Parameters
     ----------
@@ -685,9 +686,10 @@ def steps_of(
         Effect → how it was tried.
     causes : sequence of GapCause
         In their order.
+    beside : GapCause or None
+        What may be there beside the likeliest, where that leaves much.
     try_further : callable
-        Effect → how it was tried, None where it cannot be: asked where the likeliest leaves much, of the likeliest one
-        that is no rival of it but may be there beside it.
+        Effect → how it was tried, None where it cannot be: asked where `beside` was not.
     """
     folds = folds_of(conditions)
     steps = [GapStep("before", _remaining_gap(conditions, folds, []))]
@@ -704,15 +706,9 @@ def steps_of(
     first = next((cause for cause in causes if cause.name in tried), None)
     if first is not None:
         add(first, tried[first.name])
-        beside = next((cause for cause in causes if cause.is_effect and not _are_rivals(cause, first)), None)
-        if beside is not None and steps[-1].remaining.value > MUCH_LEFT:
-            add(beside, tried.get(beside.name) or try_further(beside.name))
+    if beside is not None and added and steps[-1].remaining.value > MUCH_LEFT:
+        add(beside, tried.get(beside.name) or try_further(beside.name))
     return tuple(steps)
-
-
-def _are_rivals(cause: GapCause, first: GapCause) -> bool:
-    """Whether one is taken for the other, so that it is there instead of it: of one kind, or both faults of a tooth."""
-    return cause.group == first.group or {cause.name, first.name}.issubset(TOOTH_FAULTS)
 
 
 def _remaining_gap(conditions: Sequence[Condition], folds: Sequence[Fold], added: Sequence[TriedEffect]) -> Interval:
@@ -772,13 +768,16 @@ def place_of(added: Added, frame: GearFrame, places: Sequence[GapPlace]) -> str:
         return ""
     shaft = frame.shafts[SIDES.index(str(side))]
     words = shaft_words(frame, SIDES.index(str(side)))
+    mate = " or its mate" if frame.teeth[0] == frame.teeth[1] else ""  # the same teeth meet at every revolution
     if "tooth" not in options:
-        return f"the gear on {words}" if "gear" in options else words
+        return f"the gear on {words}{mate}" if "gear" in options else words
     tooth_place = _tooth_place(shaft, places)
     if tooth_place is None or (tooth_place.tooth is None and tooth_place.angle_deg is None):
-        return f"one tooth of the gear on {words}"
+        return f"one tooth of the gear on {words}{mate}"
     tooth = f"tooth {tooth_place.tooth} of the gear on"
-    return f"{tooth} {words}" if tooth_place.tooth is not None else f"{tooth_place.angle_deg:.0f}° of {words}"
+    return (
+        f"{tooth} {words}{mate}" if tooth_place.tooth is not None else f"{tooth_place.angle_deg:.0f}° of {words}{mate}"
+    )
 
 
 def _bearings(name: str, fitted: str, frame: GearFrame, places: Sequence[GapPlace]) -> list[str]:
