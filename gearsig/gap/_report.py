@@ -513,7 +513,7 @@ class NextStep:
     Parameters
     ----------
     code : str
-        "healthy", "encoders", "slow_loads", "run_up", "other_speed" or "label".
+        "healthy", "encoders", "slow_loads", "run_up", "other_speed", "less_gain" or "label".
     text : str
     """
 
@@ -937,6 +937,8 @@ NEXT_STEPS = {
     "sensors",
     "other_speed": "the same machine at twice or half the speed: a resonance stays at its frequency, what belongs to a "
     "shaft at its order",
+    "less_gain": "the same with less gain, or a wider range: tops that are cut off and loud low orders both look like "
+    "a sine",
     "label": "two labelled recordings of each likely cause on this rig (--learn): nothing else tells so much",
 }
 
@@ -954,7 +956,7 @@ def _next(report: GapReport) -> str:
         return f"Next: another sensor nearer to where it is loudest{ways}."
     if report.outcome is GapOutcome.NO_GAP:
         return "Next: nothing is needed; keep these recordings, later ones are best compared with them."
-    if sum(cause.shrinkage is not None for cause in report.causes) < 2:
+    if not is_settled(report.causes) and sum(cause.shrinkage is not None for cause in report.causes) < 2:
         ways = " or ".join(_unvaried_quantities(report)) or "sensor"
         return f"Next: another {ways}; no two effects are likely enough to compute which would tell most."
     where_to_look = _common_place(report)

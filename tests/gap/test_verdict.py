@@ -219,6 +219,8 @@ def test_where_one_effect_alone_is_likely_no_recording_is_asked_for() -> None:
     assert not is_settled(report.causes)
     assert not is_settled(sure[:1])
     assert "further apart" not in replace(report, causes=sure).verdict[3]
+    alone_tried = (sure[0], *(replace(cause, shrinkage=None) for cause in sure[1:]))
+    assert "no other effect is likely enough" in replace(report, causes=alone_tried).verdict[3]
 
 
 def test_what_was_varied_already_is_not_advised() -> None:
