@@ -28,6 +28,7 @@ from gearsig.gap._population import load_learned
 from gearsig.gap._reduction import ReducedRecording
 from gearsig.gap._report import (
     NAMING,
+    SETTLED,
     GapCause,
     GapOutcome,
     GapPlace,
@@ -601,7 +602,7 @@ def _crack_messages(crack: CrackAnswer, name: str, causes: Sequence[GapCause], o
         return []
     if isinstance(crack, GearsigError):
         return [NO_CRACK_ESTIMATE.format(name=name, reason=getattr(crack, "reason", crack))]
-    has_depth = any(cause.name == CRACK and cause.severity is not None for cause in causes)
+    has_depth = any(c.name == CRACK and c.severity is not None and c.probability >= SETTLED for c in causes)
     depth = OF_THE_DEPTH if has_depth and _is_depth(crack) else ""
     return [BY_THE_CRACK_ESTIMATE.format(name=name, text=crack.text, depth=depth)]
 

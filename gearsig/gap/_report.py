@@ -907,17 +907,12 @@ def _shrinkage_text(report: GapReport) -> str:
     elif shrinkage.after.high < 1.0:
         shrinks = f"shrinks {sizes}, within what healthy machines show,"
     far = f"How far: with the effect added, the gap on the features that it changes {shrinks} on {shrinkage.held_out}."
-    if len(report.steps) <= MAX_ALONE:
-        return far
-    *_, one, both = report.steps
-    left = f"from {one.remaining.value:.2g} to {both.remaining.value:.2g} structural floors"
-    return (
-        f"{far} It cannot make all lines; {both.label} beside it takes the whole gap {left}, and may be there as well."
-    )
-
-
-MAX_ALONE = 2
-"""Steps of a gap that one effect explains: before, and with it."""
+    for one, both in zip(report.steps[1:], report.steps[2:], strict=False):  # with two effects, where one leaves much
+        left = f"from {one.remaining.value:.2g} to {both.remaining.value:.2g} structural floors"
+        far += (
+            f" It cannot make all lines; {both.label} beside it takes the whole gap {left}, and may be there as well."
+        )
+    return far
 
 
 SLOW_RPM = 300.0
