@@ -13,7 +13,7 @@ from typing import TypeGuard
 import numpy as np
 
 from gearsig.checks import closest_match_hint, listed, short
-from gearsig.errors import GearsigError, InputError, RefusalError
+from gearsig.errors import GearsigError, InputError, RefusalError, answer_or_none
 from gearsig.formatting import odds_text
 from gearsig.gap._attribution import Attribution, attribute, counted_against, likely_beside, within_the_floor
 from gearsig.gap._conditions import Condition, Stage, conditions_of, simulated, warnings_of
@@ -221,7 +221,7 @@ def diagnose_gap(
     # 4. Which effect: what the forests and labelled recordings say, and of the likeliest what trials on the twin say.
     tell("recognising", 0.2)
     labelled, left_out = labelled_changes(learn, healthy, conditions, twin, cache, fresh=fresh)
-    tooth_errors = _tooth_error_evidences(conditions, recordings, references)
+    tooth_errors, no_tooth_errors = _tooth_error_evidences(conditions, recordings, references)
     with ThreadPoolExecutor(1) as executor:  # step 5 has time while other processes simulate
         unexpected_job = executor.submit(unexpected_findings, recording, healthy)
         crack_job = executor.submit(_crack_answer, recording, reference)
@@ -319,7 +319,8 @@ def diagnose_gap(
             *_fit_messages(named, tried, crack),
             *([TEETH_COUNT] if named is not None and named.place.startswith("tooth") else ()),
             *_waveform_messages(tried, known, clearest),
-            *(_encoder_messages(tooth_errors, known) if named is not None else ()),
+            *_encoder_messages(tooth_errors, known),
+            *no_tooth_errors,
         ),
         twin_toml=""
         if fitted is None
@@ -484,12 +485,17 @@ def _waveform_messages(
 
 def _tooth_error_evidences(
     conditions: Sequence[Condition], recordings: Sequence[Recording], references: Sequence[Recording]
-) -> list[ToothErrorEvidence]:
-    """Return what encoders say, of the conditions that have a reference and encoders in both."""
-    of = {prepared.name: prepared for prepared in (*references, *recordings)}
-    pairs = [(c.facts.name, c.facts.reference) for c in conditions if c.facts.reference]
-    evidences = [tooth_error_evidence(of[now], of[healthy]) for now, healthy in pairs]
-    return [evidence for evidence in evidences if evidence is not None]
+) -> tuple[list[ToothErrorEvidence], list[str]]:
+    """Return what encoders say, of conditions with a reference and encoders in both; and why some say nothing."""
+    of = {recording.name: recording for recording in (*references, *recordings)}
+    refusals: list[str] = []
+    evidences = [
+        answer_or_none(partial(tooth_error_evidence, of[c.facts.name], of[c.facts.reference]), c.facts.name, refusals)
+        for c in conditions
+        if c.facts.reference
+    ]
+    known = [evidence for evidence in evidences if evidence is not None]
+    return known, [f"No transmission error, in spite of encoders, of {refusal}." for refusal in refusals]
 
 
 def _encoder_messages(evidences: Sequence[ToothErrorEvidence], known: Mapping[str, GapEffect]) -> list[str]:
