@@ -19,7 +19,7 @@ from gearsig.diagnosis._types import (
 )
 from gearsig.diagnosis._verdict import DEPTH_UNKNOWN
 from gearsig.errors import RefusalError
-from gearsig.formatting import percent
+from gearsig.formatting import odds_text
 from gearsig.prepared import PreparedRecording, prepare
 from gearsig.recording import Recording
 from gearsig.rig import GearPair, Rig
@@ -136,7 +136,7 @@ def _seen(crack: CrackEstimate, rig: Rig) -> Finding:
     root = f"{crack.depth_percent:.0f} % of the root ({low:.0f} to {high:.0f} %)"
     evidence = [f"A crack of {crack.size} takes {root}."]
     if crack.kind_probabilities:
-        shares = ", ".join(f"{kind} {percent(share)}" for kind, share in crack.kind_probabilities.items())
+        shares = ", ".join(f"{kind} {odds_text(share)}" for kind, share in crack.kind_probabilities.items())
         evidence.append(f"By its shape it is {shares}, if cracks are as frequent as chips and spalls together.")
     chance = f"chance of as clear a change on healthy gears {p_text(crack.p_value)}, by simulation"
     return Finding(

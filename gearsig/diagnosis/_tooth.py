@@ -27,7 +27,7 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import enumerated, percent, unit_text
 from gearsig.orders import SynchronousAverage, revolution_of_lines, separate, whole_revolutions
 from gearsig.prepared import chance_of_any, sliding_mean, strongest_window
-from gearsig.severity import ShaftLines, difference_lines, reversed_channels
+from gearsig.severity import TEETH_COUNT, ShaftLines, difference_lines, reversed_channels
 
 
 @dataclass(frozen=True)
@@ -729,7 +729,7 @@ def _evidence(examined: _Examined) -> Iterator[str]:
     if not examined.has_mark:
         yield "No once-per-revolution mark is on this shaft: the angle holds for this record's average only."
     elif len(shaft.teeth) == 1:
-        yield "Teeth count from 1 at the mark in order of engagement; the place is good to about one tooth."
+        yield TEETH_COUNT
     if len(shaft.teeth) > 1:
         teeth = ", ".join(map(str, shaft.teeth))
         yield f"The shaft carries {len(shaft.teeth)} gears ({teeth} teeth); it may be on either."

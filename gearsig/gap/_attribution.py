@@ -27,6 +27,7 @@ from gearsig.gap._report import (
     LIKELIER_THAN_NOT,
     NONE,
     UNKNOWN,
+    GapCause,
     GapOutcome,
     GapPlace,
     Interval,
@@ -470,6 +471,34 @@ def with_dominant_order_counted(
             for name in (NONE, *([UNKNOWN] if _is_first_of_a_shaft(place, frame) else [])):
                 lowered[name] *= 2.0 * (1.0 - place.share)
     return scaled(lowered)
+
+
+def likely_beside(
+    causes: Sequence[GapCause], effects: Mapping[str, GapEffect], places: Sequence[GapPlace], frame: GearFrame
+) -> GapCause | None:
+    """Return the likeliest effect that makes an order beyond its floor which the first cannot make; None: none does.
+
+    It is no rival of the first, that is there instead of it: of another kind, and not a fault of a tooth as well.
+    """
+    first = causes[0]
+    if first.name not in effects:
+        return None
+    orders = [
+        place
+        for place in places
+        if place.structural > 1.0 and _is_an_order(place, frame) and not _can_make(effects[first.name].shows_in, place)
+    ]
+    return next(
+        (
+            cause
+            for cause in causes
+            if cause.name in effects
+            and cause.group != first.group
+            and not {cause.name, first.name}.issubset(TOOTH_FAULTS)
+            and any(_can_make(effects[cause.name].shows_in, place) for place in orders)
+        ),
+        None,
+    )
 
 
 def _is_first_of_a_shaft(place: GapPlace, frame: GearFrame) -> bool:

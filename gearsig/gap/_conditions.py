@@ -528,7 +528,7 @@ def pattern_mismatch_text(now: ReducedRecording, reference: ReducedRecording, na
     by = " and ".join(f"{max(a, 0.0):.2f}" for a in agreements)
     message = (
         f"{name}: the patterns of the teeth of both gears agree with the reference by {by} only, where 1 is the same "
-        "gears. The reference is of another machine, or both gears have worn since."
+        "gears. The reference is of another machine, all teeth have changed since, or flanks part at a light load."
     )
     return [message]
 

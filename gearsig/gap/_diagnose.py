@@ -5,15 +5,23 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from hashlib import sha256
 from pathlib import Path
+from typing import TypeGuard
 
 import numpy as np
 
 from gearsig.checks import closest_match_hint, listed, short
-from gearsig.errors import GearsigError, InputError, RefusalError
+from gearsig.errors import GearsigError, InputError, RefusalError, answer_or_none
 from gearsig.formatting import odds_text
-from gearsig.gap._attribution import Attribution, attribute, with_dominant_order_counted, with_unknown_within_floor
+from gearsig.gap._attribution import (
+    Attribution,
+    attribute,
+    likely_beside,
+    with_dominant_order_counted,
+    with_unknown_within_floor,
+)
 from gearsig.gap._conditions import Condition, Stage, conditions_of, simulated, warnings_of
 from gearsig.gap._curves import angle_curves, average_curves, spectrum_curves
 from gearsig.gap._evidence import CRACK, evidence_of
@@ -26,7 +34,9 @@ from gearsig.gap._population import load_learned
 from gearsig.gap._reduction import ReducedRecording
 from gearsig.gap._report import (
     NAMING,
+    SETTLED,
     GapCause,
+    GapOutcome,
     GapPlace,
     GapReport,
     Interval,
@@ -37,6 +47,7 @@ from gearsig.gap._report import (
     likeliest_first,
     most_probable_two,
     named_cause,
+    named_effects,
     names_single_effect,
     unbounded_fits,
 )
@@ -51,13 +62,14 @@ from gearsig.gap._trials import (
     run_for_a_moment,
     start_healthy_trial,
     steps_of,
+    try_effects,
 )
 from gearsig.gap.start_stop._diagnose import diagnose_start_stop, refuse_start_stop
 from gearsig.prepared import PreparedRecording
 from gearsig.processes import one_pool, start_early
 from gearsig.recording import Recording, check_recording, metres_per_second_squared
 from gearsig.rig import Rig
-from gearsig.severity import CrackEstimate, estimate_crack
+from gearsig.severity import TEETH_COUNT, CrackEstimate, NoCrackSeen, estimate_crack
 
 USER_EFFECT_MESSAGE = (
     "The recognition has never seen “{title}”: it was simulated, fitted and scored on held-out data like the likeliest "
@@ -80,10 +92,16 @@ OF_THE_WAVEFORM = (
     "simulator is as like the machine as one of its own specimens is to another."
 )
 
+BY_THE_CRACK_ESTIMATE = (
+    "The crack estimate (`gearsig crack`) says of {name}: {text} {depth}It rests on the shape of one tooth's event, "
+    "the probability here on all features and on trials on the twin, so that the two can differ."
+)
+NO_CRACK_ESTIMATE = (
+    "The crack estimate (`gearsig crack`) says nothing of a crack in {name}: {reason}. The probability here rests on "
+    "all features and on trials on the twin."
+)
 OF_THE_DEPTH = (
-    "The depth is that of the crack estimate, {depth:.2g} mm, with the interval that held nine in ten of the machines "
-    "it was calibrated on, {low:.2g} to {high:.2g} mm. It rests on the shape of one tooth's event, the probability "
-    "here on all features and on trials on the twin, so that the two can differ."
+    "A crack's depth here is that one; its interval held nine in ten of the machines that it was calibrated on. "
 )
 
 NOT_NEARER = (
@@ -204,13 +222,15 @@ def diagnose_gap(
     )
     clearest = max(conditions, key=lambda condition: condition.size.structural.value)
     recording = next(item for item in prepared if item.recording.name == clearest.facts.name)
+    reference = {item.recording.name: item for item in healthy}.get(clearest.facts.reference)
 
     # 4. Which effect: what the forests and labelled recordings say, and of the likeliest what trials on the twin say.
     tell("recognising", 0.2)
     labelled, left_out = labelled_changes(learn, healthy, conditions, twin, cache, fresh=fresh)
-    tooth_errors = _tooth_error_evidences(conditions, recordings, references)
+    tooth_errors, no_tooth_errors = _tooth_error_evidences(conditions, recordings, references)
     with ThreadPoolExecutor(1) as executor:  # step 5 has time while other processes simulate
         unexpected_job = executor.submit(unexpected_findings, recording, healthy)
+        crack_job = executor.submit(_crack_answer, recording, reference)
         attribution = attribute(
             conditions,
             known,
@@ -234,10 +254,14 @@ def diagnose_gap(
 
     # 6. Where, and of each cause where it sits, how severe it is and what speaks for it.
     places = ranked_places(gap, [place_of_unexpected(item, recording.rig) for item in unexpected])
-    cause_list = [_cause(name, p, known, tried, conditions, places) for name, p in probabilities.items()]
-    reference_of = {item.recording.name: item for item in healthy}.get(clearest.facts.reference)
-    cause_list, depths = _with_crack_depth(cause_list, recording, reference_of, tried)
-    causes = in_order(cause_list, outcome)
+    crack = crack_job.result()
+    causes = in_order(
+        [
+            _with_depth(_cause(name, p, known, tried, conditions, places), crack, tried)
+            for name, p in probabilities.items()
+        ],
+        outcome,
+    )
     named = causes[0] if outcome in NAMING else None
     fitted = None if named is None else named.fitted
 
@@ -257,7 +281,15 @@ def diagnose_gap(
         repeatability=clearest.size.repeatability.value,
         places=places,
         causes=causes,
-        steps=steps_of(conditions, tried, causes) if tried and named is not None else (),
+        steps=()
+        if named is None or not tried
+        else steps_of(
+            conditions,
+            tried,
+            causes,
+            likely_beside(causes, known, gap, clearest.now.frame),
+            partial(_tried_beside, known, twin, conditions, cache, fresh=fresh),
+        ),
         next_recordings=next_ones,
         spectra=spectrum_curves(
             clearest.now,
@@ -289,9 +321,12 @@ def diagnose_gap(
             ),
             *effects_without_setting(twin, allowed),
             *unexpected_messages,
-            *(depths or _fit_messages(named, tried)),
+            *_crack_messages(crack, clearest.facts.name, causes, outcome),
+            *_fit_messages(named, tried, crack),
+            *([TEETH_COUNT] if named is not None and named.place.startswith("tooth") else ()),
             *_waveform_messages(tried, known, clearest),
-            *(_encoder_messages(tooth_errors, known) if named is not None else ()),
+            *_encoder_messages(tooth_errors, known),
+            *no_tooth_errors,
         ),
         twin_toml=""
         if fitted is None
@@ -456,12 +491,17 @@ def _waveform_messages(
 
 def _tooth_error_evidences(
     conditions: Sequence[Condition], recordings: Sequence[Recording], references: Sequence[Recording]
-) -> list[ToothErrorEvidence]:
-    """Return what encoders say, of the conditions that have a reference and encoders in both."""
-    of = {prepared.name: prepared for prepared in (*references, *recordings)}
-    pairs = [(c.facts.name, c.facts.reference) for c in conditions if c.facts.reference]
-    evidences = [tooth_error_evidence(of[now], of[healthy]) for now, healthy in pairs]
-    return [evidence for evidence in evidences if evidence is not None]
+) -> tuple[list[ToothErrorEvidence], list[str]]:
+    """Return what encoders say, of conditions with a reference and encoders in both; and why some say nothing."""
+    of = {recording.name: recording for recording in (*references, *recordings)}
+    refusals: list[str] = []
+    evidences = [
+        answer_or_none(partial(tooth_error_evidence, of[c.facts.name], of[c.facts.reference]), c.facts.name, refusals)
+        for c in conditions
+        if c.facts.reference
+    ]
+    known = [evidence for evidence in evidences if evidence is not None]
+    return known, [f"No transmission error, in spite of encoders, of {refusal}." for refusal in refusals]
 
 
 def _encoder_messages(evidences: Sequence[ToothErrorEvidence], known: Mapping[str, GapEffect]) -> list[str]:
@@ -480,9 +520,9 @@ def _encoder_messages(evidences: Sequence[ToothErrorEvidence], known: Mapping[st
     return [f"{changed}{where}; by its profile alone, all faults of teeth as likely before: {likely}."]
 
 
-def _fit_messages(named: GapCause | None, tried: Mapping[str, TriedEffect]) -> list[str]:
-    """Say what the stated severity is worth, or that there is none."""
-    if named is None:
+def _fit_messages(named: GapCause | None, tried: Mapping[str, TriedEffect], crack: CrackAnswer) -> list[str]:
+    """Say what the stated severity is worth, or that there is none; nothing of a crack whose depth was estimated."""
+    if named is None or (named.name == CRACK and _is_depth(crack)):
         return []
     if named.name in tried and tried[named.name].is_shown:
         return [OF_THE_WAVEFORM]
@@ -535,33 +575,64 @@ def _cause(
     )
 
 
-def _with_crack_depth(
-    causes: Sequence[GapCause],
-    recording: PreparedRecording,
-    reference: PreparedRecording | None,
-    tried: Mapping[str, TriedEffect],
-) -> tuple[list[GapCause], list[str]]:
-    """Return the causes with the depth of a crack as `estimate_crack` measures it, and what is to be said of it.
+CrackAnswer = CrackEstimate | NoCrackSeen | GearsigError
+"""What `gearsig crack` says, or why it says nothing."""
+
+
+def _crack_answer(recording: PreparedRecording, reference: PreparedRecording | None) -> CrackAnswer:
+    """Return what `gearsig crack` says of the same files."""
+    try:
+        return estimate_crack(recording, reference=reference)
+    except GearsigError as error:
+        return error
+
+
+def _is_depth(crack: CrackAnswer) -> TypeGuard[CrackEstimate]:
+    return isinstance(crack, CrackEstimate) and crack.with_reference
+
+
+def _with_depth(cause: GapCause, crack: CrackAnswer, tried: Mapping[str, TriedEffect]) -> GapCause:
+    """Return a cause, that of a crack with the depth as `estimate_crack` measures it.
 
     A fit to the twin hangs on the path to a sensor; the estimate takes the cracked tooth relative to the mesh.
     """
-    crack = next((cause for cause in causes if cause.name == CRACK), None)
-    if crack is None or CRACK not in tried or reference is None:
-        return list(causes), []
-    try:
-        estimate = estimate_crack(recording, reference=reference)
-    except GearsigError:
-        return list(causes), []
-    if not isinstance(estimate, CrackEstimate):
-        return list(causes), []
-    depth = Interval(estimate.depth_mm, *estimate.interval_mm)
+    if cause.name != CRACK or CRACK not in tried or not _is_depth(crack):
+        return cause
     simulated_mm = [float(path.severities[-1]) for path in tried[CRACK].paths]
-    fitted = crack.fitted
-    if fitted is not None and depth.value <= max(simulated_mm, default=0.0):
-        fitted = replace(fitted, severity=depth.value)
-    changed = replace(crack, severity=depth, fitted=fitted)
-    message = OF_THE_DEPTH.format(depth=depth.value, low=depth.low, high=depth.high)
-    return [changed if cause is crack else cause for cause in causes], [message]
+    fitted = cause.fitted
+    if fitted is not None and crack.depth_mm <= max(simulated_mm, default=0.0):
+        fitted = replace(fitted, severity=crack.depth_mm)
+    return replace(cause, severity=Interval(crack.depth_mm, *crack.interval_mm), fitted=fitted)
+
+
+def _crack_messages(crack: CrackAnswer, name: str, causes: Sequence[GapCause], outcome: GapOutcome) -> list[str]:
+    """Say what `gearsig crack` says of the same files: where it sees damage, or where a crack is named and it does not.
+
+    Whoever asks both is told why they differ.
+    """
+    if not isinstance(crack, CrackEstimate) and CRACK not in named_effects(causes, outcome):
+        return []
+    if isinstance(crack, GearsigError):
+        return [NO_CRACK_ESTIMATE.format(name=name, reason=getattr(crack, "reason", crack))]
+    has_depth = any(c.name == CRACK and c.severity is not None and c.probability >= SETTLED for c in causes)
+    depth = OF_THE_DEPTH if has_depth and _is_depth(crack) else ""
+    return [BY_THE_CRACK_ESTIMATE.format(name=name, text=crack.text, depth=depth)]
+
+
+def _tried_beside(
+    known: Mapping[str, GapEffect],
+    twin: Twin,
+    conditions: Sequence[Condition],
+    cache: Path | None,
+    name: str,
+    *,
+    fresh: bool,
+) -> TriedEffect | None:
+    """Try one effect more; None where the rig has no place for it, or it cannot be simulated there."""
+    try:
+        return try_effects([known[name]], twin, conditions, cache, lambda *_: None, fresh=fresh).get(name)
+    except RefusalError:
+        return None
 
 
 def _after_and_next(

@@ -194,6 +194,7 @@ def next_steps(
         "slow_loads": is_which_tooth_fault and len(slow) < 2,
         "run_up": is_which_tooth_fault and has_reference and not has_run_up,
         "other_speed": passed_on and max(speeds) < WIDE * min(speeds),
+        "less_gain": "clipping" in likely and len({*likely} - {NONE, UNKNOWN}) > 1,
         "label": not is_labelled and outcome is not GapOutcome.EFFECT and not {NONE, UNKNOWN}.issuperset(likely),
     }
     return tuple(NextStep(code, NEXT_STEPS[code]) for code, worth in is_worth.items() if worth)

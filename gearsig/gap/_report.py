@@ -513,7 +513,7 @@ class NextStep:
     Parameters
     ----------
     code : str
-        "healthy", "encoders", "slow_loads", "run_up", "other_speed" or "label".
+        "healthy", "encoders", "slow_loads", "run_up", "other_speed", "less_gain" or "label".
     text : str
     """
 
@@ -857,18 +857,19 @@ def names_single_effect(causes: Sequence[GapCause]) -> bool:
     return len(probabilities) > 1 and probabilities[1] < SETTLED <= probabilities[0]
 
 
+def named_effects(causes: Sequence[GapCause], outcome: GapOutcome) -> tuple[str, ...]:
+    """Return the effects that an answer names: the first, or those that cannot be told apart."""
+    if outcome is GapOutcome.CANNOT_SEPARATE:
+        return inseparable_effects(causes)
+    return (causes[0].name,) if outcome in NAMING else ()
+
+
 def unbounded_fits(causes: Sequence[GapCause], outcome: GapOutcome) -> list[str]:
-    """Say of what is named which effects the fit can give no size, not even tell from nothing at all."""
-    named = (
-        inseparable_effects(causes)
-        if outcome is GapOutcome.CANNOT_SEPARATE
-        else [causes[0].name]
-        if outcome in NAMING
-        else ()
-    )
+    """Say of what is named which effects the fit can give no size."""
+    named = named_effects(causes, outcome)
     return [
-        f"{cause.title[0].upper()}{cause.title[1:]}: on the twin any severity fits the recordings about as well, none "
-        "at all included. How the recordings changed speaks for it, the simulation does not."
+        f"{cause.title[0].upper()}{cause.title[1:]}: the fit to the twin bounds its severity neither above nor below. "
+        "How the recordings changed speaks for it, the simulation hardly does."
         for cause in causes
         if cause.name in named and cause.severity is not None and cause.severity.is_unbounded
     ]
@@ -906,7 +907,13 @@ def _shrinkage_text(report: GapReport) -> str:
         shrinks = "does not shrink"
     elif shrinkage.after.high < 1.0:
         shrinks = f"shrinks {sizes}, within what healthy machines show,"
-    return f"How far: with the effect added, the gap on the features that it changes {shrinks} on {shrinkage.held_out}."
+    far = f"How far: with the effect added, the gap on the features that it changes {shrinks} on {shrinkage.held_out}."
+    for one, both in zip(report.steps[1:], report.steps[2:], strict=False):  # with two effects, where one leaves much
+        left = f"from {one.remaining.value:.2g} to {both.remaining.value:.2g} structural floors"
+        far += (
+            f" It cannot make all lines; {both.label} beside it takes the whole gap {left}, and may be there as well."
+        )
+    return far
 
 
 SLOW_RPM = 300.0
@@ -926,6 +933,8 @@ NEXT_STEPS = {
     "sensors",
     "other_speed": "the same machine at twice or half the speed: a resonance stays at its frequency, what belongs to a "
     "shaft at its order",
+    "less_gain": "the same with less gain, or a wider range: tops that are cut off and loud low orders both look like "
+    "a sine",
     "label": "two labelled recordings of each likely cause on this rig (--learn): nothing else tells so much",
 }
 
@@ -943,7 +952,7 @@ def _next(report: GapReport) -> str:
         return f"Next: another sensor nearer to where it is loudest{ways}."
     if report.outcome is GapOutcome.NO_GAP:
         return "Next: nothing is needed; keep these recordings, later ones are best compared with them."
-    if sum(cause.shrinkage is not None for cause in report.causes) < 2:
+    if not names_single_effect(report.causes) and sum(cause.shrinkage is not None for cause in report.causes) < 2:
         ways = " or ".join(_unvaried_quantities(report)) or "sensor"
         return f"Next: another {ways}; no two effects are likely enough to compute which would tell most."
     where_to_look = _common_place(report)

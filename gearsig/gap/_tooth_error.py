@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from gearsig.cache import read_arrays
 from gearsig.checks import FloatArray
-from gearsig.errors import GearsigError, InputError
+from gearsig.errors import InputError
 from gearsig.gap._evidence import TOOTH_FAULTS
 from gearsig.gap._report import shares_of
 from gearsig.motion import TransmissionError, transmission_error
@@ -341,13 +341,15 @@ def tooth_error_evidence(recording: Recording, reference: Recording) -> ToothErr
     ----------
     recording, reference : Recording
         With their rig; the same encoders, not moved in between.
+
+    Raises
+    ------
+    InputError, RefusalError
+        If encoders are there, and the transmission error cannot be had of them; see `transmission_error`.
     """
     if not (has_encoders(recording) and has_encoders(reference)):
         return None
-    try:
-        now, healthy = (transmission_error(measured, pair=_first_pair(measured)) for measured in (recording, reference))
-    except GearsigError:
-        return None
+    now, healthy = (transmission_error(measured, pair=_first_pair(measured)) for measured in (recording, reference))
     changes = [change for change in tooth_error_changes(now, healthy) if change.is_clear]
     if not changes:
         return None

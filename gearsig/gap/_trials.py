@@ -669,24 +669,48 @@ def _left_out_changes(condition: Condition, index: int, n: int) -> tuple[tuple[O
 MIN_CLOSED = 0.05
 """Share of the gap that a further effect must take away to be shown."""
 
-MAX_ADDED = 2
+MUCH_LEFT = 1.0
+"""Structural floors of the whole gap that one effect must leave for another beside it to be tried."""
 
 
 def steps_of(
-    conditions: Sequence[Condition], tried: dict[str, TriedEffect], causes: Sequence[GapCause]
+    conditions: Sequence[Condition],
+    tried: Mapping[str, TriedEffect],
+    causes: Sequence[GapCause],
+    beside: GapCause | None,
+    try_further: Callable[[str], TriedEffect | None],
 ) -> tuple[GapStep, ...]:
-    """Return the gap before, and what is left with the likeliest effect, then with the next one as well."""
+    """Return the whole gap before, what is left with the likeliest effect, and with another one beside it as well.
+
+    Parameters
+    ----------
+    conditions : sequence of Condition
+    tried : mapping
+        Effect → how it was tried.
+    causes : sequence of GapCause
+        In their order.
+    beside : GapCause or None
+        What may be there beside the likeliest, where that leaves much.
+    try_further : callable
+        Effect → how it was tried, None where it cannot be: asked where `beside` was not.
+    """
     folds = folds_of(conditions)
-    names = [c.name for c in causes if c.name in tried][:MAX_ADDED]
     steps = [GapStep("before", _remaining_gap(conditions, folds, []))]
     added: list[TriedEffect] = []
-    for name in names:
-        remaining = _remaining_gap(conditions, folds, [*added, tried[name]])
-        if added and remaining.value > (1.0 - MIN_CLOSED) * steps[-1].remaining.value:
-            break
-        added.append(tried[name])
-        title = next(c.title for c in causes if c.name == name)
-        steps.append(GapStep(title, remaining))
+
+    def add(cause: GapCause, effect: TriedEffect | None) -> None:
+        if effect is None:
+            return
+        remaining = _remaining_gap(conditions, folds, [*added, effect])
+        if not added or remaining.value <= (1.0 - MIN_CLOSED) * steps[-1].remaining.value:
+            added.append(effect)
+            steps.append(GapStep(cause.title, remaining))
+
+    first = next((cause for cause in causes if cause.name in tried), None)
+    if first is not None:
+        add(first, tried[first.name])
+    if beside is not None and added and steps[-1].remaining.value > MUCH_LEFT:
+        add(beside, tried.get(beside.name) or try_further(beside.name))
     return tuple(steps)
 
 
@@ -747,13 +771,16 @@ def place_of(added: AddedEffect, frame: GearFrame, places: Sequence[GapPlace]) -
         return ""
     shaft = frame.shafts[SIDES.index(str(side))]
     words = shaft_text(frame, SIDES.index(str(side)))
+    mate = " or its mate" if frame.teeth[0] == frame.teeth[1] else ""  # the same teeth meet at every revolution
     if "tooth" not in options:
-        return f"the gear on {words}" if "gear" in options else words
+        return f"the gear on {words}{mate}" if "gear" in options else words
     tooth_place = _tooth_place(shaft, places)
     if tooth_place is None or (tooth_place.tooth is None and tooth_place.angle_deg is None):
-        return f"one tooth of the gear on {words}"
+        return f"one tooth of the gear on {words}{mate}"
     tooth = f"tooth {tooth_place.tooth} of the gear on"
-    return f"{tooth} {words}" if tooth_place.tooth is not None else f"{tooth_place.angle_deg:.0f}° of {words}"
+    return (
+        f"{tooth} {words}{mate}" if tooth_place.tooth is not None else f"{tooth_place.angle_deg:.0f}° of {words}{mate}"
+    )
 
 
 def _bearings(name: str, fitted: str, frame: GearFrame, places: Sequence[GapPlace]) -> list[str]:

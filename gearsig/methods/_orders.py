@@ -1,4 +1,4 @@
-"""Methods along a run: order and frequency map, tracked orders, orders extracted by a Vold–Kalman filter."""
+"""Methods along a run: order and frequency map, tracked and extracted orders, transmission error by encoders."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ from gearsig.methods._table import (
     verbatim,
     waveforms_of,
 )
+from gearsig.motion import transmission_error
 from gearsig.orders import OrderMap, TrackedOrder, frequency_map, order_map, track_orders, track_vold_kalman
 from gearsig.plot import ChartLine, LevelPanel, LinePanel, decibel_text, decibels, with_unit
 from gearsig.prepared import PreparedRecording
@@ -256,6 +257,54 @@ def _samples_of_vold_kalman(options: Mapping[str, Any]) -> int:
     return max(MIN_LENGTH, MAX_EFFORT // max(2, len(options["orders"])) ** 2)
 
 
+# --------------------
+# Transmission error, from both shafts' encoders and not from the channel that is asked for.
+# --------------------
+
+
+def _transmission_error(prepared: PreparedRecording, channel: str, pair: str) -> MethodAnswer:
+    del channel
+    error = transmission_error(prepared.recording, prepared.rig, pair=pair)
+    unit, pitches = "µm", (np.arange(error.n_steps) + 0.5) / error.n_steps
+    mesh = ChartLine(pitches, error.mesh_um, "mesh")
+    panels = [LinePanel([mesh], "tooth pitches", unit, title="mesh, what every tooth pair repeats")]
+    tables = {"mesh": {"tooth pitches": pitches, with_unit("mesh", unit): error.mesh_um}}
+    swings = {"mesh": float(np.ptp(error.mesh_um))}
+    for side, gear in enumerate(("driver", "driven gear")):
+        average = error.average(side)
+        values, twice = average.values, 2.0 * average.standard_error
+        angle_deg = 360.0 * (np.arange(len(values)) + 0.5) / len(values)
+        line = ChartLine(angle_deg, values, gear, band=(values - twice, values + twice))
+        title = f"{gear}, what it adds at each of its teeth, ± 2 standard errors"
+        panels.append(LinePanel([line], f"angle of {average.shaft} (deg)", unit, x_limits=(0.0, 360.0), title=title))
+        tables[gear] = {
+            f"angle of {average.shaft} (deg)": angle_deg,
+            with_unit(gear, unit): values,
+            with_unit("standard error", unit): average.standard_error,
+        }
+        swings[gear] = float(np.ptp(values))
+    signal, caption = error.signal(), f"transmission error of {error.teeth[0]}/{error.teeth[1]} teeth"
+    name = signal.channel_names[0]
+    shown = ", ".join(f"{part} **{readable(swing, 3)} {unit}**" for part, swing in swings.items())
+    return MethodAnswer(
+        name,
+        caption,
+        lambda: plot.panels_figure(panels, title=caption),
+        {f"angle of {error.shafts[0]} (revolutions)": signal.revolutions, with_unit(name, unit): signal.samples[0]},
+        tables=tables,
+        numbers={"speed_rpm": error.speed_rpm, "mesh_hz": error.mesh_hz, "peak_to_peak_um": swings},
+        panels=tuple(panels),
+        facts=(f"Peak to peak: {shown}; {readable(error.mesh_hz)} tooth pairs meet per second.",),
+        notes=(
+            (
+                "Positive where the driven gear lags. It is the static error under load where the mesh lies well below "
+                "the first resonance in which teeth yield, else the dynamic one."
+            ),
+            *error.notes,
+        ),
+    )
+
+
 ALONG = {
     "order-map": Method(
         "Order map", "Orders over time and speed.", _order_map, (HIGHEST, SHAFT), in_blocks=_order_map_in_blocks,
@@ -263,6 +312,17 @@ ALONG = {
     "frequency-map": Method(
         "Frequency map", "Frequencies over time and speed.", _frequency_map, (HIGHEST,),
         in_blocks=_frequency_map_in_blocks,
+    ),
+    "transmission-error": Method(
+        "Transmission error",
+        "How far the driven gear lags, by encoders on both shafts; and what the mesh and either gear make of it.",
+        _transmission_error,
+        (
+            MethodOption(
+                "pair", "Gear pair", "name", "", empty="the only one",
+                known=lambda prepared, _: [pair.name for pair in prepared.rig.pairs],
+            ),
+        ),
     ),
     "tracking": Method(
         "Tracked orders", "Level and phase of orders over speed.", _tracking, (ORDERS, SHAFT), "Map", 10_000_000, 10**7

@@ -6,6 +6,7 @@ made by `python -m app.studies.crack_severity`.
 
 from gearsig.severity._estimate import (
     LARGEST_TORQUE_CHANGE,
+    TEETH_COUNT,
     GearEvidence,
     estimate_crack,
     gear_evidence,
@@ -82,6 +83,7 @@ __all__ = [
     "SHAPE",
     "SHAPED",
     "SPALLED",
+    "TEETH_COUNT",
     "WITH_REFERENCE",
     "Calibration",
     "Conditions",

@@ -444,6 +444,9 @@ def percent_per_mm(teeth: int, module_mm: float, pressure_angle_deg: float = 20.
     return 100.0 * sin(radians(45.0)) / root_thickness_mm(teeth, module_mm, pressure_angle_deg)
 
 
+TEETH_COUNT = "Teeth count from 1 at the mark in order of engagement; the place is good to about one tooth."
+"""Beside the number of a tooth."""
+
 SMALLEST_AGREEMENT = 0.4
 """Agreement of the tooth pattern with the reference's: other gears reach 0.38 once in a hundred cases; the right ones
 fall below it only where a deep crack dominates the pattern."""
@@ -677,7 +680,7 @@ def _crack_estimate(
     place = (best.event.centre_rev - calibration.lag_pitches / teeth) % 1.0
     further_prominences = [e.event.prominence for e in gears if e is not best]
     if best.shaft.has_mark:
-        reasons.append("Teeth count from 1 at the mark in order of engagement; the place is good to about one tooth.")
+        reasons.append(TEETH_COUNT)
     else:
         reasons.append("There is no mark on this shaft: the angle holds for this record only, and names no tooth.")
     reasons.append("The depth assumes a crack through the whole face width.")

@@ -13,7 +13,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray, freeze, frozen_array
 from gearsig.errors import InputError, RefusalError
-from gearsig.formatting import percent, with_minus
+from gearsig.formatting import odds_text, with_minus
 from gearsig.results import Result
 from gearsig.severity._features import FEATURES, IN_WORDS, RELIEF, RISING, SHAPE, SHAPED
 
@@ -400,7 +400,7 @@ class CrackEstimate(Result):
     @property
     def text(self) -> str:
         """The statement in one sentence, or two."""
-        not_cracked = percent(1.0 - self.kind_probabilities.get(CRACKED, 1.0))
+        not_cracked = odds_text(1.0 - self.kind_probabilities.get(CRACKED, 1.0))
         if self.kind == OTHER_DAMAGE:
             rather = f"{OTHER_DAMAGE} rather than cracked ({not_cracked})"
             return f"Damage at {self.place}, {rather}; a crack would be {self.size}."

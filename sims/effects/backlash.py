@@ -73,5 +73,6 @@ EFFECT = Effect(
         (("mesh.half", book.UP), ("line.half_mesh", book.UP)),
         "half orders of the mesh when teeth part",
         textbook_signature,
+        source="A. Kahraman, R. Singh, Non-linear dynamics of a spur gear pair, J. Sound Vib. 142 (1990)",
     ),
 )

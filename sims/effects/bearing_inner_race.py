@@ -33,5 +33,7 @@ EFFECT = Effect(
         (("envelope.inner", UP),),
         "envelope lines at the ball pass order of the inner race",
         textbook_signature,
+        source="P. D. McFadden, J. D. Smith, Model for the vibration produced by a single point defect in a rolling "
+        "element bearing, J. Sound Vib. 96 (1984)",
     ),
 )

@@ -37,5 +37,7 @@ EFFECT = Effect(
         (("envelope.outer", UP),),
         "envelope lines at the ball pass order of the outer race",
         textbook_signature,
+        source="P. D. McFadden, J. D. Smith, Model for the vibration produced by a single point defect in a rolling "
+        "element bearing, J. Sound Vib. 96 (1984)",
     ),
 )

@@ -134,5 +134,7 @@ EFFECT = Effect(
         (("tooth.{side}.elsewhere", book.UP), ("shaft.{side}.low", book.UP), ("sideband.{side}.3to5", book.UP)),
         "all orders of the shaft rise, at every tooth",
         textbook_signature,
+        source="W. D. Mark, Analysis of the vibratory excitation of gear systems: basic theory, J. Acoust. Soc. Am. 63 "
+        "(1978)",
     ),
 )

@@ -18,6 +18,12 @@ from sims.machine import log_uniform
 
 UP, DOWN, EITHER = 1, -1, 0
 
+HANDBOOKS = (
+    "R. B. Randall, Vibration-based Condition Monitoring, 2nd ed., 2021, chapters 2, 5, 6 and 7; ISO 13373-2:2016, "
+    "annexes"
+)
+"""Which most of how effects show is from."""
+
 
 @dataclass(frozen=True)
 class Textbook:
@@ -34,14 +40,13 @@ class Textbook:
         (scene, size, rng) → `Signature` with a drawn balance; its size is within `SIZES`. None: no synthetic recording
         is made, as the simulators show the effect completely.
     source : str
-        In addition to R. B. Randall, *Vibration-based Condition Monitoring*, 2nd ed., 2021, chapters 2, 5, 6 and 7, and
-        ISO 13373-2:2016, annexes, the sources of most of it.
+        Of the ways in which it shows: in addition to the handbooks, or these alone.
     """
 
     signs: tuple[tuple[str, int], ...]
     words: str
     draw: Callable[[SyntheticScene, float, np.random.Generator], Signature] | None = None
-    source: str = ""
+    source: str = HANDBOOKS
 
 
 # --------------------

@@ -73,5 +73,7 @@ EFFECT = Effect(
         (("tooth.{side}.prominence", book.UP), ("tooth.{side}.kurtosis", book.UP), ("tooth.{side}.centroid", book.UP)),
         "a short impact at one tooth, high in frequency",
         textbook_signature,
+        source="H. Endo, R. B. Randall, C. Gosselin, Differential diagnosis of spall vs. cracks in the gear tooth "
+        "fillet region: experimental validation, Mech. Syst. Signal Process. 23 (2009)",
     ),
 )

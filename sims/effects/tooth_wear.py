@@ -64,5 +64,7 @@ EFFECT = Effect(
         (("mesh.total", book.UP), ("mesh.share.2", book.UP), ("mesh.share.3", book.UP)),
         "mesh harmonics rise, the higher ones most",
         textbook_signature,
+        source="H. Ding, A. Kahraman, Interactions between nonlinear spur gear dynamics and surface wear, J. Sound "
+        "Vib. 307 (2007)",
     ),
 )

@@ -74,6 +74,11 @@ def test_paths_and_shafts_ask_for_another_speed_where_the_speed_was_not_varied(b
     assert codes(*both, points=TWO_SPEEDS) == []
 
 
+def test_what_may_be_cut_off_asks_for_less_gain() -> None:
+    assert codes("clipping", "misalignment") == ["less_gain"]
+    assert codes("clipping") == codes("misalignment") == []
+
+
 def test_labels_are_asked_for_where_it_is_not_settled() -> None:
     assert codes("root_crack", labelled=False) == ["label"]
     assert codes("root_crack", labelled=False, outcome=GapOutcome.EFFECT) == []

@@ -6,7 +6,17 @@ from dataclasses import replace
 
 import pytest
 
-from gearsig.gap import UNKNOWN, GapEffect, GapPlace, PlaceKind, gear_frame, ranked_places, with_dominant_order_counted
+from gearsig.gap import (
+    UNKNOWN,
+    GapCause,
+    GapEffect,
+    GapPlace,
+    PlaceKind,
+    gear_frame,
+    likely_beside,
+    ranked_places,
+    with_dominant_order_counted,
+)
 from tests.gap.synthetic import RIG, TEETH
 
 NAN = float("nan")
@@ -77,3 +87,18 @@ def test_what_is_less_than_half_or_follows_from_much_counts_against_nothing() ->
     ]
     assert all(against(one) == pytest.approx(FOUND) for one in nothing)
     assert against(place(PlaceKind.ENVELOPE, 0.98, 3.35))["misalignment"] < 0.05
+
+
+def test_what_makes_an_order_that_the_first_cannot_may_be_there_beside_it() -> None:
+    causes = [GapCause(name, name, name, "", p) for name, p in (("bearing", 0.9), ("misalignment", 0.02))]
+
+    def beside(*places: GapPlace) -> str | None:
+        cause = likely_beside(causes, EFFECTS, places, gear_frame(RIG))
+        return None if cause is None else cause.name
+
+    order = place(PlaceKind.SHAFT, 0.1, 2.0)
+    assert beside(MESH, order) == "misalignment"
+    assert beside(MESH, ENVELOPE) is None  # it makes that, and the mesh is no order that speaks against it
+    assert beside(replace(order, structural=0.9)) is None
+    causes[1] = replace(causes[1], group="bearing")
+    assert beside(order) is None  # of one kind one is there instead of the other

@@ -158,6 +158,13 @@ def test_a_gap_that_an_effect_explains_ends_within_the_floor() -> None:
     assert "from 3.8 to 2 structural floors, by 60 % (50 to 70 %) of its energy above one, on" in line
 
 
+def test_an_effect_that_takes_what_the_first_leaves_is_told_beside_it() -> None:
+    report = effect_report()
+    beside = "housing and sensor resonances beside it takes the whole gap from 3.9 to 1.6 structural floors"
+    assert beside in report.verdict[2]
+    assert "beside it" not in replace(report, steps=report.steps[:2]).verdict[2]
+
+
 def test_a_tooth_that_both_likeliest_effects_share_can_be_looked_at() -> None:
     report = replace(cannot_separate_report(), next_recordings=(), references=("healthy.h5",))
     at_one = tuple(replace(cause, place="tooth 21 of the gear on the input shaft") for cause in report.causes)
@@ -212,6 +219,8 @@ def test_where_one_effect_alone_is_likely_no_recording_is_asked_for() -> None:
     assert not names_single_effect(report.causes)
     assert not names_single_effect(sure[:1])
     assert "further apart" not in replace(report, causes=sure).verdict[3]
+    alone_tried = (sure[0], *(replace(cause, shrinkage=None) for cause in sure[1:]))
+    assert "no other effect is likely enough" in replace(report, causes=alone_tried).verdict[3]
 
 
 def test_what_was_varied_already_is_not_advised() -> None:

@@ -176,6 +176,13 @@ def test_the_tooth_is_the_recordings() -> None:
     assert at_recorded_tooth(CRACK, FRAME, [tooth_place(8)]).options == {"gear": "driver", "tooth": 8.0}
 
 
+def test_gears_of_equal_teeth_meet_the_same_mate_and_cannot_be_told_apart() -> None:
+    equal = replace(FRAME, teeth=(50, 50))
+    assert place_of(CRACK, equal, [tooth_place(8)]) == "tooth 8 of the gear on the input shaft or its mate"
+    unround = AddedEffect("eccentricity", 30.0, {"gear": "driven"})
+    assert place_of(unround, equal, ()) == "the gear on the output shaft or its mate"
+
+
 def test_without_a_mark_there_is_an_angle_and_the_simulated_tooth_stays() -> None:
     assert place_of(CRACK, FRAME, [tooth_place(None)]) == "87° of the input shaft"
     assert at_recorded_tooth(CRACK, FRAME, [tooth_place(None)]) == CRACK

@@ -17,6 +17,7 @@ from gearsig.recording import Channel, Recording, write_recording
 from gearsig.report import answer_json, fitting_methods, named_method, write_answer
 from gearsig.rig import Bearing, ConstantSpeed, GearPair, Rig, Shaft
 from tests.marks import further
+from tests.motion.test_transmission_error import recording as encoders_of_both_shafts
 
 RATE_HZ, N = 8192.0, 16384
 T = np.arange(N) / RATE_HZ
@@ -41,7 +42,8 @@ def recording(seed: int = 0) -> Recording:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name if name in OF_EACH_KIND else further(name) for name in METHODS])
 def test_each_method_writes_figure_table_arrays_and_numbers(name, tmp_path) -> None:
-    answer = apply_method(name, recording(), **({"n_modes": 3} if name == "modes" else {}))
+    recorded = encoders_of_both_shafts() if name == "transmission-error" else recording()
+    answer = apply_method(name, recorded, **({"n_modes": 3} if name == "modes" else {}))
     png, svg, csv, h5, numbers = write_answer(answer, tmp_path)
     assert png.stat().st_size > 5_000
     assert svg.read_text(encoding="utf-8").lstrip().startswith("<?xml")
@@ -56,7 +58,17 @@ def test_each_method_writes_figure_table_arrays_and_numbers(name, tmp_path) -> N
         for matrix in answer.matrices:
             assert file["matrices"][matrix].ndim == 2
     about = json.loads(numbers.read_text(encoding="utf-8"))
-    assert (about["method"], about["channel"]) == (name, "a1")
+    assert (about["method"], about["channel"]) == (name, answer.channel)
+
+
+def test_transmission_error_is_parted_into_mesh_and_gears_and_asks_for_two_encoders() -> None:
+    answer = apply_method("transmission-error", encoders_of_both_shafts())
+    assert answer.numbers["peak_to_peak_um"]["driver"] == pytest.approx(4.0, abs=0.1)  # one tooth by so much
+    assert answer.numbers["peak_to_peak_um"]["driven gear"] == pytest.approx(10.0, abs=0.1)  # order 1 of 5 µm
+    assert len(answer.panels) == len(answer.tables) == 3
+    without = replace(recording(), rig=encoders_of_both_shafts().rig, speed=None)
+    with pytest.raises(RefusalError, match="encoder"):
+        apply_method("transmission-error", without)
 
 
 def test_the_kurtograms_outline_frames_the_row_of_its_band() -> None:
