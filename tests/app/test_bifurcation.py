@@ -142,7 +142,7 @@ def test_values_that_cannot_be_run_are_named_and_stop_nothing(tmp_path, capsys):
     [
         (("--vary", "speed=600..900rpm"), "FROM..TO:COUNT"),
         (("--vary", "sped=600..900rpm:3"), "there is no parameter 'sped'"),
-        (("--vary", "torque=5..9Nm:3", "--torque", "5Nm"), "torque_nm is given, and varied"),
+        (("--vary", "torque=5..9Nm:3", "--torque", "5Nm"), "torque_nm is both given and varied"),
         (("--vary", "torque=5..9Nm:3", "--direction", "sideways"), "direction is 'sideways'"),
         (("--vary", "torque=5..9Nm:3", "--signal", "a7"), "there is no signal or channel 'a7'"),
         (("--vary", "torque=5..9Nm:3", "--section", "tooth"), "section is 'tooth'"),

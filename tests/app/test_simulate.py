@@ -272,7 +272,7 @@ def test_a_sweep_and_its_index(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     truth = json.loads((tmp_path / "grid" / "point_4.truth.json").read_text())
     assert truth["operation"]["speed_rpm"]["values"] == [1200.0]
     assert truth["effects"][0]["options"]["gear"] == "driven"
-    assert "0 simulated; 4 were there already" in run(capsys, *arguments)[1]
+    assert "0 simulated; 4 existed already" in run(capsys, *arguments)[1]
 
 
 @pytest.mark.parametrize(
