@@ -175,9 +175,7 @@ def bearings(names: Annotated[list[str] | None, typer.Argument(help="E.g. 6205-2
 
 
 def report(
-    files: Annotated[
-        list[Path], typer.Argument(help="Recordings, folders (including sub-folders) or 'FOLDER/*.csv'.")
-    ],
+    files: Annotated[list[Path], typer.Argument(help="Recordings, folders (including sub-folders) or 'FOLDER/*.csv'.")],
     output: Annotated[Path, options.output_option("Folder for the pages.")],
     rig: options.RigOption = None,
     fs: options.SamplingRateOption = None,

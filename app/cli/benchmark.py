@@ -52,7 +52,8 @@ def gap(
         ),
     ] = None,
     longest: Annotated[
-        float | None, typer.Option("--longest", metavar="SECONDS", help="Cut recordings to this length; default 4 to 8 s.")
+        float | None,
+        typer.Option("--longest", metavar="SECONDS", help="Cut recordings to this length; default 4 to 8 s."),
     ] = None,
     least_level: Annotated[
         float,
@@ -100,11 +101,14 @@ def gap(
 def speed(
     output: Annotated[Path | None, output_option("Folder for speed.md and speed.csv, if wanted.")] = None,
     only: Annotated[
-        list[str] | None, typer.Option("--only", metavar="WORD", help="Only methods with this word in their name; repeatable.")
+        list[str] | None,
+        typer.Option("--only", metavar="WORD", help="Only methods with this word in their name; repeatable."),
     ] = None,
     longest: Annotated[
         float,
-        typer.Option("--longest", metavar="SECONDS", min=0.0, help="A method that takes longer is given no longer signal."),
+        typer.Option(
+            "--longest", metavar="SECONDS", min=0.0, help="A method that takes longer is given no longer signal."
+        ),
     ] = 20.0,
 ) -> None:
     """Time each method against its usual alternative in one run: growth with length, agreement, distance to a limit.

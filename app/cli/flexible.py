@@ -195,7 +195,9 @@ def growth(
     ] = "",
     speed: Annotated[str, typer.Option("--speed", metavar="SPEED", help="Of the driver; default: the preset's.")] = "",
     gear: Annotated[str, typer.Option("--gear", help="driver or driven: whose tooth is cracked.")] = "driver",
-    angle: Annotated[float, typer.Option("--angle", help="Degrees between the crack and the tooth's centre line.")] = 45.0,
+    angle: Annotated[
+        float, typer.Option("--angle", help="Degrees between the crack and the tooth's centre line.")
+    ] = 45.0,
     load_factor: Annotated[
         float,
         typer.Option("--load-factor", help="Ratio of the load to that of the torque alone: K_A K_v."),
@@ -208,7 +210,9 @@ def growth(
             help="da/dN = C ΔK^m in mm and MPa√m, and the scatter of log10 C and m; default: two stages of BS 7910.",
         ),
     ] = "",
-    threshold: Annotated[float, typer.Option("--threshold", help="ΔK in MPa√m below which a crack does not grow.")] = 2.0,
+    threshold: Annotated[
+        float, typer.Option("--threshold", help="ΔK in MPa√m below which a crack does not grow.")
+    ] = 2.0,
     toughness: Annotated[float, typer.Option("--toughness", help="K in MPa√m at which the tooth breaks.")] = 60.0,
     seed: options.SeedOption = 0,
 ) -> None:

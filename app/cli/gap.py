@@ -61,7 +61,9 @@ def gap(
     ] = None,
     torque: Annotated[
         list[str] | None,
-        typer.Option("--torque", metavar="N", help="Of the input shaft, e.g. 60Nm: one for all recordings or one for each."),
+        typer.Option(
+            "--torque", metavar="N", help="Of the input shaft, e.g. 60Nm: one for all recordings or one for each."
+        ),
     ] = None,
     speed_rpm: SpeedOption = None,
     stage: Annotated[
@@ -80,7 +82,9 @@ def gap(
     ] = None,
     cache: Annotated[
         Path | None,
-        typer.Option("--cache", metavar="DIR", help="Folder for what is prepared once per rig. Default: your cache folder."),
+        typer.Option(
+            "--cache", metavar="DIR", help="Folder for what is prepared once per rig. Default: your cache folder."
+        ),
     ] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Prepare again what the cache holds, and replace it.")] = False,
     effect_file: Annotated[

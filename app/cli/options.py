@@ -27,7 +27,7 @@ RigOption = Annotated[
     Path | None,
     typer.Option(
         "--rig",
-        help="Rig file (TOML): shafts, teeth, bearings, sensors, speed source. Default: NAME.toml next to the recording.",
+        help="Rig file (TOML): shafts, teeth, bearings, sensors, speed. Default: NAME.toml next to the recording.",
     ),
 ]
 
@@ -340,7 +340,9 @@ def _split(text: str, where: str, example: str) -> tuple[str, str]:
     return name.strip(), value.strip()
 
 
-MotionArgument = Annotated[Path, typer.Argument(help="Recording with the motion of both gears, preferably also torque.")]
+MotionArgument = Annotated[
+    Path, typer.Argument(help="Recording with the motion of both gears, preferably also torque.")
+]
 UseOption = Annotated[
     list[str] | None,
     typer.Option(

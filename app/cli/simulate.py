@@ -387,9 +387,7 @@ def sweep_of(request: Simulation, vary: Sequence[str], common_seed: bool, extens
     varied = [axis.name for axis in axes]
     for name, value in (("speed_rpm", request.speed_rpm), ("torque_nm", request.torque_nm)):
         if name in varied and value is not None:
-            raise InputError(
-                f"{name} is both given and varied", remedy=f"leave out --{name.split('_')[0]} or --vary"
-            )
+            raise InputError(f"{name} is both given and varied", remedy=f"leave out --{name.split('_')[0]} or --vary")
     return Sweep(axes=axes, common_seed=common_seed, extension=extension, **vars(request))
 
 
