@@ -1,4 +1,4 @@
-"""`gearsig compare`: a simulation beside a recording, without looking for causes."""
+"""`gearsig compare`: comparison of a simulation with a recording, without looking for causes."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SimulationRigOption = Annotated[
     typer.Option(
         "--sim-rig",
         metavar="FILE",
-        help="Rig file of the simulation. Default: NAME.toml beside it, else the gears of --rig.",
+        help="Rig file of the simulation. Default: NAME.toml next to it, else the gears of --rig.",
     ),
 ]
 

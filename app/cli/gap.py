@@ -38,7 +38,7 @@ def gap(
         Path | None,
         typer.Option(
             "--rig",
-            help="Rig file (TOML) of all recordings. NAME.toml beside a recording overrides its speed, torque, "
+            help="Rig file (TOML) of all recordings. NAME.toml next to a recording overrides its speed, torque, "
             "sensors and sampling rate.",
         ),
     ] = None,

@@ -137,7 +137,7 @@ def open_rig(path: Path | None, recording: Path | None = None) -> Rig | None:
     if path is None and recording is not None:
         path = rig_file_beside(recording)
         if path is not None:
-            typer.echo(f"Using the rig file {path.name} beside {recording.name}.", err=True)
+            typer.echo(f"Using the rig file {path.name} next to {recording.name}.", err=True)
     return read_rig(path) if path is not None else None
 
 

@@ -278,7 +278,7 @@ def _line(name: str, calibration: GapCalibration, cases: Sequence[AttributedCase
     )
     return (
         f"{name}: strong {len(strong)}: likeliest {_share(first)}, two {_share(two)}, group {_share(group)}; "
-        f"said with 0.9 {len(sure)}, right {_share(sure)}; calibration error {calibration_error(answers):.3f}; "
+        f"probability ≥ 0.9: {len(sure)}, right {_share(sure)}; calibration error {calibration_error(answers):.3f}; "
         f"named on healthy {_share(healthy)}, on unknown {_share(unknown)}; log loss {log_loss(calibration, cases):.3f}"
     )
 

@@ -213,7 +213,7 @@ def _scored(cases: Sequence[_Case], classifier: EffectClassifier, n: int) -> str
         sure += [first == case.cause] if posterior[first] >= 0.9 else []
         loss.append(-np.log(max(posterior[case.cause], 1e-9)))
     return (
-        f"likeliest right {np.mean(right):.2f} of {len(right)}; said with 0.9 {len(sure)}, right "
+        f"likeliest right {np.mean(right):.2f} of {len(right)}; probability ≥ 0.9: {len(sure)}, right "
         f"{np.mean(sure) if sure else 0.0:.2f}; log loss {np.mean(loss):.2f}"
     )
 

@@ -364,7 +364,7 @@ def _print_accuracy(
     of_each = ", ".join(f"{name} {np.mean(right[truth == name]):.2f}" for name in TOOTH_FAULTS if (truth == name).any())
     typer.echo(
         f"{title}: right {right.mean():.2f} of {len(right)} ({of_each}; of one tooth {right[is_single].mean():.2f}); "
-        f"said with 0.9 {sure.sum()}, right {right[sure].mean() if sure.any() else float('nan'):.2f}"
+        f"probability ≥ 0.9: {sure.sum()}, right {right[sure].mean() if sure.any() else float('nan'):.2f}"
     )
 
 
