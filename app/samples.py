@@ -66,7 +66,7 @@ def sample_folder() -> Path:
     for folder in (package / "sample_data", package.parent / "sample_data"):
         if folder.is_dir():
             return folder
-    raise InputError("the sample recordings are missing", where=str(package), remedy="install gearsig again")
+    raise InputError("the sample recordings are missing", where=str(package), remedy="reinstall gearsig")
 
 
 @cache

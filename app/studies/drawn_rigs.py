@@ -65,7 +65,7 @@ class DrawnRig:
     ----------
     parameters : mapping
         Parameters of the simulator "cracked", without the crack.
-    modes : tuple of HousingMode
+    modes : tuple of DrawnHousingMode
     sensor_gain : float
         Gain of everything between bearing and recording, which the estimator must not need.
     speed_rpm, torque_nm : float

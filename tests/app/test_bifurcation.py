@@ -77,7 +77,7 @@ def test_kinds_are_told_over_ranges_and_two_motions_with_their_bounds():
     ranges = [{"first": 1.0, "last": 2.0}, {"first": 4.0, "last": 4.0}]
     told = coexistence_lines({"coexisting_ranges": ranges, "coexisting_step": 0.5}, "rpm")
     assert told[0] == "Two motions coexist at 1 to 2, 4 rpm; values tried are 0.5 rpm apart."
-    assert "may go on beyond" in told[1]
+    assert "may extend beyond it" in told[1]
     assert coexistence_lines({}, "rpm") == []
 
 

@@ -34,7 +34,7 @@ from sims.forging import ForgingManipulator
 ROLE = "calibration"
 NEUTRAL_SHRINK = 0.3
 RIDGE = 0.005
-"""Pulls the weights towards their starting values, as some hundred cases do not determine five numbers."""
+"""Pulls the weights towards their starting values, as some hundred cases do not determine them."""
 START = (0.6, 1.0, 0.0, 0.0)
 """Starting values: sharpness, weight of the shrink, biases of none and of unknown."""
 FALSE_ALARMS = 0.05
