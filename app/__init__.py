@@ -1,1 +1,1 @@
-"""Command line, dashboard, benchmark and studies: faces over the library."""
+"""Command line, dashboard, benchmark and studies: user interfaces of the library."""

@@ -1,4 +1,4 @@
-"""A bifurcation into a folder: branches in processes of their own, value by value, to be stopped and resumed."""
+"""A bifurcation study in a folder: each branch in its own process, value by value, which can be stopped and resumed."""
 
 from __future__ import annotations
 
@@ -29,31 +29,31 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MIN_FOR_KIND = 400
-"""Cycles that the 0–1 test and the exponent need to say something."""
+"""Minimum number of cycles for the 0–1 test and the exponent."""
 CYCLES = {"mesh": "mesh cycle", "shaft": "revolution of the input shaft"}
 N_ROTATING = 4
 UNITS = {"um": "µm", "N m": "N·m", "g mm": "g·mm", "deg": "°"}
-"""Units of the catalogue as people read them; the others are read as they are."""
+"""Units of the catalogue that are displayed differently; all others are displayed as they are."""
 
 
 @dataclass(frozen=True)
 class Measured:
-    """What is kept of one value.
+    """Results for one parameter value.
 
     Parameters
     ----------
     value : float
     section : PoincareSection
     period : int
-        Cycles after which the section repeats; 0: it does not within 16.
+        Cycles after which the section repeats; 0: not within 16 cycles.
     settled_s : float
-        Time that was left out ahead.
+        Length of the transient that was left out.
     separated_share : float
         Share of the time without a tooth in contact.
     motion : str
-        Kind of motion; empty where it was not asked for.
+        Kind of motion; empty if not requested.
     exponent_per_s, k : float
-        Largest Lyapunov exponent and the 0–1 test's K; nan where there is none.
+        Largest Lyapunov exponent and K of the 0–1 test; nan if not available.
     """
 
     value: float
@@ -67,12 +67,12 @@ class Measured:
 
 
 def measured(run: SteadyRun, branch: Branch, *, phase_cycles: float = 0.0, with_kind: bool = False) -> Measured:
-    """Take the Poincaré points of a steady run and, for some seconds more, the kind of motion."""
+    """Compute the Poincaré points of a steady run and, which takes some seconds more, the kind of motion."""
     portrait, lock = portrait_of(run, branch), lock_of(run, branch)
     section = phase.poincare_section(portrait, lock, phase_cycles=phase_cycles)
     exponent, k, motion = float("nan"), float("nan"), ""
     if with_kind:
-        # Noise-free is a run in which nothing random acts: no sensor noise, no roughness that never returns.
+        # A run is noise-free if nothing random acts: no sensor noise, no roughness that never repeats.
         rough = run.machine.roughness
         noise_free = branch.signal in SIGNALS and not (rough.locked_to == "time" and rough.rms_um > 0.0)
         kind = phase.kind_of_motion(portrait, lock, noise_free=noise_free)
@@ -84,7 +84,7 @@ def measured(run: SteadyRun, branch: Branch, *, phase_cycles: float = 0.0, with_
 
 
 def parameter_text(branch: Branch) -> tuple[str, str]:
-    """Name and unit of what is varied, for people."""
+    """Return the display name and unit of the varied parameter."""
     from sims.effects import effect
     from sims.effects import effects as known_effects
     from sims.registry import simulator
@@ -102,7 +102,7 @@ def parameter_text(branch: Branch) -> tuple[str, str]:
 
 
 def portrait_of(run: SteadyRun, branch: Branch) -> phase.PhasePortrait:
-    """Return the path of the branch's signal, with its rate where the model knows it."""
+    """Return the phase-space path of the branch's signal, with its rate if the model provides it."""
     response, signal = run.response, branch.signal
     if signal not in (TRANSMISSION_ERROR, *COORDINATES, *SIGNALS):
         recording = run.recording
@@ -128,7 +128,7 @@ def portrait_of(run: SteadyRun, branch: Branch) -> phase.PhasePortrait:
 
 
 def lock_of(run: SteadyRun, branch: Branch) -> phase.CycleLock:
-    """Return the cycles of the driver's own angle: they stay those of the teeth whatever the shaft does."""
+    """Return the cycles of the driver's angle, which follow the teeth whatever the shaft does."""
     from gearsig.angle import ShaftAngle
 
     response, turn = run.response, 2.0 * pi
@@ -145,12 +145,12 @@ def lock_of(run: SteadyRun, branch: Branch) -> phase.CycleLock:
 
 NUMBERS = ("period", "settled_s", "separated_share", "exponent_per_s", "k")
 MAX_BYTES = 1_000_000_000
-"""Of one value's arrays; a usual one has some ten thousand."""
+"""Maximum size of the arrays of one value; usually they have some ten thousand bytes."""
 
 
 @dataclass(frozen=True)
 class KeptValue:
-    """What became of one value: its points and where the run ended, or the reason why there are none."""
+    """Outcome of one value: its points and final state, or the reason why there are none."""
 
     value: float
     measured: Measured | None
@@ -159,7 +159,7 @@ class KeptValue:
 
 
 def save(kept: KeptValue, path: Path) -> None:
-    """Write one value, whole or not at all."""
+    """Write one value atomically."""
     fields: dict[str, np.ndarray] = {"value": np.array(kept.value), "reason": np.array(kept.reason)}
     if kept.measured is not None and kept.end is not None:
         points, section, end = kept.measured, kept.measured.section, kept.end
@@ -180,7 +180,7 @@ def save(kept: KeptValue, path: Path) -> None:
 
 
 def load(path: Path) -> KeptValue | None:
-    """Read one value; None where it is not there, or damaged."""
+    """Read one value; None if it is missing or damaged."""
     data = read_arrays(path, MAX_BYTES)
     if data is None:
         return None
@@ -204,18 +204,18 @@ DIRECTIONS = ("both", "up", "down", "rest")
 
 @dataclass(frozen=True)
 class BifurcationRequest:
-    """A bifurcation as it is asked for.
+    """A requested bifurcation study.
 
     Parameters
     ----------
     branch : Branch
     direction : str
-        "up", "down", "both": each value goes on from where the last one ended; "rest": each starts from the static
-        balance, independently of the others.
+        "up", "down", "both": each value starts from the final state of the last one; "rest": each starts from static
+        equilibrium, independently of the others.
     phase_cycles : float
-        Place in the cycle at which the points are taken.
+        Position in the cycle at which the points are taken, 0 to 1.
     with_kind : bool
-        Whether the kind of motion is looked for, for some seconds per value.
+        Whether the kind of motion is determined, which takes some seconds per value.
     """
 
     branch: Branch
@@ -225,20 +225,20 @@ class BifurcationRequest:
 
     def __post_init__(self) -> None:
         one_of(self.direction, "direction", DIRECTIONS)
-        within(self.phase_cycles, "phase", 0.0, 1.0, remedy="it is a share of a cycle")
+        within(self.phase_cycles, "phase", 0.0, 1.0, remedy="give a fraction of a cycle")
 
     @property
     def branches(self) -> tuple[str, ...]:
-        """Names of the branches, as they stand in the results."""
+        """Names of the branches in the results."""
         return ("up", "down") if self.direction == "both" else (self.direction,)
 
     @property
     def n_values(self) -> int:
-        """Runs in all."""
+        """Total number of runs."""
         return len(self.branches) * len(self.branch.values)
 
     def definition(self) -> dict[str, Any]:
-        """What decides the results, as plain values."""
+        """Return the values that determine the results."""
         sweep = self.branch.sweep.definition()
         for unused in ("duration_s", "common_seed", "extension"):
             del sweep[unused]
@@ -260,14 +260,14 @@ def run_folder(
     n_processes: int | None = None,
     on_progress: Callable[[int], object] | None = None,
 ) -> dict[str, list[KeptValue]]:
-    """Run whatever the folder does not hold yet; return all values by branch, ascending.
+    """Run all values that the folder does not hold yet; return all values by branch, ascending.
 
-    The branches run beside each other. After Ctrl-C what is complete stays, and the same call goes on from there.
+    The branches run in parallel. After Ctrl-C complete values are kept, and the same call continues from there.
     """
     workers = n_processors() if n_processes is None else count(n_processes, "n_processes")
     claimed(folder, request.definition(), DEFINITION, "bifurcation")
     (folder / VALUES).mkdir(exist_ok=True)
-    # Along a branch one value waits for the other; from rest each stands alone.
+    # Along a branch each value needs the previous one; from rest they are independent.
     places = tuple(range(len(request.branch.values)))
     jobs = [(name, places[::-1] if name == "down" else places) for name in request.branches]
     if request.direction == "rest":
@@ -307,7 +307,7 @@ def _run_job(job: BranchJob) -> None:
 def _killed(job: BranchJob) -> None:
     raise RefusalError(
         killed_text(f"ran the branch {NAMES[job[2]]!r}"),
-        remedy="the same command goes on from what is complete",
+        remedy="the same command continues from what is complete",
     )
 
 
@@ -319,13 +319,13 @@ def complete(request: BifurcationRequest, folder: Path) -> dict[str, list[KeptVa
 
 
 def n_complete(request: BifurcationRequest, folder: Path) -> int:
-    """Values that the folder holds."""
+    """Return the number of values that the folder holds."""
     n = len(request.branch.values)
     return sum(value_path(folder, name, place).exists() for name in request.branches for place in range(n))
 
 
 def value_path(folder: Path, name: str, place: int) -> Path:
-    """Name of one value's file; `place` counts ascending values."""
+    """Return the path of one value's file; `place` counts ascending values."""
     return folder / VALUES / f"{name}_{place:05d}.npz"
 
 
@@ -336,7 +336,7 @@ def run_places(
     places: Sequence[int],
     on_progress: Callable[[int], object] | None = None,
 ) -> None:
-    """Run values in this order, from the first that the folder does not hold."""
+    """Run values in the given order, starting with the first that the folder does not hold."""
     before: End | None = None
     for place in places:
         path = value_path(folder, name, place)
@@ -350,7 +350,7 @@ def run_places(
 
 
 def run_value(request: BifurcationRequest, value: float, before: End | None) -> KeptValue:
-    """Run one value; what cannot be answered becomes a reason."""
+    """Run one value; an error becomes the reason for having no result."""
     try:
         run = request.branch.run(value, before)
         points = measured(run, request.branch, phase_cycles=request.phase_cycles, with_kind=request.with_kind)
@@ -362,7 +362,7 @@ def run_value(request: BifurcationRequest, value: float, before: End | None) -> 
 POINTS, SUMMARY, FIGURE = "points.csv", "bifurcation.json", "bifurcation.png"
 NAMES = {"up": "rising", "down": "falling", "rest": "from rest"}
 TRANSIENT = f"{DECAYS:g} time constants of the machine's slowest decay are left out at each value"
-BOUNDED = "known at the values tried only; a range that begins or ends where the sweep does may go on beyond it"
+BOUNDED = "known only at the values tried; a range that begins or ends with the sweep may extend beyond it"
 
 Values = Mapping[str, Sequence[KeptValue]]
 
@@ -412,7 +412,7 @@ def figure_of(branch: Branch, values: Values) -> Figure:
 
 
 def points_csv(branch: Branch, values: Values) -> str:
-    """Return every point: branch, value of what is varied, coordinates of the path in SI units."""
+    """Return every point as CSV: branch, parameter value, coordinates of the path in SI units."""
     first = next(value for kept in values.values() for value in measured_of(kept))
     axes = zip(first.section.axis_names, first.section.units, strict=True)
     rows = (
@@ -425,7 +425,7 @@ def points_csv(branch: Branch, values: Values) -> str:
 
 
 def summary(request: BifurcationRequest, values: Values) -> dict[str, Any]:
-    """Return the values of each branch, and where branches are apart."""
+    """Return the values of each branch, and where the branches differ."""
     drawn = diagrams(request.branch, values)
     result: dict[str, Any] = {
         "definition": request.definition(),
@@ -442,7 +442,7 @@ def summary(request: BifurcationRequest, values: Values) -> dict[str, Any]:
 
 
 def coexistence_lines(result: Mapping[str, Any], unit: str) -> list[str]:
-    """Return in words where two motions coexist, from a summary; empty where they do nowhere."""
+    """Return text about where two motions coexist, from a summary; empty if they do not."""
     ranges = result.get("coexisting_ranges", [])
     if not ranges:
         return []
@@ -452,7 +452,7 @@ def coexistence_lines(result: Mapping[str, Any], unit: str) -> list[str]:
 
 
 def motion_lines(kept: Sequence[KeptValue], unit: str) -> list[str]:
-    """Return the kind of motion over ranges of neighbouring values; empty where it was not looked for."""
+    """Return the kind of motion over ranges of neighbouring values; empty if it was not requested."""
     lines: list[str] = []
     moving = (value for value in measured_of(kept) if value.motion)
     for motion, group in groupby(moving, key=lambda value: value.motion):

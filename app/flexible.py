@@ -32,12 +32,12 @@ if TYPE_CHECKING:
 
 SPECTRUM_RPM = (1000.0, 2000.0, 3000.0, 4000.0, 5000.0)
 SETTLED_S, SPECTRUM_S = 0.4, 0.4
-"""Left out ahead of a spectrum, and its length: bins of 2.5 Hz."""
+"""Transient left out before a spectrum, and length of the spectrum, in s; the latter gives bins of 2.5 Hz."""
 HIGHEST_HZ = 12000.0
 RUN_UP_S, RUN_UP_RATE_HZ, HIGHEST_ORDER = 6.0, 40960.0, 260.0
 STRIDE = 4
 N_ANGLES = 160
-"""Mesh angles of natural frequencies."""
+"""Number of mesh angles at which natural frequencies are computed."""
 
 Progress = Callable[[str, float], object]
 
@@ -49,21 +49,21 @@ class Study:
     Parameters
     ----------
     torque_nm : float
-        Of spectra and eigenfrequencies.
+        Torque of spectra and eigenfrequencies.
     n_teeth : int
-        Of the driver.
+        Tooth count of the driver.
     maps : MeshMaps
     sweeps : mapping of torque in N m to (up, down)
     spectra_hz : array, (n,)
     spectra_m : mapping of speed in rpm to peak amplitudes, (n,)
-    natural_hz : mapping of torque to the torsional mode's frequency
+    natural_hz : mapping of torque in N m to the frequency of the torsional mode
     angle_hz : array, (n_c, n_modes)
-        Eigenfrequencies over the mesh cycles `angle_cycles`, at the pair's own torque.
+        Eigenfrequencies over the mesh cycles `angle_cycles`, at `torque_nm`.
     uncoupled_hz : array, (n,)
-        Of both sides without contact, rising.
+        Eigenfrequencies of both sides without contact, ascending.
     spreading : SpreadingCheck or None
     run_up : OrderMap
-        Of the acceleration that the first sensor reads in a run-up through the sweeps' speeds.
+        Order map of the acceleration at the first sensor in a run-up through the speeds of the sweeps.
     """
 
     torque_nm: float
@@ -92,22 +92,22 @@ def flexible_study(
     check_spreading: bool = False,
     on_progress: Progress = lambda *_: None,
 ) -> Study:
-    """Run everything.
+    """Compute maps, sweeps, spectra and eigenfrequencies of a flexible pair.
 
     Parameters
     ----------
     pair : FlexiblePair
     torque_nm : float
-        Of spectra and eigenfrequencies.
+        Torque of spectra and eigenfrequencies.
     torques_nm : tuple of float
-        Of the sweeps.
+        Torques of the sweeps.
     sweep_s : float
         Length of one sweep; up and down of 15 s each are six million steps of 5 µs.
     first_rpm, last_rpm, step_s : float
     check_spreading : bool
         Also reduce the gears with contact at single nodes and at patches, see `sims.reduced_fe`.
     on_progress : callable
-        Told what is done, and which part of the whole.
+        Takes the current stage and the fraction completed.
     """
     positive(sweep_s, "sweep_s", "s")
     for torque in torques_nm:
@@ -157,7 +157,7 @@ def flexible_study(
 def _run_up(
     pair: FlexiblePair, torque_nm: float, speeds_rpm: tuple[float, float], duration_s: float, step_s: float
 ) -> OrderMap:
-    """Measure a run-up and return its first channel's levels over order and time."""
+    """Simulate a run-up and return the levels of its first channel over order and time."""
     operation = Operation(Profile.of([0.0, duration_s], speeds_rpm), Profile.constant(torque_nm))
     rig = build_rig(pair.machine, operation, name="run-up")
     recording, _ = reduced_fe.simulate_pair(
@@ -168,7 +168,7 @@ def _run_up(
 
 
 def _spectrum(pair: FlexiblePair, speed_rpm: float, torque_nm: float, step_s: float) -> tuple[FloatArray, FloatArray]:
-    """Peak amplitudes of the dynamic transmission error at constant speed, by a flat-top window."""
+    """Return frequencies and peak amplitudes of the dynamic transmission error (flat-top window), constant speed."""
     from scipy import fft
     from scipy.signal.windows import flattop
 
@@ -192,7 +192,7 @@ def _spectrum(pair: FlexiblePair, speed_rpm: float, torque_nm: float, step_s: fl
 
 NAMES = {"node": "line of nodes", "patch": "RBE3 patch", "section": "tooth section"}
 RANGE = (0.52, 1.25)
-"""Of the torsional mode's frequency, in which its jumps are looked for."""
+"""Range, relative to the torsional mode's frequency, in which its jumps are sought."""
 
 
 def write_study(study: Study, folder: Path, title: str) -> tuple[Path, ...]:
@@ -204,7 +204,7 @@ def write_study(study: Study, folder: Path, title: str) -> tuple[Path, ...]:
 
 
 def figures(study: Study, title: str) -> dict[str, Figure]:
-    """Return every figure by its file's name."""
+    """Return every figure by its file name."""
     maps = study.maps
     twice = np.concatenate((maps.mesh_cycles, maps.mesh_cycles + 1.0))
     stiffness = {
@@ -237,7 +237,7 @@ def figures(study: Study, title: str) -> dict[str, Figure]:
             f"{NAMES[spread]}: ripple {100.0 * check.ripple[spread]:.2g} %": values
             for spread, values in check.frequency_hz.items()
         }
-        words = f"Contact spread over nodes at {study.torque_nm:g} N·m, {title}; ripple is that of a tooth's compliance"
+        words = f"Contact spread over nodes at {study.torque_nm:g} N·m, {title}; ripple: of a tooth's compliance"
         panel = plot.curve_panel(check.mesh_cycles, curves, "mesh cycles (tooth passages)", "torsional mode (Hz)")
         drawn["contact_spreading"] = plot.panels_figure([panel], title=words)
     words = f"Run-up at {study.torque_nm:g} N·m, {title}: acceleration (m/s²) at sensor {study.run_up.source}"
@@ -252,7 +252,7 @@ def figures(study: Study, title: str) -> dict[str, Figure]:
 
 
 def sweeps_csv(study: Study) -> str:
-    """Return every part of every sweep as a line."""
+    """Return the sweeps as CSV, with one line for each segment of each sweep."""
     header = ["torque_nm", "direction", "speed_rpm", "mesh_hz", "rms_um", "least_force_n", "lost_part"]
     rows: list[list[str]] = []
     for torque, pair in study.sweeps.items():
@@ -263,7 +263,7 @@ def sweeps_csv(study: Study) -> str:
 
 
 def maps_csv(maps: MeshMaps) -> str:
-    """Return every angle and torque as a line: the whole mesh, then each pair, the newest first."""
+    """Return the maps as CSV, one line per angle and torque: the whole mesh, then each pair, newest first."""
     n_slots = maps.pair_forces_n.shape[2]
     names = ["torque_nm", "mesh_cycles", "transmission_error_um", "tangent_n_per_m", "secant_n_per_m"]
     whole = (1e6 * maps.transmission_error_m, maps.tangent_stiffness_n_per_m, maps.secant_stiffness_n_per_m)
@@ -277,7 +277,7 @@ def maps_csv(maps: MeshMaps) -> str:
 
 
 def summary(study: Study) -> dict[str, object]:
-    """Return the numbers that matter."""
+    """Return the main numbers of a study."""
     rows = []
     for torque, (up, down) in study.sweeps.items():
         natural = study.natural_hz[torque]
@@ -313,7 +313,7 @@ def summary(study: Study) -> dict[str, object]:
 
 
 def _pair_stiffness(study: Study, title: str) -> Figure:
-    """Contact stiffness of one pair along its way, over the torque; it enters at 1."""
+    """Draw the contact stiffness of one pair along its path, over torque; the pair enters at 1."""
     maps = study.maps
     twice = np.concatenate((maps.mesh_cycles, maps.mesh_cycles + 1.0, maps.mesh_cycles + 2.0))
     slot = np.floor(twice + reduced_fe.MARGIN).astype(np.int64) - 1
@@ -337,7 +337,7 @@ def _sharing(study: Study, title: str) -> Figure:
     maps = study.maps
     place = int(np.argmin(np.abs(maps.torque_nm - 170.0)))
     n_slots = maps.force_n.shape[2]
-    # Over two cycles each pair keeps its name: slot j of cycle c holds pair ⌊c − start⌋ − j.
+    # Each pair keeps its name over two cycles: slot j of cycle c holds pair ⌊c − start⌋ − j.
     cycles = np.concatenate((maps.mesh_cycles, maps.mesh_cycles + 1.0))
     newest = np.floor(cycles + reduced_fe.MARGIN).astype(int)
     forces = np.tile(maps.pair_forces_n[:, place], (2, 1))

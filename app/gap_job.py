@@ -1,7 +1,7 @@
-"""A gap diagnosis from files to a folder of results, here or in a process of its own that can be stopped.
+"""A gap diagnosis from files to a folder of results, in this process or in a separate one that can be stopped.
 
-A page starts `python -P -m app.gap_job FOLDER`. The folder holds request.json; progress.json, and in the end results or
-error.json, come beside it. The process ends when its standard input does: nothing goes on for a parent that is gone.
+A page starts `python -P -m app.gap_job FOLDER`. The folder holds request.json; progress.json and finally the results or
+error.json are added. The process ends when its standard input ends, so that it does not outlive its parent.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from gearsig.report import check_writable, from_plain, plain, read_gap_json, wri
 
 Stage = Callable[[str, float], None]
 READING = 0.03
-"""Share of the progress that is reading."""
+"""Share of the progress assigned to reading."""
 
 
 def run_gap(
@@ -50,11 +50,11 @@ def run_gap(
     model : str
         Name of the simulator.
     cache : Path or None
-        Folder that keeps what is prepared once per rig; None: nothing is kept, nor taken from before.
+        Cache folder for what is prepared once per rig; None: no cache.
     fresh : bool
-        Prepare anew what the folder holds already, and keep that.
+        Prepare again what the folder holds already, and replace it.
     on_stage : callable
-        Is told what is being done, and which share of the whole is complete.
+        Takes the current stage and the fraction completed.
 
     Raises
     ------
@@ -79,33 +79,33 @@ def run_gap(
 
 
 JSON, PAGE, TWIN = "gap.json", "gap.html", "twin.toml"
-"""What a gap diagnosis leaves in a folder, the last where an effect is named; all or none."""
+"""Files of a gap diagnosis, the last only if an effect is named; all are written or none."""
 
 
 def check_folder(folder: Path) -> None:
-    """Check, before the long work, that results can be written; results of an earlier diagnosis are replaced.
+    """Check before the computation that results can be written; those of an earlier diagnosis will be replaced.
 
     Raises
     ------
     InputError
-        If it is no folder, cannot be written, or holds files that belong to no gap diagnosis.
+        If it is not a folder, cannot be written, or holds files that do not belong to a gap diagnosis.
     """
     check_writable(folder)
     if folder.is_dir():
         foreign = [path for path in folder.iterdir() if path.name not in (JSON, PAGE, TWIN)]
         if foreign or (any(folder.iterdir()) and not _is_ours(folder / JSON)):
             raise InputError(
-                "holds files that belong to no gap diagnosis", where=str(folder), remedy="choose another with -o"
+                "holds files that do not belong to a gap diagnosis", where=str(folder), remedy="choose another with -o"
             )
 
 
 def write_results(report: GapReport, folder: Path, *, command: str = "") -> tuple[Path, ...]:
-    """Write the results beside their folder and move them there when all are complete.
+    """Write the results next to their folder and move them there once all are complete.
 
     Returns
     -------
     tuple of Path
-        Page, JSON, and the twin's preset where there is one.
+        Page, JSON, and the twin's preset if there is one.
     """
     target = folder.absolute()
     try:
@@ -128,11 +128,11 @@ def write_results(report: GapReport, folder: Path, *, command: str = "") -> tupl
 
 
 def _move(unfinished: Path, target: Path) -> None:
-    """Put the finished folder in its place; file by file into a folder that exists, which may be somebody's own."""
+    """Move the finished folder to its place; move single files if the folder exists, as it may hold other files."""
     if not target.exists():
         unfinished.rename(target)
         return
-    for name in (PAGE, TWIN, JSON):  # gap.json last: where it is new, the others are
+    for name in (PAGE, TWIN, JSON):  # gap.json last: if it is new, so are the others
         if (unfinished / name).exists():
             (unfinished / name).replace(target / name)
         else:
@@ -150,11 +150,11 @@ def _is_ours(path: Path) -> bool:
 REQUEST, PROGRESS, ERROR, RESULTS, LOG = "request.json", "progress.json", "error.json", "results", "log.txt"
 EXIT_REFUSED = 2
 EVERY_S = 0.2
-"""Progress is written no oftener."""
+"""Minimum interval between two writes of the progress."""
 
 
 class JobFailedError(GearsigError):
-    """The process ended without a result and without a reason of its own."""
+    """The process ended without a result and without an error message."""
 
 
 @dataclass(frozen=True)
@@ -166,14 +166,14 @@ class _JobRequest:
 
 
 class Job:
-    """A diagnosis in a process of its own, with a private folder that goes when the job does.
+    """A diagnosis in a separate process, with a private folder that is removed with the job.
 
     Parameters
     ----------
     folder : Path
-        From `private_folder`; holds the uploads, too. The job owns it.
+        From `private_folder`; also holds the uploads. The job owns it.
     request, model, cache, command
-        See `run_gap` and the page's command.
+        See `run_gap`; `command` is the one shown on the page.
     """
 
     def __init__(self, folder: Path, request: GapRequest, model: str, *, cache: Path | None, command: str = "") -> None:
@@ -181,24 +181,24 @@ class Job:
         write_text(folder / REQUEST, json.dumps(plain(_JobRequest(request, model, cache, command))))
         log = (folder / LOG).open("w", encoding="utf-8")
         self._process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "app.gap_job", str(folder)],  # -P: a user's own app.py there is not ours
+            [sys.executable, "-P", "-m", "app.gap_job", str(folder)],  # -P: do not import a user's app.py
             env=_environment(),
             stdin=subprocess.PIPE,
             stdout=log,
             stderr=log,
-            start_new_session=True,  # it and the processes that it starts are stopped together
+            start_new_session=True,  # so that it is stopped together with the processes that it starts
         )
         log.close()
         self._end = weakref.finalize(self, _end, self._process, folder)
 
     @property
     def is_running(self) -> bool:
-        """Whether it is still at work."""
+        """Whether the process is still running."""
         return self._process.poll() is None
 
     @property
     def progress(self) -> tuple[str, float]:
-        """What is being done, and which share of the whole is complete."""
+        """Current stage and fraction completed."""
         try:
             content = json.loads((self.folder / PROGRESS).read_text(encoding="utf-8"))
         except (OSError, ValueError):
@@ -206,7 +206,7 @@ class Job:
         return str(content["stage"]), min(max(float(content["done"]), 0.0), 1.0)
 
     def stop(self) -> None:
-        """End the process and what it started; there is no result then."""
+        """End the process and those that it started; there is then no result."""
         self.was_stopped = True
         _stop(self._process)
 
@@ -216,7 +216,7 @@ class Job:
         Raises
         ------
         GearsigError
-            Why there is none.
+            If there is no result; the message says why.
         """
         if (self.folder / ERROR).exists():
             raise error_from_json((self.folder / ERROR).read_text(encoding="utf-8"))
@@ -225,28 +225,28 @@ class Job:
         return read_gap_json(self.folder / RESULTS / JSON)
 
     def result(self, name: str) -> bytes | None:
-        """Return a file of the results, None where there is none."""
+        """Return the content of a result file; None if it does not exist."""
         path = self.folder / RESULTS / name
         return path.read_bytes() if path.exists() else None
 
     def close(self) -> None:
-        """Stop, and remove the folder."""
+        """Stop the process and remove the folder."""
         self._end()
 
     def _last_message(self) -> str:
-        if (self._process.returncode or 0) < 0:  # nobody but a signal from outside ends it so
-            return "its process was killed: perhaps the memory ran out; a shorter recording needs less"
+        if (self._process.returncode or 0) < 0:  # only an external signal ends it like this
+            return "its process was killed, perhaps for lack of memory; a shorter recording needs less"
         lines = (self.folder / LOG).read_text(encoding="utf-8", errors="replace").strip().splitlines()
         return lines[-1] if lines else f"exit code {self._process.returncode}"
 
 
 def private_folder() -> Path:
-    """Return a new folder that only this user can read."""
+    """Create and return a folder that only this user can read."""
     return Path(mkdtemp(prefix="gearsig-gap-"))
 
 
 def _environment() -> dict[str, str]:
-    """Return the environment in which a process finds this very `app`, installed or not."""
+    """Return the environment in which a process imports this same `app` package, installed or not."""
     root = str(Path(__file__).parents[1])
     if root == sysconfig.get_path("purelib"):
         return dict(os.environ)
@@ -267,13 +267,13 @@ def _stop(process: subprocess.Popen[bytes]) -> None:
 
 
 def error_to_json(error: GearsigError) -> str:
-    """Return an error as a text that `error_from_json` makes it from again, with its parts."""
+    """Return an error with its parts as JSON, for `error_from_json`."""
     parts = {name: part for name, part in vars(error).items() if isinstance(part, str)} or {"reason": str(error)}
     return json.dumps({"kind": type(error).__name__, "parts": parts})
 
 
 def error_from_json(text: str) -> GearsigError:
-    """Return the error that `error_to_json` made the text of."""
+    """Return the error from the JSON of `error_to_json`."""
     written = json.loads(text)
     parts = written["parts"]
     if written["kind"] == InputError.__name__:
@@ -282,7 +282,7 @@ def error_from_json(text: str) -> GearsigError:
 
 
 class _Progress:
-    """Writes the stage and the share that is complete, now and then."""
+    """Writes the stage and the fraction completed at intervals."""
 
     def __init__(self, path: Path) -> None:
         self._path, self._stage, self._at = path, "", 0.0
@@ -295,7 +295,7 @@ class _Progress:
 
 
 def main(folder: Path) -> int:
-    """Diagnose what the folder asks for."""
+    """Run the diagnosis that the folder requests and return the exit code."""
     request: _JobRequest = from_plain(
         _JobRequest, json.loads((folder / REQUEST).read_text(encoding="utf-8")), where=REQUEST
     )
@@ -310,10 +310,10 @@ def main(folder: Path) -> int:
 
 
 def _end_with_parent() -> None:
-    """Wait for the end of standard input in a thread; then end this process and those that it started."""
+    """Start a thread that waits for the end of standard input, then ends this process and those that it started."""
 
     def wait() -> None:
-        while os.read(sys.stdin.fileno(), 1024):  # not through sys.stdin: its lock would be in the way at the end
+        while os.read(sys.stdin.fileno(), 1024):  # not through sys.stdin, whose lock would block the exit
             pass
         if hasattr(os, "killpg"):
             os.killpg(os.getpgrp(), signal.SIGTERM)

@@ -1,4 +1,4 @@
-"""One gear of finite elements: mesh it, find its modes, push a tooth, reduce it; follow a crack at its root."""
+"""One finite-element gear: mesh, modes, tooth stiffness, reduction; growth of a crack at its tooth root."""
 
 from __future__ import annotations
 
@@ -41,22 +41,22 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class GearBodyStudy:
-    """What was found of one gear.
+    """Results for one gear.
 
     Parameters
     ----------
     mesh : SectorMesh
     quality : MeshQuality
     gear : CyclicGear
-        As it is held for its modes.
+        With the support used for its modes.
     held : str
         "free", "bore" or "springs".
     modes : CyclicModes
-        Elastic ones; of a gear on springs also those in which it moves as a whole.
+        Elastic modes; for a gear on springs also rigid-body modes.
     load : ToothLoad
-        A tooth pushed in the middle of its flank, bore held.
+        A tooth loaded in the middle of its flank, bore held.
     discretisation : DiscretisationError or None
-        Of a mesh that is much coarser than what it is compared with.
+        Error of a coarse mesh, by comparison with a much finer one.
     reduced : ReducedGear or None
     craig_bampton : CraigBamptonGear or None
     """
@@ -89,21 +89,21 @@ def study_gear(
     ----------
     blank : GearBlank
     n_dof : int
-        Of the whole gear, about.
+        Approximate degrees of freedom of the whole gear.
     n_modes : int
-        Elastic modes, at least; up to 300.
+        Minimum number of elastic modes; up to 300.
     held : str
         "free" or "bore".
     springs : array (6,) or None
-        That hold the hub for the modes, see `CyclicGear`; with "free" only.
+        Springs that hold the hub for the modes, see `CyclicGear`; only with "free".
     force_n : float
-        On the tooth.
+        Force on the tooth.
     reduce : bool
-        Also reduce the gear both ways. The free-interface reduction is kept where the model `reduced-fe` finds it.
+        Also reduce the gear both ways. The free-interface reduction is kept in the cache of the model `reduced-fe`.
     on_progress : callable
-        Told what is done and how much, 0 to 1.
+        Takes the current stage and the fraction completed, 0 to 1.
     """
-    # beyond 300 modes, the search takes many minutes, and teeth alone move
+    # beyond 300 modes, the search takes many minutes, and only teeth move
     count(n_modes, "n_modes", maximum=300)
     on_progress("mesh", 0.0)
     size = fe_gear.mesh_size_for(blank, n_dof)
@@ -129,7 +129,7 @@ def study_gear(
         on_progress("free-interface reduction", 0.35)
         reduced = fe_gear.cached_gear(blank, fe_gear.ReductionPlan(size))
         on_progress("Craig–Bampton reduction", 0.7)
-        # contact patches along the face, where the mesh has layers enough
+        # contact patches along the face, if the mesh has enough layers
         plan = fe_gear.CraigBamptonPlan(n_slices=min(5, mesh.tooth.shape[2]))
         both = fe_gear.craig_bampton(mesh, plan)
     on_progress("done", 1.0)
@@ -148,13 +148,13 @@ def study_gear(
 
 N_SHOWN = 6
 NEIGHBOURS = (-1, 0, 1)
-PEAKS = "Peaks at the force and in sharp corners grow with a finer mesh."
-"""A line load and corners without a round have no finite stress."""
+PEAKS = "Peaks at the force and in sharp corners grow with mesh refinement."
+"""The stress at a line load and in sharp corners is singular."""
 HELD = {"free": "free", "bore": "bore held", "springs": "hub on springs"}
 
 
 def write_gear_body(study: GearBodyStudy, folder: Path, *, vtk: bool = False) -> tuple[Path, ...]:
-    """Write the figures as PNG, and where there are: VTK file, reduced gear, table of Craig–Bampton."""
+    """Write the figures as PNG and, if available, VTK file, reduced gear and Craig–Bampton table."""
     paths = [*write_folder(folder, {f"{name}.png": figure for name, figure in figures(study).items()})]
     if vtk:
         paths.append(fe_gear.write_vtk(folder / "gear.vtu", study.mesh, _fields(study)))
@@ -168,7 +168,7 @@ def write_gear_body(study: GearBodyStudy, folder: Path, *, vtk: bool = False) ->
 
 
 def figures(study: GearBodyStudy) -> dict[str, Figure]:
-    """Return mesh, modes and stress by their files' names; a mesh of first order has no stress worth showing."""
+    """Return figures of mesh, modes and stress by file name; stress of a first-order mesh is too coarse to show."""
     mesh, view = study.mesh, fe_gear.face_view(study.mesh)
     g = mesh.blank.geometry
     name = f"{g.teeth} teeth, module {g.module_mm:g} mm"
@@ -193,12 +193,12 @@ def figures(study: GearBodyStudy) -> dict[str, Figure]:
 
 
 def lines(study: GearBodyStudy) -> list[str]:
-    """Return what was found as text."""
+    """Return the results as lines of text."""
     q = study.quality
     text = [
         f"{study.mesh.n_dof} degrees of freedom; {_cells(study)}",
         f"mass {q.mass_kg:.4g} kg ({signed(1e6 * (q.volume_m3 / q.true_volume_m3 - 1.0), 0)} ppm of the outline's)",
-        f"polar inertia {q.polar_inertia_kg_m2:.4g} kg m², lowest scaled Jacobian {q.scaled_jacobian.min():.2f}",
+        f"polar inertia {q.polar_inertia_kg_m2:.4g} kg m², minimum scaled Jacobian {q.scaled_jacobian.min():.2f}",
         f"tooth compliance in mid-flank {study.load.push_m / study.load.force_n:.3g} m/N, bore held",
         f"modes, {HELD[study.held]}:",
         *(label(study, k) for k in range(len(study.modes.frequencies_hz))),
@@ -208,13 +208,13 @@ def lines(study: GearBodyStudy) -> list[str]:
         worst = d.frequency[np.argmax(np.abs(d.frequency))]
         text.append(
             f"coarse: against {d.finer_dof} degrees of freedom the first frequency is {signed(100.0 * d.frequency[0])} "
-            f"%, the worst of {len(d.frequency)} {signed(100.0 * worst)} %, a tooth's "
+            f"%, the worst of {len(d.frequency)} {signed(100.0 * worst)} %, the tooth "
             f"compliance {signed(100.0 * d.compliance, 0)} %"
         )
         if size.order == 1:
             text.append(f"edges straight, up to {q.outline_error_mm:.2g} mm off the outline: no stress is shown")
     if study.reduced is not None:
-        text.append(f"free-interface reduction: {study.reduced.n_modes} elastic modes and the static rest")
+        text.append(f"free-interface reduction: {study.reduced.n_modes} elastic modes and the static residual")
     if study.craig_bampton is not None:
         a = study.craig_bampton.accuracy
         text.append(
@@ -227,11 +227,11 @@ def lines(study: GearBodyStudy) -> list[str]:
 def _cells(study: GearBodyStudy) -> str:
     size = study.mesh.size
     kind = "27-node hexahedra" if size.order == 2 else "8-node hexahedra with incompatible modes"
-    return f"{kind}: {size.n_across} over a tooth's thickness, {size.n_up} up its flank, {size.n_along} along the face"
+    return f"{kind}: {size.n_across} over the tooth thickness, {size.n_up} up the flank, {size.n_along} along the face"
 
 
 def label(study: GearBodyStudy, k: int) -> str:
-    """Frequency and kind of mode k."""
+    """Return frequency and kind of mode k as text."""
     n = int(study.modes.nodal_diameters[k])
     whole = fe_gear.rigid_part(study.gear, study.modes, k)
     kind = whole or f"{counted(n, 'nodal diameter')}"
@@ -239,7 +239,7 @@ def label(study: GearBodyStudy, k: int) -> str:
 
 
 def in_the_whole_gear(mesh: SectorMesh, vectors: FloatArray) -> FloatArray:
-    """Vectors in the axes of their sectors, (n_teeth, n, 3), in those of the gear, (n_teeth · n, 3)."""
+    """Transform vectors from the axes of their sectors, (n_teeth, n, 3), to those of the gear, (n_teeth · n, 3)."""
     angle = mesh.blank.pitch_angle_rad * np.arange(len(vectors))[:, None]
     c, s = np.cos(angle), np.sin(angle)
     x, y, z = np.moveaxis(vectors, 2, 0)
@@ -247,7 +247,7 @@ def in_the_whole_gear(mesh: SectorMesh, vectors: FloatArray) -> FloatArray:
 
 
 def _motion(study: GearBodyStudy, view: FaceView, k: int) -> FloatArray:
-    """Motion of the view's points in the axes of the whole gear."""
+    """Return the motion of the view's points in the axes of the whole gear."""
     return in_the_whole_gear(study.mesh, fe_gear.mode_field(study.gear, study.modes, k)[:, view.nodes])
 
 
@@ -266,7 +266,7 @@ def _stress(study: GearBodyStudy, near: tuple[float, float, float, float], name:
 
 
 def _fields(study: GearBodyStudy) -> dict[str, FloatArray]:
-    """Values at all nodes for other programs."""
+    """Return the nodal fields for the VTK file."""
     z = study.mesh.blank.n_teeth
     fields = {
         "displacement_m": study.load.displacement_m,
@@ -278,25 +278,25 @@ def _fields(study: GearBodyStudy) -> dict[str, FloatArray]:
 
 
 # --------------------
-# What `gearsig growth` computes and writes: stress intensity of a root crack, its growth, the turns that are left.
+# What `gearsig growth` computes and writes: stress intensity and growth of a root crack, remaining revolutions.
 # --------------------
 
 
 DOF_PER_TOOTH = 4_000
-"""Of a gear that is made for this: so many that its cracks are solved on the fine mesh."""
+"""For a gear made for this study; enough that its cracks are solved on the fine mesh."""
 N_DEPTHS = 40
 ASSUMPTIONS = (
     "the crack goes through the whole face, straight at its angle",
-    "a real crack turns to where most energy is released: K is held where that of the straight one would fall",
-    "one load a turn, from nothing to its greatest: steady torque, no vibration but by the load factor",
-    "no residual stress of a hardened case, no corrosion, no overloads, no closure",
-    "the interval is that of the steel's specimens and of the depth that was given, not of these assumptions",
+    "a real crack turns towards maximum energy release: K is held constant where that of a straight crack would fall",
+    "one load per revolution, from zero to its maximum: steady torque, vibration only through the load factor",
+    "no residual stress from case hardening, no corrosion, no overloads, no closure",
+    "the interval covers the scatter of the steel specimens and the given depth, not these assumptions",
 )
 
 
 @dataclass(frozen=True)
 class GrowthStudy:
-    """What was found.
+    """Results of a growth study.
 
     Parameters
     ----------
@@ -304,11 +304,11 @@ class GrowthStudy:
     growth : CrackGrowth
     law : GrowthLaw
     torque_nm, load_factor, speed_rpm : float
-        Torque and speed of the driver; the load is their product with the factor.
+        Torque and speed of the driver; the load factor multiplies the load of the torque.
     side : int
         1: a tooth of the driver; 2: of the driven gear.
     turns_per_minute : float
-        Of the cracked gear.
+        Speed of the cracked gear.
     first_mm : (float, float)
         Present depth: from, to.
     """
@@ -325,13 +325,13 @@ class GrowthStudy:
 
     @property
     def verdict(self) -> str:
-        """What is left, in a sentence."""
+        """Remaining life, as a sentence."""
         low, middle, high = self.growth.remaining_turns
         end = "it breaks" if self.growth.ends == "toughness" else f"{self.growth.depth_mm[-1]:.2g} mm"
         if not isfinite(low):
-            return f"The crack rests: ΔK stays below {self.law.threshold:g} MPa√m at this load."
+            return f"The crack does not grow: ΔK stays below {self.law.threshold:g} MPa√m at this load."
         hours = [t / self.turns_per_minute / 60.0 for t in (low, middle, high)]
-        text = f"About {_said(middle)} turns until {end}, {_said(low)} to {_said(high)} with 90 %"
+        text = f"About {_said(middle)} revolutions until {end}, {_said(low)} to {_said(high)} with 90 %"
         return f"{text}: {_said(hours[1])} hours, {_said(hours[0])} to {_said(hours[2])}."
 
 
@@ -351,22 +351,22 @@ def growth_study(
     load_factor: float = 1.0,
     seed: int = 0,
 ) -> GrowthStudy:
-    """Find stress intensity from the present depth on, and how many turns are left.
+    """Compute the stress intensity from the present depth onwards, and the remaining revolutions.
 
     Parameters
     ----------
     mesh : GearMesh
     side : int
     first_mm : (float, float)
-        Present depth; twice the same if it is known.
+        Present depth, from and to; equal if it is known.
     angle_deg : float
     torque_nm, speed_rpm : float
-        Of the driver.
+        Torque and speed of the driver.
     law : GrowthLaw
     load_factor : float
-        K_A K_v of ISO 6336: how much greater the load is than the torque's.
+        K_A K_v of ISO 6336: ratio of the load to that of the torque alone.
     seed : int
-        Of the specimens.
+        Seed of the random specimens.
     """
     gear = gear_of(mesh, side)
     positive(load_factor, "load_factor")
@@ -376,12 +376,12 @@ def growth_study(
         raise InputError(
             f"depth is {first_mm[0]:g} to {first_mm[1]:g} mm",
             where="--depth",
-            allowed=f"above 0, below {0.98 * deepest:.3g} mm: as far as the finite elements follow at {angle_deg:g}°",
+            allowed=f"above 0, below {0.98 * deepest:.3g} mm, the limit of the finite-element mesh at {angle_deg:g}°",
         )
     depth = np.linspace(first_mm[0], deepest, N_DEPTHS)
     intensity = stress_intensity(gear, mesh, side, torque_nm * load_factor, depth, angle_deg)
     interval = None if first_mm[0] == first_mm[1] else first_mm
-    # Cracks turn to where most energy is released: K does not fall as it does along the straight line.
+    # Cracks turn towards maximum energy release: K does not fall as it does along the straight line.
     k = np.maximum.accumulate(intensity.k_mpa_sqrt_m)
     grown = crack_growth(depth, k, law, np.random.default_rng(seed), first_mm=interval)
     turns = speed_rpm * (1.0 if side == 1 else mesh.pair.driver.teeth / mesh.pair.driven.teeth)
@@ -389,30 +389,37 @@ def growth_study(
 
 
 def gear_of(mesh: GearMesh, side: int) -> ReducedGear:
-    """Finite elements of a gear: ready-made, kept, or made now."""
+    """Return the finite-element gear: supplied, cached, or made now."""
     toothed = mesh.side(side)
     return reduced_gear(GearBlank(toothed.gear, material=toothed.material), DOF_PER_TOOTH * toothed.gear.teeth)
 
 
 def growth_figure(study: GrowthStudy) -> Figure:
-    """Stress intensity over depth, and depth over turns with its interval."""
+    """Draw stress intensity over depth, and the revolutions to reach a depth with their interval."""
     intensity, grown = study.intensity, study.growth
     ends = np.full(len(intensity.depth_mm), study.law.threshold)
     panels = [
         curve_panel(
             intensity.depth_mm,
-            {"of a straight crack": intensity.k_mpa_sqrt_m, "threshold": ends},
+            {"straight crack": intensity.k_mpa_sqrt_m, "threshold": ends},
             "depth of the crack in mm",
             "MPa√m",
-            "stress intensity over a turn",
+            "stress intensity range per revolution",
         )
     ]
     if isfinite(grown.remaining_turns[0]):
-        names = ("5 % of specimens", "half of them", "95 %")
+        names = ("5 % of specimens", "50 %", "95 %")
         rows = zip(names, grown.turns, strict=True)
         curves = {name: np.where(row > 0.0, row, np.nan) for name, row in rows if np.isfinite(row).all()}
         panels.append(
-            curve_panel(grown.depth_mm, curves, "depth of the crack in mm", "turns", "turns until then", log_y=True)
+            curve_panel(
+                grown.depth_mm,
+                curves,
+                "depth of the crack in mm",
+                "revolutions",
+                "revolutions to this depth",
+                log_y=True,
+            )
         )
     return panels_figure(panels, n_columns=len(panels), title="growth of a root crack", height_in=2.8)
 

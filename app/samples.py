@@ -28,7 +28,7 @@ _CRACK = "Compared with the healthy pair, the average over a revolution changes 
 _SHOWN: dict[str, tuple[str, str, str]] = {
     "damaged_tooth": (
         "Damaged tooth",
-        "A spall on one tooth of the pinion stands out of the ring.",
+        "A spall on one tooth of the pinion stands out from the other teeth.",
         "healthy.h5",
     ),
     "root_crack_2mm": (
@@ -42,7 +42,7 @@ _SHOWN: dict[str, tuple[str, str, str]] = {
         "healthy.h5",
     ),
     "two_stage": ("Two-stage gearbox", "An inner race on the middle shaft, seen by three sensors.", ""),
-    "run_up": ("Run-up", "Mesh harmonics cross a resonance on the way from 600 to 3000 rpm.", ""),
+    "run_up": ("Run-up", "Mesh harmonics cross a resonance between 600 and 3000 rpm.", ""),
     "no_tachometer": ("Without tachometer", "The speed is found in the vibration itself.", ""),
     "eccentric_wheel": (
         "Eccentric wheel",
@@ -51,27 +51,27 @@ _SHOWN: dict[str, tuple[str, str, str]] = {
     ),
     "healthy": (
         "Healthy gearbox",
-        "What a machine in good order looks like, and what its recording cannot rule out.",
+        "What a healthy machine looks like, and what its recording cannot rule out.",
         "",
     ),
     "root_crack_0mm": ("No crack", "The reference of the four cracks.", ""),
     **{f"root_crack_{k}mm": (f"Root crack, {k} mm", _CRACK, "root_crack_0mm.h5") for k in (1, 3, 4)},
 }
-"""Of each sample: title, what it shows, and its healthy reference; those that show most come first."""
+"""Title, content and healthy reference of each sample; the most informative come first."""
 
 
 def sample_folder() -> Path:
-    """Return the folder of the samples: inside the installed package, or beside it in a checkout."""
+    """Return the folder of the samples: inside the installed package, or next to it in a checkout."""
     package = Path(gearsig.__file__).parent
     for folder in (package / "sample_data", package.parent / "sample_data"):
         if folder.is_dir():
             return folder
-    raise InputError("the sample recordings are missing", where=str(package), remedy="install gearsig again")
+    raise InputError("the sample recordings are missing", where=str(package), remedy="reinstall gearsig")
 
 
 @cache
 def samples() -> tuple[SampleRecording, ...]:
-    """Return the samples, the most telling first; each recording stands beside a rig file of the same stem."""
+    """Return the samples, the most informative first; the rig file of each has the same stem as the recording."""
     listed = []
     for rig in sorted(sample_folder().glob("*.toml")):
         recordings = [p for p in rig.parent.iterdir() if recording_stem(p.name) == rig.stem and p.suffix != ".toml"]
@@ -83,15 +83,15 @@ def samples() -> tuple[SampleRecording, ...]:
 
 
 _MACHINES = {"Mixer 1": "damaged_tooth", "Mixer 2": "outer_race", "Mixer 3": "healthy"}
-"""Of the example of a fleet: machine → the sample that it becomes like."""
+"""Machines of the example fleet → the sample that each comes to resemble."""
 N_HEALTHY, N_LATER, PIECE_S = 10, 3, 2.0
 EXAMPLE_PATTERN = "{machine}/{point}_{date:%Y%m%d}.h5"
 
 
 def write_example_fleet(folder: Path) -> None:
-    """Write three gearboxes' recordings over half a year into a folder for each, named by `EXAMPLE_PATTERN`.
+    """Write recordings of three gearboxes over half a year into one folder per machine, named by `EXAMPLE_PATTERN`.
 
-    They are pieces of the samples, which overlap, at invented dates: all machines are healthy at first.
+    They are overlapping pieces of the samples with invented dates: all machines are healthy at first.
     """
     from gearsig.recording import read_recording, write_recording
 

@@ -1,5 +1,5 @@
-"""The blind benchmark of the gap diagnosis: cases made, diagnosed where no label is, scored, reported.
+"""The blind benchmark of the gap diagnosis: make cases, diagnose them without their labels, score, report.
 
-`cases` says which cases and makes them, `answer` and `diagnosers` are all that the diagnosing process gets, `run`
-drives both and keeps answers, `scores` puts answer and truth side by side, `results` writes files.
+`cases` plans and makes the cases, `answer` and `diagnosers` form the diagnosing process, `run` drives both and keeps
+the answers, `scores` compares answer and truth, `results` writes the files.
 """

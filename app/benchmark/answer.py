@@ -1,7 +1,7 @@
-"""The diagnosing process and what it leaves: ``python -m app.benchmark.answer DIAGNOSER…`` in a case's folder.
+"""The diagnosing process and its output: ``python -m app.benchmark.answer DIAGNOSER…`` in a case's folder.
 
-It is started fresh for each case. All it is given is the folder it stands in, which has a random name and holds
-recordings and rig files; it leaves answers.json there. It imports nothing that makes cases.
+A new process is started for each case. Its only input is its working folder, which has a random name and holds
+recordings and rig files; it writes answers.json there. It imports nothing that makes cases.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ class Answer:
     Parameters
     ----------
     outcome : str
-        Value of `GapOutcome`; empty where it failed.
+        Value of `GapOutcome`; empty if the diagnosis failed.
     causes : tuple of GapCause
-        As the report has them: what its outcome names first, the others by probability.
+        In the order of the report: those that the outcome names first, then the others by probability.
     inseparable : tuple of str
     places : tuple of GapPlace
     size : float
-        Of the gap in structural floors.
+        Size of the gap in structural floors.
     seconds, cpu_seconds : float
-        What it took, start of the process left out.
+        Elapsed and processor time, without the start of the process.
     error : str
         Why there is no answer.
     """
@@ -52,35 +52,35 @@ class Answer:
 
     @property
     def ranked(self) -> tuple[GapCause, ...]:
-        """The causes by probability, whatever the outcome puts first; of those alike, the first stays first."""
+        """The causes by decreasing probability, whatever the outcome puts first; ties keep their order."""
         return tuple(sorted(self.causes, key=lambda cause: -cause.probability))
 
     def probability(self, name: str) -> float:
-        """Probability of a cause; 0 for one that is not listed."""
+        """Return the probability of a cause; 0 if it is not listed."""
         return next((c.probability for c in self.causes if c.name == name), 0.0)
 
     def options(self, name: str) -> Mapping[str, float | str]:
-        """Where a cause was put: options of its fitted setting; none where there is none."""
+        """Return the location of a cause: the options of its fitted setting; empty without one."""
         return next((c.fitted.options for c in self.causes if c.name == name and c.fitted is not None), {})
 
     def shrinkage(self, name: str) -> Shrinkage | None:
-        """How far adding a cause shrinks the gap; None where it was not tried."""
+        """Return how far adding a cause shrinks the gap; None if it was not tried."""
         return next((c.shrinkage for c in self.causes if c.name == name), None)
 
 
 def answer_of(report: GapReport) -> Answer:
-    """Reduce a report to what is scored."""
+    """Reduce a report to the fields that are scored."""
     return Answer(report.outcome.value, report.causes, report.inseparable or (), report.places, report.size.value)
 
 
 def to_text(answers: Mapping[str, Answer]) -> str:
-    """Write the answers of several diagnosers as JSON, every digit of their numbers."""
+    """Return the answers of several diagnosers as JSON, with all digits of their numbers."""
     plain = {name: asdict(answer) for name, answer in answers.items()}
     return json.dumps(plain, indent=1, default=lambda enumerated: enumerated.value) + "\n"
 
 
 def from_text(text: str) -> dict[str, Answer]:
-    """Read what `to_text` wrote."""
+    """Return the answers from the JSON of `to_text`."""
     return {name: from_plain(Answer, data, name) for name, data in json.loads(text).items()}
 
 
@@ -88,7 +88,7 @@ ANSWERS = "answers.json"
 
 
 def answered(name: str, case: VisibleCase) -> Answer:
-    """Return one diagnoser's answer; every error becomes a reason."""
+    """Return one diagnoser's answer; an error becomes the reason for having none."""
     started, cpu = time.perf_counter(), _cpu_s()
     try:
         answer = answer_of(diagnoser(name)(case))
@@ -100,14 +100,14 @@ def answered(name: str, case: VisibleCase) -> Answer:
 
 
 def main(names: Sequence[str]) -> None:
-    """Answer with each diagnoser in turn and write the answers, whole or not at all."""
+    """Answer with each diagnoser in turn and write the answers atomically."""
     case = read_visible(Path.cwd())
     answers = {name: answered(name, case) for name in names}
     write_text(Path(ANSWERS), to_text(answers))
 
 
 def _cpu_s() -> float:
-    """Processor time of this process and of those it has waited for."""
+    """Return the processor time, in s, of this process and of the child processes it has waited for."""
     spent = os.times()
     return spent.user + spent.system + spent.children_user + spent.children_system
 

@@ -1,4 +1,4 @@
-"""Which cases a benchmark makes: kinds in fixed shares, effects and severities in balance, all in a shuffled order."""
+"""Cases of a benchmark: kinds in fixed shares, effects and severities balanced, all in shuffled order."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from sims.gear_pair import PairTwin
 
 
 def counts_of(shares: Mapping[str, float], n_cases: int) -> dict[str, int]:
-    """Return whole numbers of cases in these shares, by largest remainder: together they are `n_cases`."""
+    """Return whole numbers of cases in these shares, by largest remainder; their sum is `n_cases`."""
     exact = {kind: share * n_cases for kind, share in shares.items()}
     counts = {kind: int(value) for kind, value in exact.items()}
     missing = n_cases - sum(counts.values())
@@ -49,17 +49,17 @@ BLIND, SAME = "blind", "same"
 
 @dataclass(frozen=True)
 class PlannedCase:
-    """One case before it is drawn.
+    """One planned case, before its details are drawn.
 
     Parameters
     ----------
     number : int
-        From 1, in the order of the run.
+        Number from 1, in the order of the run.
     source : str
         `BLIND` or `SAME`.
     kind : str
     effect : str or None
-        None: nothing, or drawn with the case (pairs).
+        None: no effect, or drawn with the case (pairs).
     level : float
         0 (barely noticeable) to 1 (strong).
     with_reference : bool
@@ -80,24 +80,24 @@ class PlannedCase:
 
 @dataclass(frozen=True)
 class Plan:
-    """What decides a benchmark's cases.
+    """The settings that determine a benchmark's cases.
 
     Parameters
     ----------
     n_cases : int
-        Of the independent rig.
+        Number of cases of the independent rig.
     seed : int
     role : str
         "development", "calibration" or "evaluation"; they share no gear geometry.
     reference : str
         "with" or "without" healthy references, or "both" in equal shares.
     same_simulator : bool
-        Whether the same cases are made by the diagnosing simulator too, but for the unknown, which it cannot make.
+        Whether the diagnosing simulator also makes the same cases, except unknown ones, which it cannot make.
     longest_s : float or None
-        Recordings are cut to this; None: 4 to 8 s as drawn.
+        Maximum length to which recordings are cut; None: 4 to 8 s as drawn.
     least_level : float
-        0 (barely noticeable) to 1 (strong), from which the levels of effects go up to 1; above 0 more cases are as
-        strong as the targets ask, which one in thirty is otherwise.
+        Minimum level of effects, 0 (barely noticeable) to 1 (strong). Above 0, more cases are as strong as the targets
+        require; at 0, only one in thirty is.
     """
 
     n_cases: int = 200
@@ -115,7 +115,7 @@ class Plan:
         within(self.least_level, "least level", 0, 1)
 
     def definition(self) -> dict[str, Any]:
-        """What decides the cases, as plain values."""
+        """Return the values that determine the cases."""
         return asdict(self)
 
     def cases(self) -> list[PlannedCase]:
@@ -129,11 +129,11 @@ class Plan:
         ]
 
     def rng_of(self, case: PlannedCase) -> np.random.Generator:
-        """Return the generator that a case is drawn from: a repeated case is drawn as the blind one was."""
+        """Return the random generator of a case; a repeated case uses that of its blind original."""
         return np.random.default_rng([self.seed, 1, case.number if case.repeats is None else case.repeats])
 
     def rng_of_run(self, case: PlannedCase) -> np.random.Generator:
-        """Return the generator of what the diagnosing simulator draws for itself: severities, places, noise."""
+        """Return the random generator of the diagnosing simulator, for severities, places and noise."""
         return np.random.default_rng([self.seed, 2, case.number])
 
     def draw(self, planned: PlannedCase) -> BlindCase:
@@ -155,7 +155,7 @@ class Plan:
         return replace(case, conditions=conditions, references=references)
 
     def make(self, planned: PlannedCase, folder: Path | None) -> Truth:
-        """Draw and record a case; write what may be seen into `folder` (None: nowhere); return the truth."""
+        """Draw and record a case; write its visible part into `folder` (None: nowhere); return the truth."""
         case = self.draw(planned)
         if planned.source == SAME:
             made, label = record_same(self, planned, case)
@@ -181,7 +181,7 @@ def _shuffled(plan: Plan, rng: np.random.Generator) -> list[PlannedCase]:
 def _of_kind(
     kind: str, n: int, plan: Plan, rng: np.random.Generator
 ) -> Iterator[tuple[str, str | None, float, bool, int]]:
-    """Yield kind, effect, level, reference, conditions; levels in balance within an effect, the others throughout."""
+    """Yield kind, effect, level, reference, conditions; levels are balanced within an effect, the rest overall."""
     names: Sequence[str | None] = {"single": tuple(CATALOGUE), "unknown": tuple(OUTSIDE_CATALOGUE)}.get(kind, (None,))
     chosen = [names[i] for i in rng.permutation(len(names))]
     effects = [chosen[i % len(chosen)] for i in range(n)]
@@ -195,13 +195,13 @@ def _of_kind(
 
 
 # --------------------
-# Making one case: what may be seen goes to a folder, the truth stays in memory.
+# Making one case: the visible part goes to a folder, the truth stays in memory.
 # --------------------
 
 
 @dataclass(frozen=True)
 class Truth:
-    """What the scoring side knows of a case; it is never on disk while anything is being diagnosed.
+    """The scoring side's knowledge of a case, which is never on disk while anything is being diagnosed.
 
     Parameters
     ----------
@@ -221,7 +221,7 @@ def _difference(now: Recording, before: Recording) -> dict[str, float]:
 
 
 def _features(recording: Recording) -> dict[str, float]:
-    """Return the features by name; none where the recording cannot be reduced."""
+    """Return the features by name; empty if the recording cannot be reduced."""
     from gearsig.gap import feature_values, reduce_recording
 
     if recording.rig is None:
@@ -234,18 +234,18 @@ def _features(recording: Recording) -> dict[str, float]:
 
 
 # --------------------
-# The same cases from the diagnosing simulator itself: same gears, conditions and levels, its own form of each effect.
+# The same cases made by the diagnosing simulator: same gears, conditions and levels, its own form of each effect.
 #
-# What a diagnosis scores on these over the independent rig is what it owes to knowing the generator.
+# The difference in score to the independent rig is what the diagnosis gains from knowing the generator.
 # --------------------
 
 
 N_DRAWS = 9
-"""Settings drawn per effect, of which the planned level picks one by severity."""
+"""Number of settings drawn per effect; the planned level selects one by severity."""
 
 
 def record_same(plan: Plan, planned: PlannedCase, case: BlindCase) -> tuple[CaseRecordings, dict[str, Any]]:
-    """Record a case on a specimen of the simulator; return it with its labels, laid out like the blind rig's."""
+    """Record a case on a specimen of the simulator; return it with labels in the layout of the blind rig's."""
     rng = plan.rng_of_run(planned)
     first = case.conditions[0]
     twin = CrackedPair().twin_of(case.rig.description(first.stated_rpm, first.stated_nm))
@@ -279,7 +279,7 @@ def _added(twin: PairTwin, name: str, level: float, rng: np.random.Generator) ->
 
 
 def _place(added: AddedEffect, case: BlindCase) -> dict[str, Any]:
-    """Return where the effect sits, in the words of the blind rig's labels."""
+    """Return the location of the effect in the terms of the blind rig's labels."""
     place: dict[str, Any] = {}
     for name in ("gear", "shaft"):
         if name in added.options:

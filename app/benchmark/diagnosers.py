@@ -35,7 +35,7 @@ from gearsig.rig import Rig, read_rig
 from sims.effects import as_gap_effect, effects
 
 # --------------------
-# What a diagnosing process sees of a case: one folder with recordings and rig files.
+# The visible part of a case: one folder with recordings and rig files.
 # --------------------
 
 
@@ -46,7 +46,7 @@ class VisibleCase:
     Parameters
     ----------
     recordings, references : tuple of Recording
-        Reference i was recorded where recording i was; none: no reference at all.
+        Reference i was recorded under the condition of recording i; empty: no reference.
     """
 
     recordings: tuple[Recording, ...]
@@ -54,7 +54,7 @@ class VisibleCase:
 
     @property
     def rig(self) -> Rig:
-        """Of the first recording."""
+        """Rig of the first recording."""
         return self.recordings[0].rig or Rig()
 
     @cached_property
@@ -69,7 +69,7 @@ class VisibleCase:
 
 
 def read_visible(folder: Path) -> VisibleCase:
-    """Read condition_1.h5, reference_1.h5 … with the rig files beside them."""
+    """Read condition_1.h5, reference_1.h5 … with the rig files next to them."""
     conditions, references = (
         tuple(read_recording(p, rig=read_rig(p.with_suffix(".toml"))) for p in sorted(folder.glob(f"{stem}_*.h5")))
         for stem in ("condition", "reference")
@@ -81,21 +81,21 @@ Diagnoser = Callable[[VisibleCase], GapReport]
 
 GAP, FOREST, MAJORITY, RULES = "gap", "forest", "majority", "rules"
 GAP_UNSEEN, FOREST_UNSEEN = "gap-unseen", "forest-unseen"
-"""The same without what was learned from the independent rig's development gears."""
+"""The same diagnosers, without what was learned from the development gears of the independent rig."""
 START_STOP = "start-stop"
-"""Of machines that start and stop, by the model forging."""
+"""Diagnoser of machines that start and stop, by the model forging."""
 BASELINES = (MAJORITY, RULES)
 MAIN = "__main__"
-"""A module that is another one in every process: the diagnosing process finds nothing of the caller's there."""
+"""Module name that differs between processes: the diagnosing process cannot find the caller's functions there."""
 
 
 def diagnoser(name: str) -> Diagnoser:
-    """Return the diagnoser of a name or of ``module:function``.
+    """Return the diagnoser given by its name or by ``module:function``.
 
     Raises
     ------
     InputError
-        If there is none.
+        If it does not exist.
     """
     if name in DIAGNOSERS:
         return DIAGNOSERS[name]
@@ -105,15 +105,15 @@ def diagnoser(name: str) -> Diagnoser:
         shared = getattr(import_module(module), function) if is_shared else None
     except (ImportError, AttributeError):
         shared = None
-    except (Exception, SystemExit) as error:  # anything: it is somebody else's program
-        raise InputError(f"the module of {name!r} does not run ({type(error).__name__}: {error})") from error
+    except (Exception, SystemExit) as error:  # a user's module may raise anything
+        raise InputError(f"the module of {name!r} cannot be imported ({type(error).__name__}: {error})") from error
     if not callable(shared):
         raise InputError(f"there is no diagnoser {name!r}", allowed=f"{', '.join(DIAGNOSERS)} or MODULE:FUNCTION")
-    return shared  # type: ignore[no-any-return]  # what a user's function returns shows when it is called
+    return shared  # type: ignore[no-any-return]  # a user's function is checked only when called
 
 
 def folders_of(name: str) -> tuple[Path, ...]:
-    """Return the folders that a diagnoser's module is imported from; none where there is no file of it."""
+    """Return the folders from which a diagnoser's module is imported; empty if it has no file."""
     top = (__name__ if name in DIAGNOSERS else name.partition(":")[0]).partition(".")[0]
     spec = None if top == MAIN else find_spec(top)
     if spec is None:
@@ -123,7 +123,7 @@ def folders_of(name: str) -> tuple[Path, ...]:
 
 
 def diagnose(case: VisibleCase, model: str = "cracked") -> GapReport:
-    """Diagnose a case with the product itself; what is kept for its rig lies with the case and goes with it."""
+    """Diagnose a case with the gap diagnosis of gearsig; its cache lies with the case and is deleted with it."""
     from gearsig.gap import diagnose_gap
     from sims.registry import gap_simulator
 
@@ -136,12 +136,12 @@ def diagnose(case: VisibleCase, model: str = "cracked") -> GapReport:
 
 
 def diagnose_drive(case: VisibleCase) -> GapReport:
-    """Diagnose a case of starts and stops with the product itself."""
+    """Diagnose a start–stop case with the gap diagnosis of gearsig."""
     return diagnose(case, "forging")
 
 
 # --------------------
-# A gap report of nothing but probabilities: what a baseline can say.
+# A gap report that holds only probabilities, for the baselines.
 # --------------------
 
 
@@ -155,18 +155,18 @@ def bare_report(
     options: Mapping[str, Mapping[str, str]] | None = None,
     outcome: GapOutcome | None = None,
 ) -> GapReport:
-    """Return the report of probabilities.
+    """Return a report that holds only probabilities.
 
     Parameters
     ----------
     simulator : str
-        Name of the baseline, where a report names its simulator.
+        Name of the baseline, in place of the simulator.
     probabilities : mapping
         Cause → probability.
     options : mapping or None
-        Cause → where it is put: gear, bearing.
+        Cause → its location: gear, bearing.
     outcome : GapOutcome or None
-        None: the likeliest cause's.
+        None: follows from the most probable cause.
     """
     where = options or {}
     ranked = sorted(probabilities.items(), key=lambda item: -item[1])
@@ -200,12 +200,12 @@ def _cause(name: str, probability: float, options: Mapping[str, str]) -> GapCaus
 
 
 # --------------------
-# The baseline that asks the forests only: nothing is tried on the rig's twin.
+# The baseline that uses only the forests: nothing is simulated on the rig's twin.
 # --------------------
 
 
 def diagnose_forest(case: VisibleCase) -> GapReport:
-    """Return the calibrated probabilities of the forests, what may be said of them, and the shaft that shows it."""
+    """Return the calibrated probabilities of the forests, the verdict they allow, and the shaft that shows it."""
     from gearsig.gap import attribute, conditions_of, determined_options
     from sims.cracked import CrackedPair
 
@@ -224,19 +224,19 @@ def diagnose_forest(case: VisibleCase) -> GapReport:
 
 
 # --------------------
-# The baseline that looks at nothing: it always answers with the shares of the kinds of case.
+# The baseline that ignores the recordings: it always answers with the shares of the kinds of case.
 # --------------------
 
 
 SHARES = {"single": 0.60, "none": 0.15, "unknown": 0.15, "pair": 0.10}
-"""Of all cases; "single" is shared evenly by the catalogue's effects, "unknown" by those outside it.
+"""Shares of all cases; "single" is divided evenly among the effects of the catalogue, "unknown" among those outside it.
 
-They are public, and stand here since the diagnosing process imports nothing that makes cases.
+They are public. They are defined here because the diagnosing process imports nothing that makes cases.
 """
 
 
-def diagnose_majority(case: VisibleCase) -> GapReport:  # noqa: ARG001 - that is the point of it
-    """Return the shares; the likeliest is "none"."""
+def diagnose_majority(case: VisibleCase) -> GapReport:  # noqa: ARG001 - it ignores the case on purpose
+    """Return the shares as probabilities; the most probable cause is "none"."""
     per_effect = (SHARES["single"] + SHARES["pair"]) / len(effects())
     return bare_report(
         "majority", {NONE: SHARES["none"], UNKNOWN: SHARES["unknown"], **dict.fromkeys(effects(), per_effect)}
@@ -244,7 +244,7 @@ def diagnose_majority(case: VisibleCase) -> GapReport:  # noqa: ARG001 - that is
 
 
 # --------------------
-# The diagnosis as it is of machines like none that it knows: nothing of the independent rig is in its population.
+# The diagnosis of machines unlike any that it knows: its population contains nothing of the independent rig.
 # --------------------
 
 
@@ -259,16 +259,16 @@ def unseen(diagnose_case: Diagnoser) -> Diagnoser:
 
 
 # --------------------
-# What is usual of the features in the rule table of `gearsig.gap`, for the baseline that applies it.
+# Usual values of the features in the rule table of `gearsig.gap`, for the baseline that applies it.
 #
-# A feature counts by how far it is from usual, over its usual spread. With a healthy reference the change against it
-# counts, over the change's usual spread. Usual: the middle and the spread of 24 healthy machines of the development
-# cases, rounded.
+# A feature counts by its deviation from the usual value, relative to its usual spread; with a healthy reference, by
+# its change, relative to the usual spread of the change. Usual values and spreads: median and spread of 24 healthy
+# machines of the development cases, rounded.
 # --------------------
 
 
 MIN_STRENGTH = 2.0
-"""In spreads: the strength at which "none" stands."""
+"""Strength assigned to "none", in spreads."""
 
 USUAL: dict[str, tuple[float, float, float]] = {
     "mesh.total": (5.0, 16.0, 1.5),
@@ -318,7 +318,7 @@ USUAL: dict[str, tuple[float, float, float]] = {
 
 
 def diagnose_rules(case: VisibleCase) -> GapReport:
-    """Return the rules' strengths as probabilities, by exponentials; conditions count alike."""
+    """Return the softmax of the rules' strengths as probabilities; all conditions count equally."""
     strongest: dict[str, tuple[float, str]] = {NONE: (MIN_STRENGTH, "")}
     deviations_of = list(_deviations(case))
     for cause, signs in textbook_rules(map(as_gap_effect, effects().values())):
@@ -334,13 +334,13 @@ def diagnose_rules(case: VisibleCase) -> GapReport:
 
 
 def _deviations(case: VisibleCase) -> Iterator[dict[str, float]]:
-    """Yield, for each condition, how far every feature of the table is from usual, in spreads."""
+    """Yield, for each condition, the deviation of every feature of the table from its usual value, in spreads."""
     for i, recording in enumerate(case.reduced):
         values = dict(zip(*feature_values(recording), strict=True))
         before = (
             dict(zip(*feature_values(case.reduced_references[i]), strict=True)) if case.reduced_references else None
         )
-        deviations = dict.fromkeys(values, 0.0)  # what is usual is known of the table's features alone
+        deviations = dict.fromkeys(values, 0.0)  # usual values are known only for features of the table
         for name, (usual, spread, change) in USUAL.items():
             for side in SIDES:
                 feature = name.format(side=side)
@@ -358,4 +358,4 @@ DIAGNOSERS: dict[str, Diagnoser] = {
     FOREST_UNSEEN: unseen(diagnose_forest),
     START_STOP: diagnose_drive,
 }
-"""Those that `gearsig benchmark gap` knows by name."""
+"""Diagnosers that `gearsig benchmark gap` knows by name."""

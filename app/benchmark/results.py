@@ -1,4 +1,4 @@
-"""A benchmark's files: report.html, table.md, scores.json, cases.csv, labels/. Each is written whole, the page last."""
+"""Files of a benchmark: report.html, table.md, scores.json, cases.csv, labels/; written atomically, the page last."""
 
 from __future__ import annotations
 
@@ -42,16 +42,16 @@ from gearsig.report import Section, benchmark_html
 from sims.blind import CATALOGUE, OUTSIDE_CATALOGUE
 
 # --------------------
-# Result tables: the README's in Markdown, the same cells for the page.
+# Result tables: in Markdown for the README, and with the same cells for the page.
 # --------------------
 
 
 NO_CASES = "–"
-"""A cell without a case."""
+"""Text of a cell without cases."""
 
 
 def main_table(result: BenchmarkResult) -> Section:
-    """Return the figures that have targets or matter beside them, with and without reference."""
+    """Return the figures with targets and those needed to interpret them, with and without reference."""
     parts = {name: result.part(name).scores for name in (WITHOUT, WITH)}
     rows = []
     for figure in FIGURES:
@@ -66,7 +66,7 @@ def main_table(result: BenchmarkResult) -> Section:
 
 
 def same_table(result: BenchmarkResult) -> tuple[Section, ...]:
-    """Return the figures of the diagnosing simulator's own cases and the drop from them, if there are any."""
+    """Return the figures of the diagnosing simulator's own cases, if any, and the drop from them."""
     if not result.request.plan.same_simulator:
         return ()
     rows = []
@@ -77,14 +77,14 @@ def same_table(result: BenchmarkResult) -> tuple[Section, ...]:
             row += [cell(figure, same), _drop(figure, same, blind)]
         if any(text != NO_CASES for text in row[1::2]):
             rows.append(tuple(row))
-    note = "The same plan of cases, made by the diagnosing simulator; drop: from there to the independent rig."
+    note = "The same plan of cases, made by the diagnosing simulator; drop: change on going to the independent rig."
     return (Section("Same simulator", note, ("", WITHOUT, "drop", WITH, "drop"), tuple(rows)),)
 
 
 def figures_table(
     result: BenchmarkResult, title: str, note: str, columns: Mapping[str, Part], *, with_n: bool = True
 ) -> Section:
-    """Return the figures of some parts of the cases side by side, without those that no case has."""
+    """Return the figures of several parts side by side, without figures that apply to no case."""
     rows = []
     for figure in result.figures:
         of_parts = [part.scores[figure.key] for part in columns.values()]
@@ -94,27 +94,27 @@ def figures_table(
 
 
 def alternatives_table(result: BenchmarkResult) -> Section:
-    """Return the same figures of the diagnosers beside, on the very same cases."""
+    """Return the same figures for the other diagnosers, on the same cases."""
     names = result.request.diagnosers
     parts = (("without", WITHOUT), ("with", WITH))
     columns = {f"{name}, {word}": result.part(part, diagnoser=name) for name in names for word, part in parts}
-    words = {"majority": "majority: always the commonest answer", "rules": "rules: a table of textbook signatures"}
+    words = {"majority": "majority: always the most frequent answer", "rules": "rules: a table of textbook signatures"}
     note = "; ".join(words[name] for name in BASELINES if name in names).capitalize()
     text = f"On the same cases, without and with reference. {note}."
-    return figures_table(result, "Beside other diagnosers", text, columns, with_n=False)
+    return figures_table(result, "Comparison with other diagnosers", text, columns, with_n=False)
 
 
 def parts_table(result: BenchmarkResult) -> Section:
-    """Return the figures of one and two conditions, and of faults of every strength."""
+    """Return the figures for one and two conditions, and for faults of every strength."""
     columns = {name: result.part(name) for name in ("one condition", "two conditions")} | {
-        "every strength, without": result.part(WITHOUT, strong=False),
+        "every strength, without reference": result.part(WITHOUT, strong=False),
         "with reference": result.part(WITH, strong=False),
     }
     return figures_table(result, "By conditions, and with weak faults", "", columns)
 
 
 def cell(figure: Figure, score: Score, *, with_n: bool = True) -> str:
-    """Return value, interval and number of cases."""
+    """Return value, interval and number of cases as text."""
     if not score.n:
         return NO_CASES
     n = f" of {score.n}" if with_n else ""
@@ -144,8 +144,8 @@ def _drop(figure: Figure, same: Score, blind: Score) -> str:
 
 
 _BASIS = (
-    f"Faults of at least {STRONG:g} structural floors, and all healthy cases; value (90 % interval) of so many cases; "
-    "open: the interval holds the target."
+    f"Faults of at least {STRONG:g} structural floors, and all healthy cases; value (90 % interval) and number of "
+    "cases; open: the interval contains the target."
 )
 
 
@@ -158,28 +158,28 @@ def markdown(result: BenchmarkResult, command: str, date: datetime) -> str:
 
 
 def titled_table(table: Section) -> str:
-    """Return a table in Markdown, its title and note above."""
+    """Return a table in Markdown with its title and note above it."""
     return f"**{table.title}.** {table.note}\n\n{markdown_table(table.header, table.rows)}"
 
 
 def cost_lines(result: BenchmarkResult) -> list[str]:
-    """Return what a diagnosis took, and the calibration error that chance alone would give."""
+    """Return the run time of a diagnosis and the calibration error expected by chance, as text."""
     answers = [row.answer for row in result.rows[result.judged]]
     wall = np.array([a.seconds for a in answers])
     cpu = np.array([a.cpu_seconds for a in answers])
     took = (
-        f"One diagnosis took {np.median(wall):.1f} s (middle; longest {wall.max():.1f} s), "
-        f"{np.median(cpu):.1f} s of one processor's time (longest {cpu.max():.1f} s)."
+        f"One diagnosis took {np.median(wall):.1f} s (median; longest {wall.max():.1f} s), "
+        f"{np.median(cpu):.1f} s of processor time (longest {cpu.max():.1f} s)."
     )
     chance = (
-        "With so many cases, probabilities that are exactly true would show a calibration error of "
+        "With this number of cases, exactly correct probabilities would show a calibration error of "
         f"{result.chance_error:.2f}."
     )
     return [took, chance]
 
 
 # --------------------
-# Per effect and per level; and what was taken for what, with what both have in common.
+# Results per effect and per level, and confusions, with what both effects have in common.
 # --------------------
 
 
@@ -201,12 +201,12 @@ def effects_table(result: BenchmarkResult) -> Section:
         f"≥ {STRONG:g} floors, without",
         "with reference",
         "strength",
-        "most often taken for",
+        "most often mistaken for",
     )
     note = (
-        "Likeliest cause right, of so many: in the weak, middle and strong third of the effect's span, and from "
-        f"{STRONG:g} structural floors on. Strength: the middle, in structural floors. For effects outside the "
-        "catalogue “unknown” is right."
+        "Cases with the likeliest cause right, of how many: in the weak, middle and strong third of the effect's span, "
+        f"and from {STRONG:g} structural floors upwards. Strength: the median, in structural floors. For effects "
+        "outside the catalogue “unknown” is right."
     )
     return Section("Effect by effect", note, header, tuple(row for row in table if row))
 
@@ -232,7 +232,7 @@ def _right(rows: Sequence[Row]) -> str:
 
 
 def confusions_table(result: BenchmarkResult) -> Section:
-    """Return the commonest wrong answers, and in which kinds of features both effects show."""
+    """Return the most frequent wrong answers, and the kinds of features in which both effects show."""
     confusions = Counter(
         (r.truths[0] if r.kind != "unknown" else r.effects[0], r.first)
         for r in _with_one_answer(result)
@@ -242,15 +242,15 @@ def confusions_table(result: BenchmarkResult) -> Section:
         (true, answer or "no answer", str(n), _common(true, answer)) for (true, answer), n in confusions.most_common()
     ]
     return Section(
-        "What was taken for what",
+        "Confusions",
         "In common: kinds of features in which theory expects both.",
-        ("it was", "said", "cases", "in common"),
+        ("true cause", "answer", "cases", "in common"),
         tuple(table[:MAX_CONFUSIONS]),
     )
 
 
 def _with_one_answer(result: BenchmarkResult) -> list[Row]:
-    """Return the blind cases with one right answer, of strong faults only where strength is known."""
+    """Return the blind cases with one right answer; only those with strong faults, if strength is known."""
     rows = [r for r in result.rows[result.judged] if r.source == BLIND and r.kind != "pair"]
     return strong_only(rows, STRONG) if result.strengths_known else rows
 
@@ -259,9 +259,9 @@ def _common(true: str, answer: str) -> str:
     from sims.effects import effects
 
     if answer == NONE:
-        return "too weak to stand out of the floor"
+        return "too weak to stand out from the floor"
     if true in OUTSIDE_CATALOGUE:
-        return "made to be mistaken for it" if OUTSIDE_CATALOGUE[true].resembles == answer else ""
+        return "made to resemble it" if OUTSIDE_CATALOGUE[true].resembles == answer else ""
     known = effects()
     if true in known and answer in known:
         return ", ".join(kind.replace("_", " ") for kind in known[true].shows_in if kind in known[answer].shows_in)
@@ -269,7 +269,7 @@ def _common(true: str, answer: str) -> str:
 
 
 def confusion_counts(result: BenchmarkResult) -> tuple[tuple[str, ...], tuple[str, ...], np.ndarray]:
-    """Return what it was, what was said, and the counts, (n_true, n_said), of blind cases with one right answer."""
+    """Return true causes, answers and counts, (n_true, n_answers), of the blind cases with one right answer."""
     rows = _with_one_answer(result)
     true = (*CATALOGUE, NONE, UNKNOWN)
     answers = (*true, "no answer") if any(not r.first for r in rows) else true
@@ -285,12 +285,12 @@ COLUMNS = (
     *("diagnoser", "outcome", "likeliest", "probability", "second", "probability_of_true", "named", "right"),
     *("seconds", "cpu_seconds", "error"),
 )
-CHANGED = "; it changed while the benchmark ran, so that the answers are not all of one state"
+CHANGED = "; it changed while the benchmark ran, so the answers come from different versions"
 REPORT, TABLE, SCORES, CASES, LABELS = "report.html", "table.md", "scores.json", "cases.csv", "labels"
 
 
 def write_results(result: BenchmarkResult, cases: Sequence[Done], folder: Path, command: str) -> Path:
-    """Write everything; return the page's path. Nothing may be left to diagnose when this is called."""
+    """Write all files and return the path of the page; call it only when every diagnosis has ended."""
     now = datetime.now().astimezone()
     write_files(result, cases, folder, command, markdown(result, command, now), now)
     return write_text(folder / REPORT, page(result, command, now))
@@ -299,7 +299,7 @@ def write_results(result: BenchmarkResult, cases: Sequence[Done], folder: Path, 
 def write_files(
     result: BenchmarkResult, cases: Sequence[Done], folder: Path, command: str, table: str, date: datetime | None = None
 ) -> None:
-    """Write labels, cases, scores and the tables' text, each whole or not at all."""
+    """Write labels, cases, scores and tables, each atomically."""
     (folder / LABELS).mkdir(exist_ok=True)
     for done in cases:
         text = json.dumps({"source": done.planned.source, **done.truth.labels}, indent=1, ensure_ascii=False)
@@ -310,7 +310,7 @@ def write_files(
 
 
 def scores_json(result: BenchmarkResult, command: str, date: datetime) -> str:
-    """Return every figure of every part, for programs."""
+    """Return every figure of every part as JSON."""
     parts = [
         {
             "diagnoser": p.diagnoser,
@@ -340,7 +340,7 @@ def _plain(score: Score) -> dict[str, float | int | None]:
 
 
 def cases_csv(result: BenchmarkResult, cases: Sequence[Done]) -> str:
-    """Return one line per case and diagnoser."""
+    """Return a CSV table with one line per case and diagnoser."""
     table: list[list[object]] = []
     for name, rows in result.rows.items():
         for done, row in zip(cases, rows, strict=True):
@@ -376,12 +376,12 @@ def _number(value: float) -> str:
 
 
 def page(result: BenchmarkResult, command: str, date: datetime) -> str:
-    """Return report.html."""
+    """Return the HTML of report.html."""
     sections = [
         main_table(result),
-        Section("What was taken for what", pictures=(_confusion_picture(result),)),
-        replace(confusions_table(result), title="The commonest confusions"),
-        Section("Are the probabilities true?", " ".join(cost_lines(result)[1:]), pictures=_calibration(result)),
+        Section("Confusions", pictures=(_confusion_picture(result),)),
+        replace(confusions_table(result), title="The most frequent confusions"),
+        Section("Are the probabilities correct?", " ".join(cost_lines(result)[1:]), pictures=_calibration(result)),
         effects_table(result),
         parts_table(result),
         alternatives_table(result),
@@ -415,8 +415,8 @@ def _provenance(result: BenchmarkResult, command: str) -> list[tuple[str, str]]:
         ("command", command),
         ("cases", f"{plan.n_cases}, role {plan.role}, seed {plan.seed}; {shares}"),
         ("code", result.request.code + ("" if state_of_code() == result.request.code else CHANGED)),
-        ("blindness", "each case diagnosed by a fresh process that is given recordings and rig files only"),
-        ("strength", "change between a case and its twin without the fault, sized like the whole gap"),
+        ("blindness", "each case is diagnosed by a new process that is given only recordings and rig files"),
+        ("strength", "change between a case and its twin without the fault, measured like the whole gap"),
         ("one diagnosis", cost_lines(result)[0]),
     ]
 
@@ -426,11 +426,11 @@ def _confusion_picture(result: BenchmarkResult) -> Picture:
 
     strong = f", faults of at least {STRONG:g} structural floors" if result.strengths_known else ""
     true, answers, counts = confusion_counts(result)
-    figure = confusion_figure(true, answers, counts, title=f"Cases by what it was and what was said{strong}")
+    figure = confusion_figure(true, answers, counts, title=f"Cases by true cause and answer{strong}")
     return embed(
         figure,
-        "Rows are what it was, with the number of cases; what lies off the diagonal was mistaken.",
-        "Table of what it was against the likeliest cause.",
+        "Rows: true causes, with the number of cases; entries off the diagonal are wrong answers.",
+        "Table of the true cause against the likeliest cause.",
     )
 
 
@@ -452,7 +452,9 @@ def _calibration(result: BenchmarkResult) -> tuple[Picture, ...]:
     if not curves:
         return ()
     figure = calibration_figure(curves, title="Right answers over stated probability")
-    caption = "Ten bins of equally many cases, of every strength; below the dashed line answers are surer than right."
+    caption = (
+        "Ten bins with equal numbers of cases, of every strength; answers below the dashed line are overconfident."
+    )
     return (embed(figure, caption, "Share of right answers over stated probability.", vector=True),)
 
 

@@ -25,21 +25,20 @@ from gearsig.processes import Running, process_pool, stop
 from sims.sweep import claimed
 
 # --------------------
-# Makes cases and has them answered: each by a fresh process in a folder of its own, which is then forgotten.
+# Make cases and have each answered by a new process in its own temporary folder.
 #
-# Labels and twins exist in the memory of the making processes and of this one only, until every diagnosis has ended;
-# the folder of a case has a random name, is removed with the answer, and holds recordings and rig files only. What is
-# kept on the way are answers. An answer that is there already is not asked for again; its truth is made anew from the
-# seed.
+# Until every diagnosis has ended, labels and twins exist only in the memory of the making processes and of this one;
+# the folder of a case has a random name, holds only recordings and rig files, and is removed after the answer. Only
+# answers are kept during the run. An existing answer is not asked for again; its truth is made again from the seed.
 # --------------------
 
 
 DEFINITION, ANSWERS_FOLDER = "benchmark.json", "answers"
 MAX_S = 900.0
-"""A diagnosis that takes longer has no answer."""
+"""Time limit, in s; a diagnosis that takes longer has no answer."""
 
 _SHOWS_ONLY = ("gearsig/plot/", "gearsig/report/", "app/benchmark/scores.py", "app/benchmark/results.py")
-"""What neither makes a case nor answers one: it may change between an answer and its score."""
+"""Code that neither makes nor answers cases: it may change between an answer and its score."""
 
 _PASSED_ON = ("PATH", "LANG", "LC_ALL", "HOME", "SYSTEMROOT", "VIRTUAL_ENV", "NUMBA_CACHE_DIR", *FOLDERS)
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -48,13 +47,13 @@ _ROOT = Path(app.__file__).resolve().parents[1]
 
 @dataclass(frozen=True)
 class BenchmarkRequest:
-    """A benchmark as it is asked for.
+    """A requested benchmark.
 
     Parameters
     ----------
     plan : Plan
     diagnosers : tuple of str
-        The first is judged, the others stand beside it; see `app.benchmark.diagnosers`.
+        The first is judged, the others are for comparison; see `app.benchmark.diagnosers`.
     """
 
     plan: Plan
@@ -66,11 +65,11 @@ class BenchmarkRequest:
 
     @cached_property
     def code(self) -> str:
-        """State of the code when it was first asked for."""
+        """Hash of the code when it was first requested."""
         return state_of_code()
 
     def definition(self) -> dict[str, Any]:
-        """What decides the result, as plain values."""
+        """Return the values that determine the result."""
         return {
             **self.plan.definition(),
             "diagnosers": list(self.diagnosers),
@@ -98,14 +97,14 @@ class Done:
 def run_benchmark(
     request: BenchmarkRequest, folder: Path, *, n_processes: int = 2, on_progress: Callable[[int], object] | None = None
 ) -> list[Done]:
-    """Make and diagnose all cases, in as many processes; return them in the plan's order.
+    """Make and diagnose all cases in `n_processes` processes; return them in the plan's order.
 
-    After Ctrl-C or SIGTERM the answers so far stay in the folder, and the same call goes on from there.
+    After Ctrl-C or SIGTERM the answers so far stay in the folder, and the same call continues from there.
 
     Raises
     ------
     InputError
-        If the folder holds other things or another benchmark, a diagnoser is not there, or the code has changed.
+        If the folder holds other files or another benchmark, a diagnoser does not exist, or the code has changed.
     """
     claimed(folder, request.definition(), DEFINITION, "benchmark")
     (folder / ANSWERS_FOLDER).mkdir(exist_ok=True)
@@ -141,7 +140,7 @@ def _run_case(
 
 
 def _kept_answers(path: Path, diagnosers: Sequence[str]) -> dict[str, Answer] | None:
-    """Return the answers of an earlier run; None where there are none, or they are damaged: they are given again."""
+    """Return the answers of an earlier run; None if they are missing or damaged, so that they are made again."""
     try:
         answers = from_text(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
@@ -150,17 +149,17 @@ def _kept_answers(path: Path, diagnosers: Sequence[str]) -> dict[str, Answer] | 
 
 
 def n_answered(folder: Path) -> int:
-    """Cases whose answers the folder holds."""
+    """Return the number of cases whose answers the folder holds."""
     return len(list((folder / ANSWERS_FOLDER).glob("case_*.json")))
 
 
 def diagnosed(folder: Path, names: Sequence[str], running: Running | None = None) -> dict[str, Answer]:
-    """Return the answers of a fresh process that is given the folder and nothing else.
+    """Return the answers of a new process that is given only the folder.
 
     Raises
     ------
     KeyboardInterrupt
-        If what runs was stopped: that is no answer.
+        If the run was stopped, which is not an answer.
     """
     runs = running or Running()
     process = runs.start(
@@ -187,9 +186,9 @@ def diagnosed(folder: Path, names: Sequence[str], running: Running | None = None
 
 
 def environment(folder: Path, names: Sequence[str]) -> dict[str, str]:
-    """Return all that the process of some diagnosers finds in its environment.
+    """Return the environment of a diagnosing process.
 
-    Of the caller's own PYTHONPATH it gets the folders that these diagnosers' modules lie in and nothing else.
+    Of the caller's PYTHONPATH it contains only the folders that hold the modules of these diagnosers.
     """
     passed_on = {name: os.environ[name] for name in _PASSED_ON if name in os.environ}
     modules = dict.fromkeys([_ROOT, *(place for name in names for place in folders_of(name))])
@@ -198,7 +197,7 @@ def environment(folder: Path, names: Sequence[str]) -> dict[str, str]:
 
 
 def state_of_code() -> str:
-    """Return a hash of everything that makes or answers a case: answers of other code are no answers of this one."""
+    """Return a hash of all code that makes or answers cases; answers made by other code do not count."""
     digest = hashlib.sha256()
     for room in ("gearsig", "sims", "app/benchmark"):
         for path in sorted((_ROOT / room).rglob("*")):

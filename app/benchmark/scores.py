@@ -1,4 +1,4 @@
-"""How a benchmark is scored: answer and truth side by side, and the figures of many cases, with 90 % intervals."""
+"""Scores of a benchmark: comparison of answer and truth, and figures over many cases with 90 % intervals."""
 
 from __future__ import annotations
 
@@ -30,28 +30,28 @@ from gearsig.gap import (
 from sims.blind import CATALOGUE, MECHANICAL
 
 # --------------------
-# Whether the fault was put where it is: tooth, shaft, bearing, order.
+# Whether the fault was located correctly: tooth, shaft, bearing, order.
 # --------------------
 
 
 SHAFT_OF = {"pinion": "input", "wheel": "output", "driver": "input", "driven": "output"}
-"""Shaft of a gear, in the labels' words and in the answers'."""
+"""Shaft of a gear, under the names used by the labels and by the answers."""
 
 ORDER_TOLERANCE = 0.02
-"""Relative: slipping bearings stay within it."""
+"""Relative tolerance of an order; wide enough for slip in bearings."""
 
 
 @dataclass(frozen=True)
 class Located:
-    """True, false, or None where the case has no such place.
+    """Whether each part of the location is right; None if the case has no such location.
 
     Parameters
     ----------
     tooth : bool or None
-        Within one tooth; only teeth of a shaft with a mark have an angle that can be known.
+        Within one tooth; the angle can be known only for teeth of a shaft with a mark.
     shaft : bool or None
     bearing : bool or None
-        The two bearings of a shaft are alike on the blind rig: either counts.
+        The two bearings of a shaft are identical on the blind rig: either counts.
     order : bool or None
     """
 
@@ -62,19 +62,19 @@ class Located:
 
 
 def located(place: Mapping[str, Any], effect: str, answer: Answer, pair: Mapping[str, float]) -> Located:
-    """Compare a label's place with what was answered.
+    """Compare the location in the label with the answer.
 
-    The fitted setting of the true effect counts, if it was tried; what it does not say is sought in the places of the
-    gap, the one of largest share first. What is said nowhere is wrong.
+    The fitted setting of the true effect counts, if it was tried; what it does not state is taken from the places of
+    the gap, the one with the largest share first. What neither states counts as wrong.
 
     Parameters
     ----------
     place : mapping
-        Of the label.
+        Location in the label.
     effect : str
     answer : Answer
     pair : mapping
-        Teeth: z1 on the input shaft, z2 on the output shaft.
+        Tooth counts: z1 on the input shaft, z2 on the output shaft.
     """
     options, places = answer.options(effect), answer.places
     shaft = str(place.get("shaft", ""))
@@ -107,39 +107,39 @@ def _shaft(options: Mapping[str, Any], places: tuple[GapPlace, ...]) -> str:
 
 
 def _bearing_shaft(options: Mapping[str, Any]) -> str:
-    """Shaft of the bearing that is named: the blind rig has 1 and 2 on its input shaft, 3 and 4 on the other."""
+    """Return the shaft of the named bearing: the blind rig has 1 and 2 on its input shaft, 3 and 4 on the output."""
     number = str(options.get("bearing", "")).rpartition(" ")[2]
     return ("input" if int(number) <= 2 else "output") if number.isdigit() else ""
 
 
 def _order(order: float, options: Mapping[str, Any], places: tuple[GapPlace, ...]) -> bool:
-    """Orders of the input shaft: of the setting, or of the first place."""
+    """Return whether the order (of the input shaft) of the setting, else of the first place, is right."""
     stated_orders = [float(options["order"])] if "order" in options else [o for p in places[:1] for o in p.orders]
     return any(abs(value - order) <= ORDER_TOLERANCE * order for value in stated_orders)
 
 
 # --------------------
-# How strong a case's fault is, measured by its twin: the same run from the same seeds without the fault.
+# Strength of a case's fault, measured against its twin: the same run from the same seeds without the fault.
 # --------------------
 
 
 STRONG = 3.0
-"""Structural floors from which on a fault should be found."""
+"""Strength, in structural floors, from which a fault should be found."""
 
 Floors = Mapping[bool, StructuralFloor]
-"""With a reference (True) and without (False)."""
+"""Structural floors with a reference (True) and without (False)."""
 
 
 def known_floors() -> Floors:
-    """Return the floors that the diagnosis itself uses."""
+    """Return the structural floors that the diagnosis uses."""
     learned = load_learned()
     return {with_reference: learned.floor(with_reference=with_reference) for with_reference in (False, True)}
 
 
 def strength(truth: Truth, floors: Floors) -> float:
-    """Return the size of the change that the fault alone makes, in structural floors; nan where it cannot be said.
+    """Return the size of the change caused by the fault alone, in structural floors; nan if it cannot be measured.
 
-    It is measured like the whole gap, see `gearsig.gap.gap_size`; of two conditions the larger counts.
+    It is measured like the whole gap, see `gearsig.gap.gap_size`; with two conditions the larger value counts.
     """
     floor = floors[bool(truth.labels["has_reference"])]
     known = [name for name in floor.names if all(name in change for change in truth.fault_changes)]
@@ -161,11 +161,11 @@ class Row:
     number : int
     source, kind : str
     effects : tuple of str
-        What was wrong.
+        Simulated effects.
     truths : tuple of str
-        Causes that are right: the effects; "none"; "unknown".
+        Correct causes: the effects, "none" or "unknown".
     level, strength : float
-        Of the fault: 0 to 1 in its span; structural floors.
+        Of the fault: 0 to 1 within its span, and in structural floors.
     has_reference : bool
     n_conditions : int
     answer : Answer
@@ -186,27 +186,27 @@ class Row:
 
     @cached_property
     def ranked(self) -> tuple[str, ...]:
-        """Causes, likeliest first."""
+        """Causes, most probable first."""
         return tuple(c.name for c in self.answer.ranked)
 
     @property
     def first(self) -> str:
-        """The likeliest cause; empty where there is no answer."""
+        """The most probable cause; empty if there is no answer."""
         return self.ranked[0] if self.ranked else ""
 
     @property
     def confidence(self) -> float:
-        """Probability of the likeliest cause; nan where there is no answer."""
+        """Probability of the most probable cause; nan if there is no answer."""
         return self.answer.probability(self.first) if self.ranked else float("nan")
 
     @property
     def first_mechanical(self) -> str:
-        """The likeliest of the mechanical effects."""
+        """The most probable mechanical effect."""
         return next((name for name in self.ranked if name in MECHANICAL), "")
 
     @property
     def named(self) -> str:
-        """The mechanical effect that the verdict names: as the cause, or as one of those that cannot be separated."""
+        """The mechanical effect that the verdict names, as the cause or as one of several inseparable causes."""
         first = tuple(c.name for c in self.answer.causes[:1])
         several = self.answer.inseparable or first
         named = {GapOutcome.EFFECT.value: first, GapOutcome.CANNOT_SEPARATE.value: several}
@@ -214,27 +214,27 @@ class Row:
 
     @property
     def is_right(self) -> bool:
-        """Whether the likeliest cause is one of those that are right."""
+        """Whether the most probable cause is a correct one."""
         return self.first in self.truths
 
     @property
     def says_unknown(self) -> bool:
-        """Whether the verdict is that a cause outside the catalogue is at work."""
+        """Whether the verdict is a cause outside the catalogue."""
         return self.answer.outcome == GapOutcome.UNKNOWN.value
 
     @property
     def is_mechanical(self) -> bool:
-        """Whether exactly one mechanical effect was wrong."""
+        """Whether the case has exactly one effect, and it is mechanical."""
         return self.kind == "single" and self.effects[0] in MECHANICAL
 
     @property
     def is_nuisance(self) -> bool:
-        """Whether nothing but the measurement chain was wrong."""
+        """Whether the only fault is in the measurement chain."""
         return self.kind == "single" and not self.is_mechanical
 
 
 def rows_of(cases: Sequence[Done], diagnoser: str, floors: Floors) -> list[Row]:
-    """Return one row per case."""
+    """Return one row per case for one diagnoser."""
 
     def on_gears(done: Done) -> Callable[[Mapping[str, Any], str, Answer], Located]:
         return lambda place, effect, answer: located(place, effect, answer, done.truth.labels["pair"])
@@ -245,7 +245,7 @@ def rows_of(cases: Sequence[Done], diagnoser: str, floors: Floors) -> list[Row]:
 def row_of(
     done: Done, answer: Answer, strength_floors: float, placed: Callable[[Mapping[str, Any], str, Answer], Located]
 ) -> Row:
-    """Return a case with an answer; `placed` says of the label's place, the effect and the answer what was right."""
+    """Return the row of a case; `placed` compares the label's location with the answer, given the effect."""
     labels = done.truth.labels
     effects = tuple(e["name"] for e in labels["effects"])
     truths = {"none": (NONE,), "unknown": (UNKNOWN,)}.get(labels["kind"], effects)
@@ -266,12 +266,12 @@ def row_of(
 
 
 def group_of(cause: str) -> str:
-    """Group of an effect; "none" and "unknown" are their own."""
+    """Return the group of an effect; "none" and "unknown" are groups of their own."""
     return CATALOGUE[cause].group if cause in CATALOGUE else cause
 
 
 # --------------------
-# 90 % intervals of shares and of anything that is computed from a list of cases.
+# 90 % intervals of shares and of statistics computed from a list of cases.
 # --------------------
 
 
@@ -282,12 +282,12 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Score:
-    """A figure with its 90 % interval and the number of cases it is made of.
+    """A figure with its 90 % interval and the number of cases it is based on.
 
     Parameters
     ----------
     value, low, high : float
-        nan without cases.
+        nan if there are no cases.
     n : int
     """
 
@@ -301,7 +301,7 @@ NO_SCORE = Score(float("nan"), float("nan"), float("nan"), 0)
 
 
 def share(n_hits: int, n: int) -> Score:
-    """Return a share with Wilson's score interval.
+    """Return the share n_hits/n with Wilson's 90 % score interval.
 
     Source: E. B. Wilson, *Probable inference, the law of succession, and statistical inference* (J. Am. Stat. Assoc.,
     1927).
@@ -321,10 +321,10 @@ def resampled(
     *,
     centred: bool = False,
 ) -> Score:
-    """Return a statistic with the 5 and 95 % quantiles over cases drawn with replacement.
+    """Return a statistic with its 5 and 95 % quantiles over cases drawn with replacement (bootstrap).
 
-    `centred` is for a sum of absolute errors, to which drawing adds errors of its own: the quantiles are moved by the
-    difference of their mean from the value, not below 0.
+    `centred` is for a sum of absolute errors, which resampling increases: the quantiles are shifted by the difference
+    between the resampled mean and the value, but not below 0.
 
     Source: B. Efron, R. J. Tibshirani, *An Introduction to the Bootstrap* (1993), chapter 13.
     """
@@ -340,12 +340,12 @@ def resampled(
 
 
 def median_of(values: Sequence[float], rng: np.random.Generator) -> Score:
-    """Return the median of the finite values, with its interval by `resampled`."""
+    """Return the median of the finite values, with its bootstrap interval from `resampled`."""
     return resampled([v for v in values if isfinite(v)], lambda drawn: float(np.median(drawn)), rng)
 
 
 # --------------------
-# Whether probabilities are worth what they say: Brier score, calibration error, calibration curve.
+# Quality of the probabilities: Brier score, calibration error, calibration curve.
 # --------------------
 
 
@@ -355,14 +355,14 @@ N_DRAWS = 500
 
 @dataclass(frozen=True)
 class CalibrationBin:
-    """Answers of nearly the same confidence.
+    """Answers of similar confidence.
 
     Parameters
     ----------
     confidence : float
-        Mean probability of the likeliest cause.
+        Mean probability of the most probable cause.
     accuracy : float
-        Share of those that were right.
+        Share of correct answers.
     n : int
     """
 
@@ -372,7 +372,7 @@ class CalibrationBin:
 
 
 def brier(probabilities: Mapping[str, float], truth: str) -> float:
-    """Return Σ_k (p_k − y_k)² over all causes, 0 (sure and right) to 2 (sure and wrong).
+    """Return Σ_k (p_k − y_k)² over all causes, 0 (certain and right) to 2 (certain and wrong).
 
     Source: G. W. Brier, *Verification of forecasts expressed in terms of probability* (Monthly Weather Review, 1950).
     """
@@ -381,7 +381,7 @@ def brier(probabilities: Mapping[str, float], truth: str) -> float:
 
 
 def bins_of(confidence: Sequence[float], right: Sequence[bool], n_bins: int = N_BINS) -> list[CalibrationBin]:
-    """Return bins with equally many answers, by rising confidence."""
+    """Return bins with equal numbers of answers, in order of confidence."""
     order = np.argsort(confidence, kind="stable")
     parts = np.array_split(order, min(n_bins, len(order))) if len(order) else []
     c, r = np.asarray(confidence, dtype=np.float64), np.asarray(right, dtype=np.float64)
@@ -391,7 +391,7 @@ def bins_of(confidence: Sequence[float], right: Sequence[bool], n_bins: int = N_
 def calibration_error(confidence: Sequence[float], right: Sequence[bool], n_bins: int = N_BINS) -> float:
     """Return Σ_b (n_b/n) |accuracy_b − confidence_b| over bins of equal mass.
 
-    It is above 0 by chance even if every probability is true: see `error_by_chance`.
+    It exceeds 0 by chance even if every probability is correct: see `error_by_chance`.
 
     Source: M. P. Naeini, G. F. Cooper, M. Hauskrecht, *Obtaining well calibrated probabilities using Bayesian binning*
     (AAAI, 2015), with bins of equal mass.
@@ -402,7 +402,7 @@ def calibration_error(confidence: Sequence[float], right: Sequence[bool], n_bins
 
 
 def error_by_chance(confidence: Sequence[float], rng: np.random.Generator) -> float:
-    """Return the calibration error that true probabilities would show with so many answers, on average."""
+    """Return the expected calibration error of correct probabilities for this number of answers."""
     if not len(confidence):
         return float("nan")
     values: FloatArray = np.asarray(confidence, dtype=np.float64)
@@ -421,16 +421,16 @@ class Figure:
     Parameters
     ----------
     key : str
-        In scores.json.
+        Key in scores.json.
     title : str
     measure : callable
         (rows, rng) → Score.
     is_share : bool
-        Shown in per cent; False: as a number.
+        True: shown in per cent; False: as a number.
     targets : (float, float) or None
-        Without and with reference, for strong faults.
+        Targets without and with reference, for strong faults.
     is_least : bool
-        Whether the target is the least (True) or the most that is allowed.
+        Whether the target is a minimum (True) or a maximum.
     """
 
     key: str
@@ -442,7 +442,7 @@ class Figure:
 
 
 def counted(of: Callable[[Row], bool], hit: Callable[[Row], object]) -> Measure:
-    """Return the measure that counts hits among the rows it applies to."""
+    """Return a measure: the share of hits among the rows selected by `of`."""
 
     def measure(rows: Rows, rng: np.random.Generator) -> Score:  # noqa: ARG001 - all measures have one form
         applicable = [row for row in rows if of(row)]
@@ -459,7 +459,7 @@ def _resampled(of: Callable[[Row], bool], statistic: Callable[[Rows], float], *,
 
 
 def mean_of(value: Callable[[Row], float]) -> Measure:
-    """Return the mean over the rows that have the value."""
+    """Return a measure: the mean over the rows that have a finite value."""
 
     def measure(rows: Rows, rng: np.random.Generator) -> Score:
         values = [x for row in rows if isfinite(x := value(row))]
@@ -473,21 +473,21 @@ def _median(value: Callable[[Row], float]) -> Measure:
 
 
 def _of_place(part: str) -> Measure:
-    """Return the share of faults whose place of this kind was found."""
+    """Return a measure: the share of faults whose location of this kind was found."""
     at = attrgetter(f"located.{part}")
     return counted(lambda r: r.is_mechanical and at(r) is not None, at)
 
 
 def is_one_answer(row: Row) -> bool:
-    """Whether exactly one cause is right, so that a probability can be judged."""
+    """Return whether exactly one cause is correct, so that a probability can be judged."""
     return row.kind != "pair" and bool(row.ranked)
 
 
 def macro_f1(rows: Rows) -> float:
-    """Return the mean over the mechanical effects of 2 TP/(2 TP + FP + FN), of the likeliest causes.
+    """Return the mean over the mechanical effects of 2 TP/(2 TP + FP + FN), based on the most probable causes.
 
-    Healthy, unknown and chain cases count as what they are: an effect named there is a false positive. Effects without
-    a case are left out.
+    An effect named for a healthy, unknown or measurement-chain case is a false positive. Effects without a case are
+    left out.
     """
     true = Counter(name for row in rows for name in row.truths)
     answered = Counter(row.first for row in rows)
@@ -497,24 +497,24 @@ def macro_f1(rows: Rows) -> float:
 
 
 def confidence_of(rows: Rows) -> tuple[list[float], list[bool]]:
-    """Return the probability of each likeliest cause, and whether it was right."""
+    """Return the probability of each most probable cause, and whether it was right."""
     return [row.confidence for row in rows], [row.is_right for row in rows]
 
 
 def ece(rows: Rows) -> float:
-    """Return the calibration error of the likeliest causes."""
+    """Return the calibration error of the most probable causes."""
     return calibration_error(*confidence_of(rows))
 
 
 def brier_of(row: Row) -> float:
-    """Return the Brier score of a case with one right answer; nan for the others."""
+    """Return the Brier score of a case with one correct answer; nan for the others."""
     if not is_one_answer(row):
         return float("nan")
     return brier({c.name: c.probability for c in row.answer.causes}, row.truths[0])
 
 
 def shrink_of(row: Row, name: str) -> float:
-    """Return the held-out shrink of a cause; nan where it was not tried."""
+    """Return the held-out shrink of a cause; nan if it was not tried."""
     shrinkage = row.answer.shrinkage(name)
     return float("nan") if shrinkage is None else shrinkage.shrink.value
 
@@ -532,9 +532,9 @@ def _shrink_named(row: Row) -> float:
 
 
 def _closed_beyond_wrong(row: Row) -> float:
-    """Return the share of the gap that the true effect closes, less the best wrong one's, on all tried features.
+    """Return the share of the gap that the true effect closes minus that of the best wrong one, on all tried features.
 
-    nan where the true effect, or no other one, was tried.
+    nan if the true effect was not tried, or no other one.
     """
     shares = {
         cause.name: cause.shrinkage.of_all
@@ -556,12 +556,12 @@ def _slope(row: Row) -> float:
 
 
 def _regret(row: Row) -> float:
-    """Return by how much the named effect shrinks the gap less than the true one; 0 where it does no worse."""
+    """Return by how much the named effect shrinks the gap less than the true one; 0 if it does as well or better."""
     return float(np.maximum(0.0, _shrink_true(row) - _shrink_named(row)))  # nan stays nan
 
 
 def is_kind(kind: str) -> Callable[[Row], bool]:
-    """Return the test whether a case is of this kind."""
+    """Return a predicate that selects cases of this kind."""
     return lambda row: row.kind == kind
 
 
@@ -590,10 +590,10 @@ FIGURES: tuple[Figure, ...] = (
     ),
     Figure(
         "top_1_of_16",
-        "likeliest right if only the 16 could be",
+        "likeliest right if only the 16 were possible",
         counted(_is_mechanical, lambda r: r.first_mechanical in r.truths),
     ),
-    Figure("named", "mechanical effect there: one is named", counted(_is_mechanical, _is_named)),
+    Figure("named", "mechanical effect present: one is named", counted(_is_mechanical, _is_named)),
     Figure(
         "macro_f1", "macro-F1 of the 16 (no pairs)", _resampled(lambda r: r.kind != "pair", macro_f1), is_share=False
     ),
@@ -606,7 +606,7 @@ FIGURES: tuple[Figure, ...] = (
     ),
     Figure(
         "named_on_unknown",
-        "unknown: an effect is named all the same",
+        "unknown: an effect is named",
         counted(is_kind("unknown"), _is_named),
         targets=(0.20, 0.15),
         is_least=False,
@@ -614,7 +614,7 @@ FIGURES: tuple[Figure, ...] = (
     Figure("unknown_recognised", "unknown: recognised", counted(is_kind("unknown"), says_unknown)),
     Figure("named_on_chain", "measurement chain only: a mechanical effect is named", counted(_is_nuisance, _is_named)),
     Figure("chain_right", "measurement chain only: likeliest cause right", counted(_is_nuisance, is_right)),
-    Figure("pair_top_1", "two effects: likeliest is one of them", counted(is_kind("pair"), is_right)),
+    Figure("pair_top_1", "two effects: the likeliest is one of them", counted(is_kind("pair"), is_right)),
     Figure(
         "pair_top_2",
         "two effects: both are the two likeliest",
@@ -652,28 +652,28 @@ FIGURES: tuple[Figure, ...] = (
     Figure("regret", "regret of shrink, mean", mean_of(_regret), is_share=False, targets=(0.08, 0.05), is_least=False),
     Figure(
         "closed",
-        "share closed on all tried features, held out: true less best wrong effect, median",
+        "held-out share closed on all tried features: true minus best wrong effect, median",
         _median(_closed_beyond_wrong),
         is_share=False,
         targets=(0.20, 0.20),
     ),
     Figure("slope", "observed over predicted change, median", _median(_slope), is_share=False),
-    Figure("answered", "answered at all", counted(lambda _: True, lambda r: r.answer.outcome)),
+    Figure("answered", "answered", counted(lambda _: True, lambda r: r.answer.outcome)),
 )
 
 
 def scores(rows: Rows, seed: int, figures: Sequence[Figure] = FIGURES) -> dict[str, Score]:
-    """Return every figure of these rows; nothing where no row applies."""
+    """Return every figure of these rows, without those to which no row applies."""
     return {f.key: f.measure(rows, np.random.default_rng(seed)) if rows else NO_SCORE for f in figures}
 
 
 def strong_only(rows: Rows, min_strength: float) -> list[Row]:
-    """Return the cases whose fault is this strong, and those without one."""
+    """Return the cases whose fault has at least this strength, and those without a fault."""
     return [row for row in rows if row.kind == "none" or row.strength >= min_strength]
 
 
 def judgement(score: Score, target: float, *, is_least: bool) -> str:
-    """Return "met", "missed", or "open" where the interval holds the target; empty without cases."""
+    """Return "met", "missed", or "open" if the interval contains the target; empty if there are no cases."""
     if not score.n:
         return ""
     if score.low < target < score.high:
@@ -682,7 +682,7 @@ def judgement(score: Score, target: float, *, is_least: bool) -> str:
 
 
 # --------------------
-# The parts of the cases that are scored one by one, and the whole result.
+# The parts of the cases, each scored separately, and the whole result.
 # --------------------
 
 
@@ -694,7 +694,7 @@ PARTS: dict[str, Callable[[Row], bool]] = {
     "one condition": lambda row: row.n_conditions == 1,
     "two conditions": lambda row: row.n_conditions == 2,
 }
-"""Name → whether a case belongs to it."""
+"""Name → predicate that selects the cases of the part."""
 
 
 @dataclass(frozen=True)
@@ -707,7 +707,7 @@ class Part:
     strong : bool
         Whether faults below `STRONG` are left out.
     n : int
-        Cases.
+        Number of cases.
     scores : mapping of str to Score
     """
 
@@ -730,7 +730,7 @@ class BenchmarkResult:
         Diagnoser → its rows.
     parts : tuple of Part
     chance_error : float
-        Calibration error that true probabilities would show with so many cases.
+        Expected calibration error of correct probabilities for this number of cases.
     figures : tuple of Figure
     """
 
@@ -742,16 +742,16 @@ class BenchmarkResult:
 
     @property
     def judged(self) -> str:
-        """The diagnoser under judgement."""
+        """The diagnoser that is judged."""
         return self.request.diagnosers[0]
 
     @property
     def strengths_known(self) -> bool:
-        """Whether faults have a strength in floors; if not, figures are of all faults."""
+        """Whether fault strengths in floors are known; if not, figures cover all faults."""
         return any(isfinite(row.strength) for row in self.rows[self.judged])
 
     def part(self, name: str, *, diagnoser: str = "", source: str = BLIND, strong: bool | None = None) -> Part:
-        """Return a part; `strong` None: strong faults only, where strength is known."""
+        """Return a part; `strong` None: only strong faults, if strength is known."""
         strong_only_part = self.strengths_known if strong is None else strong
         chosen_diagnoser = diagnoser or self.judged
         return next(
@@ -762,7 +762,7 @@ class BenchmarkResult:
 
 
 def judge(request: BenchmarkRequest, cases: Sequence[Done]) -> BenchmarkResult:
-    """Score all answers."""
+    """Score all answers of a benchmark."""
     floors = known_floors()
     rows = {name: rows_of(cases, name, floors) for name in request.diagnosers}
     first = rows[request.diagnosers[0]]
@@ -779,7 +779,7 @@ def score_parts(
     figures: Sequence[Figure],
     strengths: Sequence[bool],
 ) -> tuple[Part, ...]:
-    """Return the figures of every part of the cases, by diagnoser and source, of strong faults only and of all."""
+    """Return the figures of every part by diagnoser and source, for strong faults only and for all faults."""
     scored = []
     for name, of_all in rows.items():
         for source in (BLIND, SAME) if request.plan.same_simulator else (BLIND,):

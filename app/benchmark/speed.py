@@ -1,8 +1,8 @@
-"""How long methods take, beside what a user would take instead, in one run: growth, agreement, distance to a limit.
+"""Run times of methods and of their usual alternatives, in one run: growth, agreement, distance to a limit.
 
-All runs of one case are interleaved, on one thread, and the best of them counts, in the process's own processor time:
-other work on the machine then counts less. A limit is what no method of its kind can do without, measured in the same
-rounds: moving its samples through memory, or the Fourier transforms that define it.
+All runs of one case are interleaved on one thread, and the shortest counts, in processor time of the process, which
+reduces the influence of other work on the machine. A limit is the work that no method of its kind can avoid, measured
+in the same rounds: moving its samples through memory, or the Fourier transforms that define it.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ Run = Callable[[], Any]
 RATE_HZ = 25_600.0
 N_LINES = 64
 SHORTEST_RUNS_S = 1.0
-"""So long is each case repeated, and at least three times."""
+"""Minimum total time for which each case is repeated; there are at least three runs."""
 
 
 @dataclass(frozen=True)
@@ -40,14 +40,14 @@ class TimedCase:
     Parameters
     ----------
     run : callable
-        gearsig's.
+        The method of gearsig.
     rivals : mapping of str to callable
-        What a user would take instead, by name; the package is its first word.
+        Alternatives by name; the first word is the package.
     limit : callable
-        Does what the method cannot do without, and nothing else.
+        Does only the work that the method cannot avoid.
     alike : callable
-        Takes gearsig's result and another's, and returns the arrays that should be the same; None: there are none, as
-        the two are different estimates of one thing.
+        Takes the results of gearsig and of an alternative, and returns the arrays that should be equal; None: there are
+        none, because the two are different estimates of the same quantity.
     """
 
     run: Run
@@ -68,18 +68,19 @@ class TimedMethod:
 
 @dataclass
 class Timing:
-    """What one program took for one method.
+    """Run times of one program for one method.
 
     Parameters
     ----------
     name : str
-        "gearsig", or what was taken instead.
+        "gearsig" or the alternative.
     seconds : dict of int to float
-        By length.
+        Processor time by signal length.
     difference : float
-        Of its result from gearsig's at the greatest length, root mean square over that of gearsig's; nan of gearsig.
+        RMS difference from gearsig's result at the greatest length, relative to the rms of that result; nan for
+        gearsig itself.
     reason : str
-        Why there are no seconds.
+        Why there are no times.
     """
 
     name: str
@@ -89,7 +90,7 @@ class Timing:
 
     @property
     def exponent(self) -> float:
-        """Slope of log time over log length; nan of one length."""
+        """Slope of log time over log length; nan for a single length."""
         if len(self.seconds) < 2:
             return float("nan")
         return float(np.polyfit(np.log(list(self.seconds)), np.log(list(self.seconds.values())), 1)[0])
@@ -97,7 +98,7 @@ class Timing:
 
 @dataclass(frozen=True)
 class TimedMethodResult:
-    """All timings of a method; gearsig's first, the limit's last."""
+    """All timings of a method: gearsig first, the limit last."""
 
     method: TimedMethod
     timings: tuple[Timing, ...]
@@ -114,7 +115,7 @@ def measure(
     longest_s : float
         A program that takes longer than this for one run is not given a longer signal.
     on_progress : callable or None
-        Takes the number of methods that are done.
+        Takes the number of completed methods.
     """
     from numba import get_num_threads, set_num_threads
     from threadpoolctl import threadpool_limits
@@ -151,7 +152,7 @@ def _timed(method: TimedMethod, longest_s: float) -> tuple[Timing, ...]:
 
 
 def _best(runs: Mapping[str, Run]) -> dict[str, tuple[float, Any]]:
-    """Return the least processor time of each, and its first result; the first run of each compiles and plans."""
+    """Return the minimum processor time of each and its first result; the first run of each compiles and plans."""
     first = {}
     for name, run in runs.items():
         start = time.process_time()
@@ -171,9 +172,9 @@ def _best(runs: Mapping[str, Run]) -> dict[str, tuple[float, Any]]:
 
 
 def _difference(ours: Any, theirs: Any) -> float:
-    """Return the rms difference in the middle of two results over the rms, after the best common factor.
+    """Return the relative rms difference of the middle parts of two results, after scaling by the best common factor.
 
-    Programs scale differently and take for granted different things beyond the ends.
+    Programs scale differently and make different assumptions beyond the ends.
     """
     a, b = np.asarray(ours), np.asarray(theirs)
     n = min(a.shape[-1], b.shape[-1])
@@ -197,7 +198,7 @@ def trial_signal(n: int) -> FloatArray:
 
 
 def _copies(n_values: float, kind: type = np.float64) -> Run:
-    """Return a run that reads and writes so many values, in pieces that no cache holds at once where they are many."""
+    """Return a run that reads and writes `n_values` values; many values are moved in pieces larger than any cache."""
     source: NDArray[Any] = np.ones(max(1, int(min(n_values, 2**22))), dtype=kind)
     target, times = np.empty_like(source), max(1, round(n_values / len(source)))
 
@@ -282,7 +283,7 @@ def _stft(n: int) -> TimedCase:
     blocks = np.lib.stride_tricks.sliding_window_view(x, n_window)[::step]
 
     def alike(ours: Any, theirs: NDArray[np.complex128]) -> tuple[Any, Any]:
-        # Moduli: each counts its phase from elsewhere. Both have frames at whole steps.
+        # Moduli, because the phase references differ. Both have frames at whole steps.
         return np.abs(ours.values), np.abs(theirs)[:, -transform.p_min :]
 
     return TimedCase(
@@ -327,7 +328,7 @@ def _morlet(n: int) -> TimedCase:
 
 
 def _moduli(ours: Any, theirs: Any) -> tuple[Any, Any]:
-    """Return the moduli of two transforms; of the other one each line with the mean of ours, as each scales them."""
+    """Return the moduli of two transforms, each line of the other scaled to our mean because the scalings differ."""
     a, b = np.abs(ours), np.abs(theirs)
     return a, b * (a.mean(axis=1) / b.mean(axis=1))[:, None]
 
@@ -456,7 +457,7 @@ def _vold_kalman(n: int) -> TimedCase:
 
 
 def _motion(n: int) -> TimedCase:
-    """N steps of the cracked pair; DOP853 solves the same compiled equations to the same error."""
+    """Time n steps of the cracked pair; DOP853 solves the same compiled equations to the same error."""
     from scipy.integrate import solve_ivp
 
     from sims.cracked import default_step_s, prepare, respond
@@ -470,7 +471,7 @@ def _motion(n: int) -> TimedCase:
     surface, first, rate = ready.roughness.surface, float(ready.q[0]), np.empty(32)
     rough = (surface.amplitudes_m, 2 * pi * ready.roughness.frequencies_hz, ready.roughness.phases_rad)
     state, times = np.concatenate((ready.q, ready.v)), np.arange(n // stride) * stride * step_s
-    # Displacements are of 1e-5 m where angles are of 1 rad: each coordinate has its own absolute tolerance.
+    # Displacements are of the order of 1e-5 m, angles 1 rad: each coordinate has its own absolute tolerance.
     scale = np.r_[np.ones(4), np.full(12, 1e-5), np.full(4, 50.0), np.full(12, 1e-2)]
 
     def fixed(refined: int = 1) -> FloatArray:
@@ -530,7 +531,7 @@ METHODS = (
     TimedMethod("Vold–Kalman, one order", [2**14, 2**16, 2**18, 2**20], _vold_kalman, MEMORY),
     TimedMethod("cracked pair, steps", [2**13, 2**15, 2**17], _motion, "four evaluations of the equations a step"),
 )
-"""A rotor of ROSS has no teeth in contact: nothing here computes what it does."""
+"""ROSS is not compared: its rotors have no teeth in contact, so no method here computes the same thing."""
 
 
 # --------------------
@@ -539,7 +540,7 @@ METHODS = (
 
 
 def rows(results: Sequence[TimedMethodResult]) -> Iterator[dict[str, str | float | int]]:
-    """Yield a row for each program beside gearsig, at the greatest length that both did."""
+    """Yield a row for each alternative, at the greatest length that it and gearsig completed."""
     for result in results:
         gearsig, *alternatives, limit = result.timings
         for alternative in alternatives:
@@ -581,7 +582,7 @@ def table(results: Sequence[TimedMethodResult], date: datetime | None = None) ->
 
 
 def machine() -> str:
-    """Return processor, number of cores, system and Python in words."""
+    """Return processor, number of cores, system and Python version as text."""
     name = platform.processor() or platform.machine()
     try:
         with open("/proc/cpuinfo", encoding="utf-8") as file:  # noqa: PTH123 - no file of ours
@@ -592,7 +593,7 @@ def machine() -> str:
 
 
 def programs() -> str:
-    """Return the versions of what is compared, where it is installed."""
+    """Return the versions of the compared packages that are installed."""
     versions = []
     for name in ("numpy", "scipy", "numba", "PyWavelets", "ssqueezepy", "vmdpy", "pyfcwt", "PySDKit"):
         try:

@@ -1,4 +1,4 @@
-"""`gearsig benchmark gap --model forging`: blind start–stop cases from an independent drive, and how answers score."""
+"""`gearsig benchmark gap --model forging`: blind start–stop cases from an independent drive, and their scores."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ SHARES = {"none": 0.3, "single": 0.55, "unknown": 0.15}
 
 
 def planned(n_cases: int, seed: int) -> list[tuple[str, str, float]]:
-    """Return kind, effect and level of each case: effects in turn, levels drawn."""
+    """Return kind, effect and level of each case: effects in turn, random levels."""
     rng = np.random.default_rng([seed, 0])
     cases: list[tuple[str, str, float]] = []
     effects = {"none": ("",), "single": tuple(CATALOGUE), "unknown": tuple(OUTSIDE)}
@@ -58,12 +58,12 @@ def planned(n_cases: int, seed: int) -> list[tuple[str, str, float]]:
 
 @dataclass(frozen=True)
 class DrivePlan(Plan):
-    """What decides the cases of drives: as many, the seed, the role and the references of a `Plan`."""
+    """Plan of the drive cases, by number, seed, role and references as in `Plan`."""
 
     n_cases: int = 140
 
     def definition(self) -> dict[str, Any]:
-        """What decides the cases, as plain values."""
+        """Return the values that determine the cases."""
         return {"model": "forging", **super().definition()}
 
     def cases(self) -> list[PlannedCase]:
@@ -75,7 +75,7 @@ class DrivePlan(Plan):
         return cases
 
     def make(self, planned: PlannedCase, folder: Path | None) -> Truth:
-        """Make a case; write what may be seen into `folder` (None: nowhere); return the truth."""
+        """Make a case; write its visible part into `folder` (None: nowhere); return the truth."""
         fault = planned.kind, planned.effect or "", planned.level
         case = drawn_case(self.role, self.seed, planned.number, fault, with_reference=planned.with_reference)
         if folder is not None:
@@ -91,7 +91,7 @@ class DrivePlan(Plan):
 
 
 def _labels(case: DriveCase) -> dict[str, Any]:
-    """Return the label, laid out like those of the blind gear pairs."""
+    """Return the label in the layout used for the blind gear pairs."""
     label = label_of(case)
     effect = {"name": label["effect"], **{key: label[key] for key in ("severity", "unit", "level", "place")}}
     return {
@@ -106,7 +106,7 @@ def _labels(case: DriveCase) -> dict[str, Any]:
 
 
 def drawn_case(role: str, seed: int, number: int, fault: tuple[str, str, float], *, with_reference: bool) -> DriveCase:
-    """Return a case of a plan: kind, effect and level as asked, all else from the seed and the case's number."""
+    """Return a case with the given kind, effect and level; the rest follows from the seed and the case number."""
     kind, effect, level = fault
     rng = np.random.default_rng([seed, 1, number])
     return draw_case(rng, role, kind=kind, effect=effect, level=level, with_reference=with_reference)
@@ -122,17 +122,17 @@ def labelled_recordings(
 
 
 def needs_reference(effect: str) -> bool:
-    """Whether an effect shows against a healthy reference only: no drawing says what is usual."""
+    """Return whether an effect shows only against a healthy reference, because no drawing states the normal value."""
     return bool(effect) and (CATALOGUE | OUTSIDE)[effect].needs_reference
 
 
 # --------------------
-# Scores: how often right, what is said of healthy and of unknown cases, how far gaps shrink.
+# Scores: share of right answers, answers to healthy and unknown cases, shrinkage of the gap.
 # --------------------
 
 
 STRONG_LEVEL = 0.5
-"""Level from which on an effect is in the upper half of its span."""
+"""Level from which an effect is in the upper half of its span."""
 PARTS = {name: ALL_PARTS[name] for name in ("all", WITH, WITHOUT)}
 
 
@@ -143,7 +143,7 @@ def judge_drives(request: BenchmarkRequest, cases: Sequence[Done]) -> BenchmarkR
 
 
 def drive_row(done: Done) -> Row:
-    """Return a case with its answer as the scores count it; tooth or order are placed right if the setting says so."""
+    """Return the row of a case for the scores; tooth and order count as right if the fitted setting states them."""
 
     def located(place: Mapping[str, Any], effect: str, answer: Answer) -> Located:
         return Located(**{key: answer.options(effect).get(key) == at for key, at in place.items()})
@@ -152,12 +152,12 @@ def drive_row(done: Done) -> Row:
 
 
 def effects_ranked(row: Row) -> list[str]:
-    """Return the effects by probability."""
+    """Return the effects by decreasing probability."""
     return [name for name in row.ranked if name not in (NONE, UNKNOWN)]
 
 
 def effects_named(row: Row) -> list[str]:
-    """Return what the answer names: one effect, or all those that it cannot tell apart."""
+    """Return the effects that the answer names: one, or several that it cannot distinguish."""
     if row.answer.outcome == GapOutcome.CANNOT_SEPARATE.value:
         return list(row.answer.inseparable)
     return effects_ranked(row)[:1] if _names_effect(row) else []
@@ -175,7 +175,7 @@ _is_single = is_kind("single")
 
 
 def _shrinkages(rows: Rows) -> list[Shrinkage]:
-    """Return the shrinkages by the true effects."""
+    """Return the shrinkage of the gap by the true effect, for each case that has one."""
     shrinkages = [row.answer.shrinkage(row.truths[0]) for row in rows if _is_single(row)]
     return [shrinkage for shrinkage in shrinkages if shrinkage is not None]
 
@@ -190,7 +190,7 @@ def _medians(values: Callable[[Rows], list[float]]) -> Measure:
 
 
 def _plain(statistic: Callable[[Rows], float], of: Callable[[Row], bool] = lambda row: bool(row.ranked)) -> Measure:
-    """Return a statistic of the answered cases without an interval."""
+    """Return a measure: a statistic of the answered cases, without an interval."""
 
     def measure(rows: Rows, rng: np.random.Generator) -> Score:  # noqa: ARG001 - all measures have one form
         chosen = [row for row in rows if of(row)]
@@ -201,21 +201,21 @@ def _plain(statistic: Callable[[Rows], float], of: Callable[[Row], bool] = lambd
 
 FIGURES = (
     Figure("top_1", "likeliest effect right", counted(_is_single, _is_right)),
-    Figure("top_2", "among the first two", counted(_is_single, lambda r: r.truths[0] in effects_ranked(r)[:2])),
+    Figure("top_2", "among the two likeliest", counted(_is_single, lambda r: r.truths[0] in effects_ranked(r)[:2])),
     Figure(
         "top_1_strong",
         "likeliest effect right, upper half of the span",
         counted(lambda r: _is_single(r) and r.level >= STRONG_LEVEL, _is_right),
     ),
-    Figure("named_right", "named, and right", counted(_is_single, lambda r: r.truths[0] in effects_named(r))),
+    Figure("named_right", "named and right", counted(_is_single, lambda r: r.truths[0] in effects_named(r))),
     Figure(
         "named_wrong",
-        "named, and wrong",
+        "named but wrong",
         counted(_is_single, lambda r: _names_effect(r) and r.truths[0] not in effects_named(r)),
     ),
     Figure(
         "place",
-        "tooth or order right, of effects that were",
+        "tooth or order right, if the effect is right",
         counted(
             lambda r: _is_single(r) and r.located != Located() and _is_right(r),
             lambda r: r.located.tooth or r.located.order,
@@ -261,7 +261,7 @@ FIGURES = (
 
 
 def write_drive_results(result: BenchmarkResult, cases: Sequence[Done], folder: Path, command: str) -> Path:
-    """Write table, scores, cases and labels beside the answers, each whole or not at all; return the table's path."""
+    """Write table, scores, cases and labels next to the answers, each atomically; return the path of the table."""
     from app.benchmark.results import TABLE, figures_table, titled_table, write_files
     from gearsig.report import Section
 
@@ -273,7 +273,7 @@ def write_drive_results(result: BenchmarkResult, cases: Sequence[Done], folder: 
 
 
 def _by_effect(result: BenchmarkResult) -> tuple[str, str, tuple[str, ...], tuple[tuple[str, ...], ...]]:
-    """Return how often the likeliest effect was right for each effect, and what it was taken for."""
+    """Return, for each effect, how often the likeliest effect was right and the most frequent wrong answer."""
     table = []
     for name in CATALOGUE:
         cases = [row for row in result.rows[START_STOP] if row.effects == (name,)]
@@ -281,5 +281,5 @@ def _by_effect(result: BenchmarkResult) -> tuple[str, str, tuple[str, ...], tupl
         wrong = Counter(row.first for row in cases if row.ranked and row.first != name).most_common(1)
         shares = (f"{sum(map(_is_right, some))} of {len(some)}" for some in (cases, strong))
         table.append((name, *shares, f"{wrong[0][0]} ({wrong[0][1]})" if wrong else ""))
-    header = ("effect", "right", "in the upper half of its span", "most often taken for")
+    header = ("effect", "right", "in the upper half of its span", "most often mistaken for")
     return "Effect by effect", "Likeliest effect right.", header, tuple(table)

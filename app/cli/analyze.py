@@ -1,4 +1,4 @@
-"""`gearsig analyze`, `crack`, `report`: what recordings show, in words, numbers and pages; `gearsig rig`: rig files."""
+"""`gearsig analyze`, `crack`, `report`: results of recordings as text, numbers and pages; `gearsig rig`: rig files."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ def analyze(
     reference_fs: options.ReferenceRateOption = None,
     torque: options.TorqueOption = None,
     json: options.JsonOption = False,
-    indicators: Annotated[bool, typer.Option("--indicators", help="Print the table of indicators as well.")] = False,
+    indicators: Annotated[bool, typer.Option("--indicators", help="Also print the table of indicators.")] = False,
     memory: options.MemoryOption = 2.0,
 ) -> None:
-    """Say what a recording shows of the machine's condition, most important first.
+    """Report what a recording shows about the machine's condition, most important first.
 
-    Every finding comes with its place (gear, shaft, order, angle), its strength against a floor, how sure it is, and
-    what would make it surer. Where the recording does not allow an answer, it says so and why. With --reference, cracks
-    of a millimetre show, and every indicator is compared.
+    Each finding states its location (gear, shaft, order, angle), its strength relative to a noise floor, its certainty,
+    and what would increase the certainty. If the recording does not allow an answer, the report says why. With
+    --reference, cracks of a millimetre become visible and every indicator is compared.
 
     Example: gearsig analyze gearbox.csv --rig gearbox.toml
     """
@@ -77,7 +77,7 @@ def crack(
     torque: options.TorqueOption = None,
     tip_relief: Annotated[
         str | None,
-        typer.Option("--tip-relief", help="Metal taken off at the tips, e.g. 15um, where the drawing says it: surer."),
+        typer.Option("--tip-relief", help="Tip relief, e.g. 15um, if the drawing states it; improves the estimate."),
     ] = None,
     channel: options.ChannelsOption = None,
     fs: options.SamplingRateOption = None,
@@ -87,10 +87,10 @@ def crack(
 ) -> None:
     """Estimate the depth of a crack in a tooth root, in mm and % of the root, with a 90 % interval.
 
-    It says "no crack seen, below … mm" where none stands out and one through half of the root would have; it refuses
-    machines that its calibration (by simulation) does not reach. With --reference it is much surer, and cracks of a
-    millimetre show. It also says whether the tooth may be chipped or spalled instead. With --channel it looks at some
-    of the accelerations only, e.g. without a dead one.
+    It reports "no crack seen, below … mm" if none stands out and one through half of the root would have; it refuses
+    machines outside its calibration (by simulation). With --reference it is much more certain, and cracks of a
+    millimetre become visible. It also says whether the tooth may be chipped or spalled instead. With --channel it uses
+    only some of the accelerations, e.g. to leave out a dead one.
 
     Example: gearsig crack sample_data/root_crack_3mm.h5 --reference sample_data/root_crack_0mm.h5
     """
@@ -113,7 +113,7 @@ def crack(
 def demo(
     output: Annotated[Path, options.output_option("Folder for the pages.")] = Path("demo-report"),
 ) -> None:
-    """Diagnose the sample recordings, write their report, and say where to look."""
+    """Diagnose the sample recordings, write a report of them, and say where it is."""
     from app.samples import samples
     from gearsig.diagnosis import analyze
     from gearsig.report import analysis_text
@@ -125,8 +125,8 @@ def demo(
     typer.echo(f"$ gearsig analyze {first.recording}\n")
     typer.echo(analysis_text(analyze(options.open_recording(first.recording, options.open_rig(first.rig), None))))
     typer.echo(
-        f"\nThe same for all {len(chosen)} samples (they are simulated; {first.recording.parent} says how), "
-        "beside their healthy machine where there is one:"
+        f"\nThe same for all {len(chosen)} samples (simulated, as {first.recording.parent} describes), "
+        "each compared with its healthy machine where there is one:"
     )
     healthy = {s.recording: s.reference for s in chosen if s.reference is not None}
     recordings = [sample.recording for sample in chosen]
@@ -134,7 +134,7 @@ def demo(
     typer.echo("Next: `gearsig rig example` for a rig file of your own, `gearsig dashboard` to explore.")
 
 
-# `gearsig rig`: check a rig file, print one to start from, list the bearings that are known by name.
+# `gearsig rig`: check a rig file, print one to start from, list the bearings known by name.
 
 rig_app = typer.Typer(
     name="rig", no_args_is_help=True, help="Check a rig file, which describes the machine, or print one to start from."
@@ -157,7 +157,7 @@ def example() -> None:
 
 @rig_app.command()
 def bearings(names: Annotated[list[str] | None, typer.Argument(help="E.g. 6205-2RS; default: all.")] = None) -> None:
-    """List bearings that a rig file may call by name, with their orders and the source of their geometry."""
+    """List the bearings that a rig file may name, with their orders and the source of their geometry."""
     from gearsig.rig import Bearing, bearing_catalogue, catalogue_bearing
 
     typer.echo(f"{'bearing':<16} {'n':>3} {'ball mm':>8} {'pitch mm':>8}  BPFO    BPFI    BSF     FTF     source")
@@ -175,9 +175,7 @@ def bearings(names: Annotated[list[str] | None, typer.Argument(help="E.g. 6205-2
 
 
 def report(
-    files: Annotated[
-        list[Path], typer.Argument(help="Recordings, or folders with their sub-folders, or 'FOLDER/*.csv'.")
-    ],
+    files: Annotated[list[Path], typer.Argument(help="Recordings, folders (including sub-folders) or 'FOLDER/*.csv'.")],
     output: Annotated[Path, options.output_option("Folder for the pages.")],
     rig: options.RigOption = None,
     fs: options.SamplingRateOption = None,
@@ -193,24 +191,24 @@ def report(
             "--with",
             metavar="METHOD",
             help="Further methods on the pages, e.g. order-map or modes+squeezed-cwt; see gearsig show --list. "
-            "Repeatable. Default: those that each recording calls for; none: none.",
+            "Repeatable. Default: those that suit each recording; none: no further methods.",
         ),
     ] = None,
     jobs: options.JobsOption = None,
     cluster: options.ClusterOption = "",
     memory: options.MemoryOption = 2.0,
-    pdf: Annotated[bool, typer.Option("--pdf", help="Write each page and the index as PDF as well.")] = False,
+    pdf: Annotated[bool, typer.Option("--pdf", help="Also write each page and the index as PDF.")] = False,
 ) -> None:
     """Write one self-contained HTML page per recording, and an index page that compares them.
 
-    A file that cannot be analysed does not stop the others: the index lists it with its reason, and the exit code is 1
-    (2 if none could be). With --reference, all recordings are compared with that one. It can be stopped at any
-    time: the same command goes on from the pages that are there.
+    A file that cannot be analysed does not stop the others: the index lists it with the reason, and the exit code is 1
+    (2 if no file could be analysed). With --reference, all recordings are compared with that one. It can be stopped at
+    any time: the same command continues from the existing pages.
 
     Example: gearsig report monday.csv tuesday.csv --rig gearbox.toml -o report
     """
     if tach_times is not None and (len(files) > 1 or files[0].is_dir()):
-        raise InputError("--tach-times belong to one recording, and there are more", remedy="make a report for each")
+        raise InputError("--tach-times belongs to one recording, but several are given", remedy="report each by itself")
     speed = options.stated_speed(speed_rpm, tach_times, pulses_per_revolution)
     failed = make_report(
         files,
@@ -235,7 +233,7 @@ def report(
 def make_report(
     files: list[Path], output: Path, rig: Path | None = None, jobs: int | None = None, cluster: str = "", **how: Any
 ) -> int:
-    """Write the pages with their progress, by what else `report_many` takes; return the exit code."""
+    """Write the pages and show the progress; `how` goes to `report_many`; return the exit code."""
     from gearsig.batch import report_many
 
     before, so_far = output.exists(), "0"
@@ -264,7 +262,7 @@ def make_report(
         typer.echo(f"{entry.name}: {entry.verdict}")
     for failure in result.failures:
         typer.echo(f"{failure.name}: not analysed: {failure.reason}", err=True)
-    kept = f"{result.n_found} of {len(result.entries)} pages were there already. " if result.n_found else ""
+    kept = f"{result.n_found} of {len(result.entries)} pages existed already. " if result.n_found else ""
     typer.echo(f"{kept}{f'It ran {ran}. ' if ran else ''}Open {result.index_path} in a browser.")
     if not result.failures:
         return 0
@@ -272,10 +270,10 @@ def make_report(
 
 
 def _present_text(output: Path, was_there: bool) -> str:
-    """Say what an interrupted report left; a new folder without pages is taken away."""
+    """Say what an interrupted report left; a new folder without pages is removed."""
     pages = [page for page in output.glob("*.html") if page.name != "index.html"] if output.is_dir() else []
     if pages:
-        return f"pages in {output} are whole, and the same command goes on from there"
+        return f"pages in {output} are complete; the same command continues from there"
     if not was_there:
         (output / "index.html").unlink(missing_ok=True)
     if not was_there and output.is_dir() and not any(output.iterdir()):

@@ -1,6 +1,6 @@
-"""`gearsig benchmark`: how good the gap diagnosis is on cases whose cause it cannot know, and how long methods take.
+"""`gearsig benchmark`: accuracy of the gap diagnosis on blind cases, and run times of methods.
 
-`gearsig papers`: how good the models are, beside what publications say.
+`gearsig papers`: the models compared with publications.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ if TYPE_CHECKING:
     from app.benchmark.run import BenchmarkRequest, Done
 
 benchmark_app = typer.Typer(
-    name="benchmark", no_args_is_help=True, help="Measure how good a diagnosis is, or how quick methods are."
+    name="benchmark", no_args_is_help=True, help="Measure how accurate a diagnosis is, or how fast methods are."
 )
 
 
 @benchmark_app.command("gap")
 def gap(
     output: Annotated[Path, output_option("Folder for the report.")],
-    cases: Annotated[int, typer.Option("--cases", min=1, max=100_000, help="Blind cases.")] = 200,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Decides the cases.")] = 1,
+    cases: Annotated[int, typer.Option("--cases", min=1, max=100_000, help="Number of blind cases.")] = 200,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Determines the cases.")] = 1,
     role: Annotated[
         str, typer.Option("--role", help="evaluation, calibration or development; they share no gear geometry.")
     ] = "evaluation",
@@ -39,7 +39,7 @@ def gap(
     ] = None,
     same_simulator: Annotated[
         bool,
-        typer.Option("--same-simulator", help="Also cases made by the diagnosing simulator, and the drop."),
+        typer.Option("--same-simulator", help="Add cases made by the diagnosing simulator, and report the drop."),
     ] = False,
     diagnosers: Annotated[
         list[str] | None,
@@ -47,26 +47,27 @@ def gap(
             "--diagnoser",
             metavar="NAME",
             help="gap, forest, either with -unseen (nothing learned from the rig that makes the cases), majority, "
-            "rules, or MODULE:FUNCTION, whose code is executed. The first is judged, more stand beside it. Default: "
-            "gap.",
+            "rules, or MODULE:FUNCTION, whose code is executed. The first is judged, the others are listed for "
+            "comparison. Default: gap.",
         ),
     ] = None,
     longest: Annotated[
-        float | None, typer.Option("--longest", metavar="SECONDS", help="Cut recordings to this; default 4 to 8 s.")
+        float | None,
+        typer.Option("--longest", metavar="SECONDS", help="Cut recordings to this length; default 4 to 8 s."),
     ] = None,
     least_level: Annotated[
         float,
-        typer.Option("--least-level", help="0 to 1: the weakest effects, where 1 is strong; default 0: all."),
+        typer.Option("--least-level", help="Minimum strength of the effects, 0 to 1, where 1 is strong; default: all."),
     ] = 0.0,
     model: Annotated[
-        str, typer.Option("--model", help="cracked, or forging: blind starts and stops of an independent drive.")
+        str, typer.Option("--model", help="cracked; or forging: blind starts and stops of an independent drive.")
     ] = "cracked",
-    processes: Annotated[int, typer.Option("--processes", "-j", help="Cases at a time.")] = 2,
+    processes: Annotated[int, typer.Option("--processes", "-j", help="Number of cases run in parallel.")] = 2,
 ) -> None:
-    """Make blind cases, diagnose each in a process that cannot know its cause, score the answers.
+    """Make blind cases, diagnose each in a process that cannot know its cause, and score the answers.
 
-    An independent rig makes the cases: it shares no code with the diagnosing simulator. It can be stopped with Ctrl-C
-    at any time; the same command goes on from the answers it has.
+    The cases come from an independent rig, which shares no code with the diagnosing simulator. It can be stopped with
+    Ctrl-C at any time; the same command continues from the answers it has.
 
     Example: gearsig benchmark gap --cases 200 --same-simulator -o benchmark
     """
@@ -98,18 +99,21 @@ def gap(
 
 @benchmark_app.command("speed")
 def speed(
-    output: Annotated[Path | None, output_option("Folder for speed.md and speed.csv as well.")] = None,
+    output: Annotated[Path | None, output_option("Folder for speed.md and speed.csv, if wanted.")] = None,
     only: Annotated[
-        list[str] | None, typer.Option("--only", metavar="WORD", help="Methods with this in their name; repeatable.")
+        list[str] | None,
+        typer.Option("--only", metavar="WORD", help="Only methods with this word in their name; repeatable."),
     ] = None,
     longest: Annotated[
         float,
-        typer.Option("--longest", metavar="SECONDS", min=0.0, help="A method that takes longer gets no longer signal."),
+        typer.Option(
+            "--longest", metavar="SECONDS", min=0.0, help="A method that takes longer is given no longer signal."
+        ),
     ] = 20.0,
 ) -> None:
-    """Time each method beside what a user would take instead, in one run: growth, agreement, distance to a limit.
+    """Time each method against its usual alternative in one run: growth with length, agreement, distance to a limit.
 
-    PyWavelets, ssqueezepy, vmdpy and SciPy come with gearsig; pyfcwt and PySDKit are timed where they are installed.
+    PyWavelets, ssqueezepy, vmdpy and SciPy come with gearsig; pyfcwt and PySDKit are timed if they are installed.
 
     Example: gearsig benchmark speed --only wavelet
     """
@@ -153,7 +157,7 @@ def _run_drives(cases: int, seed: int, role: str, reference: str, output: Path, 
 
 
 def _run(request: BenchmarkRequest, output: Path, processes: int) -> list[Done]:
-    """Run a benchmark with a progress bar; the answers so far stay after Ctrl-C."""
+    """Run a benchmark with a progress bar; after Ctrl-C the answers so far are kept."""
     from app.benchmark.run import n_answered, run_benchmark
 
     n_cases = len(request.plan.cases())
@@ -164,7 +168,7 @@ def _run(request: BenchmarkRequest, output: Path, processes: int) -> list[Done]:
         raise stopped(f"{n_answered(output)} of {n_cases} cases are answered in {output}") from None
 
 
-# `gearsig papers`: the figures of three publications beside the model's own.
+# `gearsig papers`: the figures of three publications, computed by the models.
 
 
 def _paper_names(incomplete: str) -> list[str]:
@@ -177,9 +181,9 @@ def papers(
     name: Annotated[str, typer.Argument(help="cracked, reduced-fe or forging.", autocompletion=_paper_names)],
     output: Annotated[Path, output_option("Folder for page and figures.")],
 ) -> None:
-    """Draw the figures of a publication that the model can answer, and judge each statement of its text by numbers.
+    """Draw the figures of a publication that the model can reproduce, and check each statement of its text by numbers.
 
-    Every statement comes with "agrees", "agrees in part" or "does not agree, because …". index.html shows all of it.
+    Each statement is given as "agrees", "agrees in part" or "does not agree, because …". index.html shows everything.
 
     Example: gearsig papers cracked -o cracked
     """

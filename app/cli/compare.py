@@ -1,4 +1,4 @@
-"""`gearsig compare`: a simulation beside a recording, without looking for causes."""
+"""`gearsig compare`: comparison of a simulation with a recording, without looking for causes."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
 
 PAGE, DATA, TABLE = "compare.html", "compare.json", "orders.csv"
-"""Files that -o makes."""
+"""Files that -o writes."""
 
 SimulationRigOption = Annotated[
     Path | None,
     typer.Option(
         "--sim-rig",
         metavar="FILE",
-        help="Rig file of the simulation. Default: NAME.toml beside it, else the gears of --rig.",
+        help="Rig file of the simulation. Default: NAME.toml next to it, else the gears of --rig.",
     ),
 ]
 
@@ -40,11 +40,11 @@ def compare(
         typer.Option(
             "--channel",
             metavar="SIM=RECORDED",
-            help="Channels that belong together; repeatable. Default: equal names, or the only one of each.",
+            help="Channels to compare; repeatable. Default: those of equal name, or the only channel of each.",
         ),
     ] = None,
     align: Annotated[
-        str, typer.Option("--align", help="auto, marks or correlation; auto: marks where both records have them.")
+        str, typer.Option("--align", help="auto, marks or correlation; auto: marks if both records have them.")
     ] = "auto",
     fs: options.SamplingRateOption = None,
     speed_rpm: options.SpeedOption = None,
@@ -58,11 +58,11 @@ def compare(
         float | None, typer.Option("--sim-speed-rpm", metavar="RPM", help="Speed of the simulation, like --speed-rpm.")
     ] = None,
 ) -> None:
-    """Compare a simulation with a recording by order, band and angle; every figure with how well it repeats.
+    """Compare a simulation with a recording by order, band and angle, and state the repeatability of each figure.
 
-    Both are sampled over the shafts' angles, so that speed, sampling rate and length may differ. It prints levels of
-    the mesh harmonics and how alike the synchronous averages are; the page adds order spectra, averages tooth by tooth
-    and band levels. It names no cause.
+    Both are resampled over shaft angle, so speed, sampling rate and length may differ. It prints the levels of the mesh
+    harmonics and the similarity of the synchronous averages; the page adds order spectra, averages tooth by tooth and
+    band levels. It names no cause.
 
     Example: gearsig compare model.h5 measured.csv --rig gearbox.toml -o comparison
     """
@@ -96,9 +96,9 @@ def compare(
 def open_simulation(
     path: Path, rig: Path | None, machine: Rig | None, sampling_rate_hz: float | None, speed_rpm: float | None
 ) -> Recording:
-    """Read the simulation with its own rig file; without one its channels are taken as the file has them.
+    """Read the simulation with its own rig file; without one, its channels are used as the file has them.
 
-    The recording's rig then gives the gears only: its sensors' scales and its tachometer belong to the measurement.
+    The recording's rig then supplies only the gears: its sensor scales and tachometer belong to the measurement.
     """
     from gearsig.comparison import SIMULATION_OPTIONS, for_simulation
 
@@ -110,7 +110,7 @@ def open_simulation(
 
 
 def read_pair(text: str, simulated: Recording, recorded: Recording) -> tuple[str, str]:
-    """Return both names of "SIM=RECORDED", or of one name that both records have; names may hold "=" themselves."""
+    """Return the two channels of "SIM=RECORDED", or of one name that both records have; names may contain "="."""
     if text in simulated.channel_names and text in recorded.channel_names:
         return text, text
     parts = text.split("=")
@@ -128,7 +128,7 @@ def read_pair(text: str, simulated: Recording, recorded: Recording) -> tuple[str
 
 
 def write_comparison(comparison: Comparison, folder: Path, command: str) -> None:
-    """Write page, data and table; all are made before the first is written, and each appears when it is complete."""
+    """Write page, data and table: all are built before the first is written, and each appears once it is complete."""
     from gearsig.report import comparison_page, comparison_to_json, orders_csv, write_folder
 
     texts = {

@@ -1,4 +1,4 @@
-"""The terminal of the commands: a progress bar, the command as it was typed, how a command ends."""
+"""Terminal helpers of the commands: progress bar, the command as typed, exit codes."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ EXIT_INTERRUPTED = 130
 
 
 def typed_command() -> str:
-    """Return the command that this process was started with, for the pages that it writes."""
+    """Return the command line of this process, for the pages that it writes."""
     return "gearsig " + shlex.join(sys.argv[1:])
 
 
 @contextmanager
 def progress_bar(stage: str, n: int | None = None) -> Iterator[Callable[..., None]]:
-    """Show a bar on standard error while a command works; where that is no terminal, a line every ten seconds.
+    """Show a progress bar on standard error; if that is no terminal, print a line every ten seconds.
 
     Parameters
     ----------
     stage : str
         What is being done.
     n : int or None
-        Things that are counted, with the time that remains; None: a share from 0 to 1, with the time that has passed.
+        Number of items, shown with the time remaining; None: a fraction from 0 to 1, shown with the time elapsed.
 
     Yields
     ------
     callable
-        Takes what is complete, and, where they change, the stage and what there is in all.
+        Takes the amount completed and, if they change, the stage and the total.
     """
     from rich.console import Console
     from rich.progress import (
@@ -50,7 +50,7 @@ def progress_bar(stage: str, n: int | None = None) -> Iterator[Callable[..., Non
         TimeRemainingColumn,
     )
 
-    text = TextColumn("{task.description}", markup=False)  # names of files are no markup
+    text = TextColumn("{task.description}", markup=False)  # file names are not markup
     share: tuple[ProgressColumn, ...] = (TaskProgressColumn(), TimeElapsedColumn())
     columns = share if n is None else (MofNCompleteColumn(), TimeRemainingColumn())
     console = Console(stderr=True)
@@ -70,7 +70,7 @@ SECONDS_BETWEEN_LINES = 10.0
 
 
 def _progress_lines(stage: str, n: int | None) -> Callable[..., None]:
-    """Return what says how far a long command is, in lines for a log file; quick ones say nothing."""
+    """Return a function that prints the progress as lines for a log file; quick commands print nothing."""
     began_s = printed_s = monotonic()
     now, whole = stage, 1.0 if n is None else float(n)
 
@@ -90,6 +90,6 @@ def _progress_lines(stage: str, n: int | None) -> Callable[..., None]:
 
 
 def stopped(kept: str) -> typer.Exit:
-    """Say what an interrupted command keeps, and that it can go on from there; return what ends the command."""
-    typer.echo(f"gearsig: stopped; {kept}; the same command goes on from there", err=True)
+    """Print what an interrupted command keeps and how to continue it; return the exit to raise."""
+    typer.echo(f"gearsig: stopped; {kept}; the same command continues from there", err=True)
     return typer.Exit(EXIT_INTERRUPTED)

@@ -14,9 +14,9 @@ MAIN_PAGE = Path(__file__).parents[1] / "dashboard" / "main.py"
 
 OPTIONS = (
     "server.address=localhost",
-    "server.allowedHosts=localhost",  # whatever other name may have been made to point at this machine
+    "server.allowedHosts=localhost",  # reject other names that may point at this machine
     "server.allowedHosts=127.0.0.1",
-    "server.maxUploadSize=2000",  # MB; the readers refuse what would not fit into the memory
+    "server.maxUploadSize=2000",  # MB; the readers refuse files that do not fit into memory
     "server.fileWatcherType=none",
     "server.showEmailPrompt=false",
     "server.enableCORS=true",
@@ -25,16 +25,16 @@ OPTIONS = (
     "browser.gatherUsageStats=false",
     "client.toolbarMode=minimal",
     "client.showErrorLinks=false",
-    "runner.postScriptGC=false",  # the pages ask for it themselves, when nobody waits: see `work.collect_garbage_later`
+    "runner.postScriptGC=false",  # the pages collect while nobody waits, see `work.collect_garbage_later`
 )
-"""Flags win over what the user's environment says in variables; files are not read, see `_read_no_configuration`."""
+"""Flags override environment variables of the user; files are not read, see `_read_no_configuration`."""
 
 
 def dashboard(
     port: Annotated[int, typer.Option(help="Port on localhost.", min=1, max=65535)] = 8501,
     browser: Annotated[bool, typer.Option(help="Open a browser window.")] = True,
 ) -> None:
-    """Open the dashboard in a browser. It listens on localhost only and sends nothing anywhere."""
+    """Open the dashboard in a browser. It listens only on localhost and sends no data anywhere."""
     from app.dashboard import compiled
 
     _read_no_configuration()
@@ -52,7 +52,7 @@ def _run(port: int, *, browser: bool) -> NoReturn:
 
     from app.dashboard.theme import THEME_OPTIONS
 
-    net_util.get_external_ip = lambda: None  # it would ask a server elsewhere who we are, to judge a foreign origin
+    net_util.get_external_ip = lambda: None  # it would ask an external server for our address to check an origin
     server_options = (
         f"server.port={port}",
         f"server.headless={str(not browser).lower()}",
@@ -68,10 +68,10 @@ def _run(port: int, *, browser: bool) -> NoReturn:
 
 
 def _read_no_configuration() -> None:
-    """Keep Streamlit from reading `.streamlit` in the folder the command starts in: it may have come with recordings.
+    """Keep Streamlit from reading `.streamlit` in the working folder, as it may have come with recordings.
 
-    Its base theme may be an address elsewhere, its path moves the pages, a file that is no text ends the start, and its
-    secrets become variables of the environment, of which one names Python files that are executed.
+    Its base theme may be an external address, its path moves the pages, a file that is not text stops the start, and
+    its secrets become environment variables, one of which names Python files that are executed.
     """
     from streamlit import config
 
@@ -83,7 +83,7 @@ def _read_no_configuration() -> None:
 
 
 def _hide_streamlit_offers() -> None:
-    """Keep Streamlit from offering its own add-ons over the page; older versions have no such module."""
+    """Keep Streamlit from offering its add-ons on the page; older versions have no such module."""
     from importlib import import_module
     from importlib.util import find_spec
 
@@ -112,10 +112,11 @@ def _print_also_to_nobody() -> None:
 
 
 def _tell_page_its_server(folder: Path) -> None:
-    """Let the first page name the server, in a copy of it in that folder.
+    """Make the first page name its server, in a copy of the page in `folder`.
 
-    On an address with a path, /analysis, Streamlit's script looks for its server below that path first, and the browser
-    reports two errors. Where links to files are not allowed, or another version keeps its page elsewhere, it does.
+    At an address with a path such as /analysis, Streamlit's script first looks for its server below that path, and the
+    browser reports two errors. This remains so if symbolic links are not allowed or another version keeps its page
+    elsewhere.
     """
     from streamlit import file_util
 

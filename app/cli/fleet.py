@@ -35,22 +35,22 @@ StoreOption = Annotated[
     typer.Option("--store", metavar="DIR", envvar="GEARSIG_FLEET", help="Folder where results are kept."),
 ]
 PlacesArgument = Annotated[
-    list[Path], typer.Argument(help="Recordings, or folders with their sub-folders, or 'FOLDER/*.csv'.")
+    list[Path], typer.Argument(help="Recordings, folders (including sub-folders) or 'FOLDER/*.csv'.")
 ]
 PatternOption = Annotated[
     str,
     typer.Option(
         "--pattern",
-        help="How paths name machine, point and date, from their end: '{machine}/{point}_{date:%Y%m%d}.csv'; "
-        "{number:1min} is a running number, {speed} a nominal speed in rpm, {} is anything.",
+        help="How the ends of paths give machine, point and date: '{machine}/{point}_{date:%Y%m%d}.csv'; "
+        "{number:1min} is a running number, {speed} a nominal speed in rpm, {} matches anything.",
     ),
 ]
-MachineOption = Annotated[str, typer.Option("--machine", help="Name of the machine, for all of these recordings.")]
-PointOption = Annotated[str, typer.Option("--point", help="Measuring point, for all of these recordings.")]
+MachineOption = Annotated[str, typer.Option("--machine", help="Machine of all these recordings.")]
+PointOption = Annotated[str, typer.Option("--point", help="Measuring point of all these recordings.")]
 OnlyMachineOption = Annotated[str, typer.Option("--machine", help="Only this machine.")]
 OnlyPointOption = Annotated[str, typer.Option("--point", help="Only this measuring point.")]
 DateOption = Annotated[
-    datetime | None, typer.Option("--date", help="Date of these recordings, where their names do not state it.")
+    datetime | None, typer.Option("--date", help="Date of these recordings, if their names do not state it.")
 ]
 StartOption = Annotated[datetime | None, typer.Option("--from", help="From this date on, e.g. 2026-01-31.")]
 EndOption = Annotated[datetime | None, typer.Option("--to", help="Up to this date.")]
@@ -73,17 +73,17 @@ def add(
     reference_fs: options.ReferenceRateOption = None,
     torque: options.TorqueOption = None,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Show machine, point, date and speed of each recording; analyse nothing.")
+        bool, typer.Option("--dry-run", help="Only show machine, point, date and speed of each recording.")
     ] = False,
     jobs: options.JobsOption = None,
     cluster: options.ClusterOption = "",
     memory: options.MemoryOption = 2.0,
     json: options.JsonOption = False,
 ) -> None:
-    """Analyse recordings that are new and keep their results; what is known already is passed over.
+    """Analyse new recordings and keep their results; recordings that are already in the fleet are skipped.
 
     Machine, date and speed are taken from the options, the pattern, sub-folders, rig files and file names, in this
-    order, and shown first. It can be stopped, or killed, at any time: the same command goes on from there. The exit
+    order, and shown first. It can be stopped, or killed, at any time: the same command continues from there. The exit
     code is 1 if some recordings could not be analysed.
 
     Example: gearsig fleet add recordings --pattern '{machine}/{point}_{date:%Y%m%d}.csv'
@@ -144,7 +144,7 @@ def status(
     all_points: Annotated[bool, typer.Option("--all", help="All measuring points, not the 40 worst.")] = False,
     json: options.JsonOption = False,
 ) -> None:
-    """Show every measuring point, the worst first: diagnosis of the last recording, alarms, what rose most."""
+    """Show the measuring points, the worst first: diagnosis of the last recording, alarms, largest increases."""
     from gearsig.fleet import counts_text, trends_text
 
     table = _open(store).status()
@@ -174,19 +174,19 @@ def status(
 @fleet_app.command()
 def trend(
     machine: Annotated[str, typer.Argument(help="Machine.")],
-    indicator: Annotated[str, typer.Argument(help="E.g. 'overall velocity'; without it all, the worst first.")] = "",
+    indicator: Annotated[str, typer.Argument(help="E.g. 'overall velocity'; default: all, the worst first.")] = "",
     store: StoreOption = DEFAULT_STORE,
     point: OnlyPointOption = "",
     channel: Annotated[str, typer.Option("--channel", help="Only this channel.")] = "",
     over: Annotated[
-        str, typer.Option("--over", help="time, or load or speed: limits then follow the baseline's dependence on it.")
+        str, typer.Option("--over", help="time, load or speed; for the last two, limits follow the baseline's trend.")
     ] = "time",
     json: options.JsonOption = False,
 ) -> None:
     """Show an indicator over time, load or speed with its limits, or all indicators of a machine against theirs.
 
-    Limits are the zones of ISO 20816-3 for the overall velocity, where the rig file says what the machine is, and
-    statistical ones from the baseline otherwise; docs/fleet.md says how often they are wrong.
+    For the overall velocity, limits are the zones of ISO 20816-3 if the rig file gives the machine's class; otherwise
+    they are statistical limits from the baseline; docs/fleet.md says how often they are wrong.
     """
     from gearsig.checks import one_of
     from gearsig.errors import InputError
@@ -257,9 +257,9 @@ def report(
         datetime | None, typer.Option("--since", help="UTC. Default: since the last report of this fleet.")
     ] = None,
     everything: Annotated[bool, typer.Option("--everything", help="Since the beginning.")] = False,
-    pdf: Annotated[bool, typer.Option("--pdf", help="Write the page as PDF as well.")] = False,
+    pdf: Annotated[bool, typer.Option("--pdf", help="Also write the page as PDF.")] = False,
 ) -> None:
-    """Write what changed since last time as one HTML page: diagnoses, alarms raised and cleared, levels that moved.
+    """Write what changed since the last report as one HTML page: diagnoses, alarms raised and cleared, level changes.
 
     Example: gearsig fleet report -o monday.html
     """
@@ -277,8 +277,8 @@ def report(
     if since is None and not everything:
         try:
             mark_reported(fleet, now)
-        except InputError as error:  # of others' stores, which may be read only
-            _say(f"the next report begins where this one did: {error}")
+        except InputError as error:  # somebody else's store may be read-only
+            _say(f"the next report will start at the same date as this one: {error}")
     typer.echo(f"Open {output} in a browser.")
 
 
@@ -290,10 +290,10 @@ def baseline(
     store: StoreOption = DEFAULT_STORE,
     point: OnlyPointOption = "",
 ) -> None:
-    """State when a machine was healthy, e.g. after an overhaul; without it the first 20 healthy recordings count."""
+    """State when a machine was healthy, e.g. after an overhaul; by default its first 20 healthy recordings count."""
     from datetime import timedelta
 
-    if end == end.replace(hour=0, minute=0, second=0, microsecond=0):  # a day ends when it is over
+    if end == end.replace(hour=0, minute=0, second=0, microsecond=0):  # a date means all of that day
         end += timedelta(days=1, microseconds=-1)
     _open(store).set_baseline(machine, start, end, point=point)
     typer.echo(f"The baseline of {machine} is from {start:%Y-%m-%d} to {end:%Y-%m-%d}.")
@@ -308,20 +308,20 @@ def watch(
     point: PointOption = "",
     rig: options.RigOption = None,
     fs: options.SamplingRateOption = None,
-    interval: Annotated[float, typer.Option("--interval", metavar="S", help="Seconds between two looks at it.")] = 5.0,
+    interval: Annotated[float, typer.Option("--interval", metavar="S", help="Seconds between two checks.")] = 5.0,
     settle: Annotated[
-        float, typer.Option("--settle", metavar="S", help="Seconds for which a file must not change.")
+        float, typer.Option("--settle", metavar="S", help="Seconds for which a file must be unchanged.")
     ] = 10.0,
-    once: Annotated[bool, typer.Option("--once", help="End once all that is there has been added.")] = False,
+    once: Annotated[bool, typer.Option("--once", help="End once all existing recordings have been added.")] = False,
     jobs: options.JobsOption = None,
     cluster: options.ClusterOption = "",
     memory: options.MemoryOption = 2.0,
-    json: Annotated[bool, typer.Option("--json", help="A line of JSON for each recording.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Print a line of JSON for each recording.")] = False,
 ) -> None:
     """Add new recordings as they appear, with a line for each, until it is stopped (Ctrl-C or SIGTERM).
 
-    A file is taken when it has stopped changing. Several watches on one folder share the work; after a restart it goes
-    on where it was. The exit code is 0 when it was stopped, 1 if with --once some recordings failed.
+    A file is added once it has stopped changing. Several watches on one folder share the work; after a restart the
+    command continues where it was. The exit code is 0 when it is stopped, and 1 if recordings failed with --once.
 
     Example: gearsig fleet watch incoming --pattern '{machine}/{date:%Y%m%d-%H%M}.wav' --json
     """
@@ -408,7 +408,7 @@ def _table(
     for heading in headings:
         table.add_column(heading, overflow="fold")
     for row in rows:
-        table.add_row(*(Text(cell, styles.get(cell, "")) for cell in row))  # names from files are no markup
+        table.add_row(*(Text(cell, styles.get(cell, "")) for cell in row))  # names from files are not markup
     console = Console(stderr=err)
     if not console.is_terminal:
         console = Console(stderr=err, width=200)
@@ -452,7 +452,7 @@ def _show_added(result: AddResult, store: Path, workers: Cluster | None, *, json
     parts = [f"{counted(len(result.added) - len(result.failures), 'recording')} added to {store}"]
     parts += [f"{len(result.failures)} failed"] if result.failures else []
     was, are = ("was" if result.n_known == 1 else "were"), ("is" if result.n_elsewhere == 1 else "are")
-    parts += [f"{result.n_known} {was} there already"] if result.n_known else []
+    parts += [f"{result.n_known} {was} known already"] if result.n_known else []
     parts += [f"{result.n_elsewhere} {are} being analysed by another process"] if result.n_elsewhere else []
     typer.echo("; ".join(parts) + (f"; {ran}" if ran else "") + ".")
 

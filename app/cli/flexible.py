@@ -1,7 +1,7 @@
 """Commands that compute with finite elements: a pair of gears, one gear's body, the growth of a root crack.
 
 `gearsig flexible`: maps, speed sweeps and spectra. `gearsig gear-body`: mesh, modes, stress, reduction. `gearsig
-growth`: how fast a root crack grows, and how many turns are left.
+growth`: how fast a root crack grows, and how many revolutions are left.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ def flexible(
 
 
 SPRINGS = {"radial": "2e8N/m", "axial": "1e8N/m", "tilt": "1e5Nm/rad", "twist": "4e4Nm/rad"}
-"""That hold the hub unless others are given."""
+"""Default springs that hold the hub."""
 
 
 def gear_body(
@@ -101,22 +101,22 @@ def gear_body(
     fillet: Annotated[float, typer.Option("--fillet", help="Tip radius of the tool, in modules.")] = 0.38,
     face: Annotated[str, typer.Option("--face", metavar="LENGTH", help="Face width.")] = "20mm",
     bore: Annotated[str, typer.Option("--bore", metavar="LENGTH", help="Radius of the bore.")] = "20mm",
-    web: Annotated[str, typer.Option("--web", metavar="LENGTH", help="Thickness of the web; none: full disc.")] = "",
+    web: Annotated[str, typer.Option("--web", metavar="LENGTH", help="Thickness of the web; default: full disc.")] = "",
     rim: Annotated[str, typer.Option("--rim", metavar="LENGTH", help="Thickness of the rim, with a web.")] = "",
     hub: Annotated[str, typer.Option("--hub", metavar="LENGTH", help="Thickness of the hub, with a web.")] = "",
-    dof: Annotated[int, typer.Option("--dof", help="Degrees of freedom of the mesh, about.")] = 277_200,
-    modes: Annotated[int, typer.Option("--modes", help="Elastic modes to find.")] = 20,
+    dof: Annotated[int, typer.Option("--dof", help="Approximate degrees of freedom of the mesh.")] = 277_200,
+    modes: Annotated[int, typer.Option("--modes", help="Number of elastic modes.")] = 20,
     held: Annotated[
         str, typer.Option("--held", help="free, bore or springs: how the gear is held for its modes.")
     ] = "free",
     radial: Annotated[str, typer.Option("--radial", metavar="STIFFNESS", help="Radial springs.")] = SPRINGS["radial"],
     axial: Annotated[str, typer.Option("--axial", metavar="STIFFNESS", help="Axial springs.")] = SPRINGS["axial"],
-    tilt: Annotated[str, typer.Option("--tilt", metavar="STIFFNESS", help="Against tilting.")] = SPRINGS["tilt"],
-    twist: Annotated[str, typer.Option("--twist", metavar="STIFFNESS", help="About the shaft.")] = SPRINGS["twist"],
+    tilt: Annotated[str, typer.Option("--tilt", metavar="STIFFNESS", help="Tilting springs.")] = SPRINGS["tilt"],
+    twist: Annotated[str, typer.Option("--twist", metavar="STIFFNESS", help="Torsional spring.")] = SPRINGS["twist"],
     force: Annotated[str, typer.Option("--force", metavar="FORCE", help="Force on a tooth, for stress.")] = "1000N",
-    reduce: Annotated[bool, typer.Option("--reduce", help="Also reduce the gear, with its errors.")] = False,
+    reduce: Annotated[bool, typer.Option("--reduce", help="Also reduce the gear, and state the errors.")] = False,
     fresh: Annotated[
-        bool, typer.Option("--fresh", help="Clear away reduced gears that another version of gearsig kept.")
+        bool, typer.Option("--fresh", help="Delete reduced gears that another version of gearsig kept.")
     ] = False,
     vtk: Annotated[bool, typer.Option("--vtk", help="Also write gear.vtu for other programs.")] = False,
 ) -> None:
@@ -164,7 +164,7 @@ def gear_body(
 
 
 def _springs(held: str, texts: dict[str, str]) -> FloatArray | None:
-    """Stiffness in the six directions of the hub; None where it is not on springs."""
+    """Return the hub stiffness in six directions (N/m, N m/rad); None if the hub is not on springs."""
     import numpy as np
 
     from gearsig.checks import positive
@@ -182,7 +182,7 @@ def _springs(held: str, texts: dict[str, str]) -> FloatArray | None:
 
 
 CRACKED = "cracked"
-"""The model whose machine a crack grows in."""
+"""Model of the machine in which the crack grows."""
 
 
 def growth(
@@ -195,26 +195,30 @@ def growth(
     ] = "",
     speed: Annotated[str, typer.Option("--speed", metavar="SPEED", help="Of the driver; default: the preset's.")] = "",
     gear: Annotated[str, typer.Option("--gear", help="driver or driven: whose tooth is cracked.")] = "driver",
-    angle: Annotated[float, typer.Option("--angle", help="Degrees between crack and the tooth's centre line.")] = 45.0,
+    angle: Annotated[
+        float, typer.Option("--angle", help="Degrees between the crack and the tooth's centre line.")
+    ] = 45.0,
     load_factor: Annotated[
         float,
-        typer.Option("--load-factor", help="Load over that of the torque alone: K_A K_v."),
+        typer.Option("--load-factor", help="Ratio of the load to that of the torque alone: K_A K_v."),
     ] = 1.0,
     paris: Annotated[
         str,
         typer.Option(
             "--paris",
             metavar="C,m[,sC[,sm]]",
-            help="da/dN = C ΔK^m in mm and MPa√m, and the scatter of log10 C and of m; else the two stages of BS 7910.",
+            help="da/dN = C ΔK^m in mm and MPa√m, and the scatter of log10 C and m; default: two stages of BS 7910.",
         ),
     ] = "",
-    threshold: Annotated[float, typer.Option("--threshold", help="ΔK in MPa√m below which a crack rests.")] = 2.0,
+    threshold: Annotated[
+        float, typer.Option("--threshold", help="ΔK in MPa√m below which a crack does not grow.")
+    ] = 2.0,
     toughness: Annotated[float, typer.Option("--toughness", help="K in MPa√m at which the tooth breaks.")] = 60.0,
     seed: options.SeedOption = 0,
 ) -> None:
-    """Say how many turns a root crack has left, with an interval: stress intensity by finite elements, Paris' law.
+    """Predict the revolutions until a cracked tooth breaks, with an interval, by finite elements and Paris' law.
 
-    The machine is a preset of the model cracked, or a file of one. What is assumed stands in growth.json.
+    The machine is a preset of the model cracked, or a preset file. growth.json lists the assumptions.
 
     Example: gearsig growth --preset published_55_75 --depth 1..1.6mm --torque 300Nm -o growth
     """

@@ -1,4 +1,4 @@
-"""`gearsig gap`: where a recording differs from its simulation, which effect causes it, how far it shrinks with it."""
+"""`gearsig gap`: where a recording differs from its simulation, and which effect explains how much of it."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ if TYPE_CHECKING:
 
 
 TABLE_WIDTH = 110
-"""Columns of the table of effects where it is not printed to a terminal."""
+"""Width of the table of effects, in columns, if it is not printed to a terminal."""
 
 
 def gap(
     recordings: Annotated[
-        list[Path] | None, typer.Argument(help="Recordings of one rig; more operating conditions tell more.")
+        list[Path] | None, typer.Argument(help="Recordings of one rig, preferably at several operating conditions.")
     ] = None,
     rig: Annotated[
         Path | None,
         typer.Option(
             "--rig",
-            help="Rig file (TOML) of all recordings. NAME.toml beside a recording overrides its speed, torque, "
+            help="Rig file (TOML) of all recordings. NAME.toml next to a recording overrides its speed, torque, "
             "sensors and sampling rate.",
         ),
     ] = None,
@@ -55,18 +55,20 @@ def gap(
         typer.Option(
             "--run-up",
             metavar="HEALTHY",
-            help="Run-up or run-down of the same rig when it was healthy, with a tachometer, beside --reference: it "
-            "measures the path to the sensors, by which faults of teeth are told apart.",
+            help="Run-up or run-down of the same rig when it was healthy, with a tachometer, in addition to "
+            "--reference: it measures the path to the sensors, which helps to distinguish tooth faults.",
         ),
     ] = None,
     torque: Annotated[
         list[str] | None,
-        typer.Option("--torque", metavar="N", help="Of the input shaft, e.g. 60Nm: one for all, or one for each."),
+        typer.Option(
+            "--torque", metavar="N", help="Of the input shaft, e.g. 60Nm: one for all recordings or one for each."
+        ),
     ] = None,
     speed_rpm: SpeedOption = None,
     stage: Annotated[
         str,
-        typer.Option("--stage", metavar="NAME", help="Of several gear pairs the one to diagnose: its name or shaft."),
+        typer.Option("--stage", metavar="NAME", help="Gear pair to diagnose, if there are several: its name or shaft."),
     ] = "",
     fs: SamplingRateOption = None,
     learn: Annotated[
@@ -74,34 +76,36 @@ def gap(
         typer.Option(
             "--learn",
             metavar="FOLDER",
-            help="Labelled recordings of this rig, or of your own simulation of it: labels.csv there names file, "
-            "effect, reference, severity. Two of each effect help most of all.",
+            help="Labelled recordings of this rig, or of your own simulation of it: labels.csv in it lists file, "
+            "effect, reference, severity. Two of each effect help most.",
         ),
     ] = None,
     cache: Annotated[
         Path | None,
-        typer.Option("--cache", metavar="DIR", help="Keeps what is prepared once per rig. Default: your cache folder."),
+        typer.Option(
+            "--cache", metavar="DIR", help="Folder for what is prepared once per rig. Default: your cache folder."
+        ),
     ] = None,
-    fresh: Annotated[bool, typer.Option("--fresh", help="Prepare anew what the cache holds, and keep that.")] = False,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Prepare again what the cache holds, and replace it.")] = False,
     effect_file: Annotated[
         list[Path] | None,
         typer.Option(
             "--effect-file",
             metavar="FILE",
-            help="Python file with an effect of your own, which is looked for, too; repeatable. Its code is executed: "
-            "give files that you trust. The variable GEARSIG_EFFECTS names such files for every command and the "
-            "dashboard, which execute them, too.",
+            help="Python file with an effect of your own to look for as well; repeatable. Its code is executed: give "
+            "only files that you trust. The variable GEARSIG_EFFECTS names such files for every command and the "
+            "dashboard, which then execute them.",
         ),
     ] = None,
     list_effects: Annotated[bool, typer.Option("--list-effects", help="Show the effects that are looked for.")] = False,
     output: Annotated[Path | None, output_option("Folder for gap.html, gap.json and twin.toml.")] = None,
     cluster: ClusterOption = "",
 ) -> None:
-    """Say where recordings differ from the simulation of their rig, which effect causes it, how far it shrinks then.
+    """Find where recordings differ from the simulation of their rig, and which effect explains how much of it.
 
-    Give recordings at several speeds and loads if there are any, and recordings of the same rig when it was healthy:
-    both make the answer much surer. The first answer for a rig takes about a minute on two free cores; its simulations
-    are kept, and the next answer at the same speed and load takes a quarter of that.
+    If possible, give recordings at several speeds and loads, and recordings of the same rig when it was healthy: both
+    make the answer much more certain. The first answer for a rig takes about a minute on two free cores; its
+    simulations are kept, and the next answer at the same speed and load takes a quarter of that.
 
     Example: gearsig gap slow.h5 fast.h5 --rig gearbox.toml --reference healthy.h5 -o gap
     """
@@ -137,7 +141,7 @@ def gap(
         check_writable(cache, "--cache")
     if fresh and model == "reduced-fe":
         clear_other_versions(model)
-    with one_pool(PROCESSES):  # which draw the page as well
+    with one_pool(PROCESSES):  # they draw the page, too
         with open_cluster(cluster) as workers:
             report = _diagnosed(request, model, cache, fresh=fresh)
             ran = workers.text() if workers else ""
@@ -155,7 +159,7 @@ def _torques(texts: list[str] | None) -> tuple[float, ...]:
 
 
 def _diagnosed(request: GapRequest, model: str, cache: Path | None, *, fresh: bool) -> GapReport:
-    """Diagnose with a progress bar, which is shown on a terminal only."""
+    """Diagnose and show the progress."""
     from app.gap_job import run_gap
     from gearsig.cache import cache_folder
 
@@ -176,7 +180,7 @@ def _print_summary(report: GapReport, written: tuple[Path, ...]) -> None:
     for message in report.notes:
         typer.echo(f"Note: {message}", err=True)
     page, *further_files = written
-    typer.echo(f"Open {page} in a browser; beside it: {', '.join(path.name for path in further_files)}.")
+    typer.echo(f"Open {page} in a browser; next to it: {', '.join(path.name for path in further_files)}.")
     if report.twin_toml:
         twin = shlex.quote(str(further_files[-1]))
         run = f"{_user_effects(report)}gearsig simulate {report.simulator} --preset {twin} -o twin.h5"
@@ -184,7 +188,7 @@ def _print_summary(report: GapReport, written: tuple[Path, ...]) -> None:
 
 
 def _user_effects(report: GapReport) -> str:
-    """Return what must stand before a command that needs an effect of the user's own."""
+    """Return the variable to set in front of a command that needs the user's own effects."""
     from sims.effects import VARIABLE, is_user_effect, user_files
 
     fitted = report.causes[0].fitted
@@ -194,7 +198,7 @@ def _user_effects(report: GapReport) -> str:
 
 
 def _print_effects(model: str) -> None:
-    """Print the catalogue: group, name, unit of the severity, where it shows."""
+    """Print the catalogue of effects: group, name, unit of the severity, where the effect shows."""
     from rich.box import SIMPLE_HEAD
     from rich.console import Console
     from rich.table import Table
@@ -206,7 +210,7 @@ def _print_effects(model: str) -> None:
     table = Table("group", "effect", "severity", "shows in", box=SIMPLE_HEAD, pad_edge=False)
     simulator = gap_simulator(model)
     effects = simulator.gap_effects()
-    # Starts and stops are compared by their equation of motion: nothing is learned, and nothing is unknown to it.
+    # Starts and stops are compared by their equation of motion: nothing is learned, so no effect is unrecognised.
     learned = effects if isinstance(simulator, DriveSimulator) else load_learned().causes
     last = ""
     for effect in effects.values():

@@ -32,9 +32,9 @@ app = typer.Typer(
     help="""Signal processing and diagnostics for gear vibration.
 
     Start with **gearsig demo**; then **gearsig analyze RECORDING --rig RIG** on a recording of your own.
-    A rig file says what is known of the machine: **gearsig rig example** prints one to start from.
+    A rig file describes the machine: **gearsig rig example** prints one to start from.
 
-    Python files that the variable GEARSIG_EFFECTS names, effects of your own, are executed by every command.""",
+    Every command executes the Python files of your own effects that the variable GEARSIG_EFFECTS names.""",
 )
 COMMANDS: tuple[Callable[..., None] | typer.Typer, ...] = (
     *(analyze, show, modes, crack, force, start_stop, identify, compare, report, fleet_app, rig_app),
@@ -43,7 +43,7 @@ COMMANDS: tuple[Callable[..., None] | typer.Typer, ...] = (
 for command in COMMANDS:
     if isinstance(command, typer.Typer):
         app.add_typer(command)
-    elif command is modes:  # its options are those of the method
+    elif command is modes:  # it takes the options of the method
         app.command(
             context_settings={"allow_extra_args": True, "ignore_unknown_options": True, "help_option_names": []}
         )(command)
@@ -51,7 +51,7 @@ for command in COMMANDS:
         app.command()(command)
 
 USAGE_ERROR: type[Exception] = typer.BadParameter.__bases__[0]
-"""Base of all errors of Typer's parser, which it does not export; since version 0.20 it is no longer Click's."""
+"""Base class of the errors of Typer's parser, which Typer does not export; since version 0.20 it is not Click's."""
 
 
 def _show_version(is_requested: bool) -> None:
@@ -64,15 +64,15 @@ def _show_version(is_requested: bool) -> None:
 def _root(
     version: bool = typer.Option(False, "--version", callback=_show_version, is_eager=True, help="Print the version."),
 ) -> None:
-    """Hold the options that belong to no single command."""
+    """Take the options that belong to no single command."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line; an error of the user's input is one line on standard error and exit code 2."""
+    """Run the command line; an input error gives one line on standard error and exit code 2."""
     _end_on_sigterm()
     try:
         sys.exit(_parser()(args=list(arguments) if arguments is not None else None, standalone_mode=False))
-    except USAGE_ERROR as error:  # a wrong option or argument: left alone, Typer draws a frame of several lines
+    except USAGE_ERROR as error:  # a wrong option or argument, which Typer would print in a frame of several lines
         typer.echo(_usage_text(error), err=True, nl=bool(_usage_text(error)))
         sys.exit(EXIT_INPUT_ERROR)
     except (InputError, RefusalError) as error:
@@ -88,18 +88,18 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 @cache
 def _parser() -> Callable[..., int | None]:
-    """Read all commands' options from their signatures, which takes a tenth of a second, once."""
+    """Build the parser from the signatures of all commands, once: it takes a tenth of a second."""
     return typer.main.get_command(app)
 
 
 def _end_on_sigterm() -> None:
-    """Let SIGTERM end a command as Ctrl-C does: what it began is tidied up."""
+    """Let SIGTERM end a command as Ctrl-C does, so that it cleans up."""
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, signal.default_int_handler)
 
 
 def _usage_text(error: Exception) -> str:
-    """Return an error of the parser in one line; empty where it has printed the help instead."""
+    """Return a parser error as one line; empty if the parser printed the help instead."""
     problem = " ".join(str(getattr(error, "format_message", error.__str__)()).rstrip(".").split())
     context = getattr(error, "ctx", None)
     command = context.command_path if context is not None else "gearsig"

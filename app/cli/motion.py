@@ -1,4 +1,4 @@
-"""`gearsig start-stop`, `force`, `identify`: what the measured motion of both gears shows."""
+"""`gearsig start-stop`, `force`, `identify`: analysis of the measured motion of both gears."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 DATA, PICTURE = "start_stop.json", "start_stop.png"
-"""Files that -o makes."""
+"""Files that -o writes."""
 
 
 def start_stop(
@@ -36,9 +36,9 @@ def start_stop(
 ) -> None:
     """Find starts and stops, the backlash, every impact of the flanks, and the loop of torque over twist.
 
-    Nothing of it needs a steady speed. The picture shows the speed with the impacts, the phase plane of the teeth and
-    torque over twist; the JSON has the level of a vibration (else of the torque) tooth by tooth, forwards and backwards
-    apart, and its orders.
+    The speed need not be steady. The picture shows the speed with the impacts, the phase plane of the teeth and torque
+    over twist; the JSON has the level of the vibration (or else of the torque) tooth by tooth, forwards and backwards
+    separately, and its orders.
 
     Example: gearsig start-stop drive.h5 --rig drive.toml -o drive
     """
@@ -60,7 +60,7 @@ def start_stop(
 
 
 def tooth_levels(recording: Recording, examined: StartStop) -> tuple[AngleProfile | None, str, str, Spectrum | None]:
-    """Return of the first acceleration, else of the torque: level tooth by tooth, channel, unit, orders forwards."""
+    """Return level tooth by tooth, channel, unit and forward orders of the first acceleration, or else the torque."""
     from gearsig.errors import RefusalError
     from gearsig.motion import angle_profile, segment_order_spectrum
 
@@ -76,14 +76,14 @@ def tooth_levels(recording: Recording, examined: StartStop) -> tuple[AngleProfil
 
 
 FORCE_DATA, TABLE, FORCE_PICTURE, NOISE_PICTURE = "force.json", "force.csv", "force.png", "noise.png"
-"""Files that -o makes."""
+"""Files that -o writes."""
 
 DatumOption = Annotated[
     str,
     typer.Option(
         "--datum",
         metavar="auto|zero|LENGTH",
-        help="Compression at which the teeth stand in the middle of the play; auto: read from the motion.",
+        help="Compression at which the teeth are in the middle of the backlash; auto: estimate it from the motion.",
     ),
 ]
 
@@ -96,17 +96,17 @@ def force(
     unwrap: options.UnwrapOption = False,
     datum: DatumOption = "auto",
     noise: Annotated[
-        bool, typer.Option("--noise", help="Also find the noise up to which the piecewise model is the nearer one.")
+        bool, typer.Option("--noise", help="Also find the noise up to which the piecewise model beats Hunt–Crossley.")
     ] = False,
     fs: options.SamplingRateOption = None,
     json: options.JsonOption = False,
     output: Annotated[Path | None, options.output_option(f"Folder for {FORCE_DATA}, {TABLE}, {FORCE_PICTURE}.")] = None,
 ) -> None:
-    """Estimate the force between the teeth by the piecewise model, by Hunt–Crossley and by Kelvin–Voigt.
+    """Estimate the force between the teeth by the piecewise, Hunt–Crossley and Kelvin–Voigt models.
 
-    The rig's [contact] table gives stiffness, backlash, restitution, friction and inertias. Where torque was measured,
+    The rig's [contact] table gives stiffness, backlash, restitution, friction and inertias. If torque was measured,
     each model is compared with torque over base radius. A speed or acceleration that was not measured is derived, and
-    said how.
+    the result says how.
 
     Example: gearsig force drive.h5 --rig drive.toml --noise -o force
     """
@@ -142,7 +142,7 @@ def force(
 
 
 def read_datum(text: str) -> str | float:
-    """Return "auto", "zero" or a length in m."""
+    """Parse "auto", "zero" or a length, returned in m."""
     if text in ("auto", "zero"):
         return text
     try:
@@ -152,7 +152,7 @@ def read_datum(text: str) -> str | float:
 
 
 def write_force(estimate: ForceEstimate, study: NoiseStudy | None, folder: Path) -> tuple[str, ...]:
-    """Write data, table and pictures; return the files' names. Without a reference there is no picture."""
+    """Write data, table and pictures; return the file names. Without a reference force there is no force picture."""
     from gearsig.plot import force_figure, noise_figure
     from gearsig.report import force_csv, force_json, write_folder
 
@@ -173,7 +173,7 @@ FITTED_NAMES = (
     "friction_coefficient",
     "driven_inertia_kg_m2",
 )
-"""Parameters that a rig file holds."""
+"""Parameters that a rig file can hold."""
 
 
 def identify(
@@ -188,9 +188,9 @@ def identify(
         Path | None, options.output_option("Rig file (.toml) to write, with all that was identified.", "FILE")
     ] = None,
 ) -> None:
-    """Fit the contact of the teeth and the load to a recording, with 95 % intervals and what it cannot tell.
+    """Fit tooth contact and load to a recording, with 95 % intervals; list what the recording cannot determine.
 
-    The best record starts, runs and stops with a brake: both flanks are loaded, flanks meet at speed, inertias show.
+    The best record starts, runs and stops with a brake: it loads both flanks, contains impacts and shows the inertias.
 
     Example: gearsig identify drive.h5 --rig drive.toml -o fitted.toml
     """
@@ -214,7 +214,7 @@ def identify(
 
 
 def with_fitted(rig: Rig, identification: Identification) -> Rig:
-    """Return the rig with the fitted values in its contact, as far as they could be identified."""
+    """Return the rig whose contact holds the fitted values that could be identified."""
     assert rig.contact is not None  # noqa: S101  motion could not have been measured without it
     values = {
         p.name: max(p.value, 0.0) for p in identification.parameters if p.is_determined and p.name in FITTED_NAMES

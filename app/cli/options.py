@@ -1,4 +1,4 @@
-"""Options that several commands share, and how a recording is opened with them."""
+"""Options that several commands share, and functions that open recordings with them."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ RigOption = Annotated[
     Path | None,
     typer.Option(
         "--rig",
-        help="Rig file (TOML): shafts, teeth, bearings, sensors, speed source. Default: NAME.toml beside it.",
+        help="Rig file (TOML): shafts, teeth, bearings, sensors, speed. Default: NAME.toml next to the recording.",
     ),
 ]
 
@@ -38,12 +38,12 @@ def output_option(about: str, metavar: str = "DIR") -> Any:
 
 
 def quantity_option(name: str, unit: str, metavar: str, about: str) -> Any:
-    """Return an option for a number in a unit, or with a unit of its own."""
+    """Return an option for a number in `unit`, or with its own unit."""
 
     def parsed(text: str | float) -> float:
         try:
             return quantity(str(text), unit, name)
-        except InputError as error:  # the parser takes it for one of its own
+        except InputError as error:  # the parser handles only its own errors
             raise typer.BadParameter(str(error)) from None
 
     return typer.Option(name, metavar=metavar, parser=parsed, help=about)
@@ -55,11 +55,11 @@ def rate_option(name: str, about: str) -> Any:
 
 
 SamplingRateOption = Annotated[
-    float | None, rate_option("--fs", "Sampling rate, in Hz or kHz, where the file does not state it.")
+    float | None, rate_option("--fs", "Sampling rate, in Hz or kHz, if the file does not state it.")
 ]
 SpeedOption = Annotated[
     float | None,
-    quantity_option("--speed-rpm", "rpm", "RPM", "Constant speed of the reference shaft, if it is known well."),
+    quantity_option("--speed-rpm", "rpm", "RPM", "Constant speed of the reference shaft, if known accurately."),
 ]
 TachometerTimesOption = Annotated[
     Path | None, typer.Option("--tach-times", metavar="FILE", help="File with the times of the tachometer pulses in s.")
@@ -70,9 +70,9 @@ ReferenceOption = Annotated[
     typer.Option(
         "--reference",
         metavar="FILE",
-        help="Recording of the same machine when it was healthy: same sensors, speed and load. --fs holds for it as "
-        "well, unless --reference-fs or a rig file beside it (NAME.toml) states its sampling rate; its sensors and "
-        "speed source are those of that rig file, too.",
+        help="Recording of the same machine when it was healthy, with the same sensors, speed and load. --fs applies "
+        "to it as well, unless --reference-fs or a rig file next to it (NAME.toml) states its sampling rate; that "
+        "file also gives its sensors and speed source.",
     ),
 ]
 ReferenceRateOption = Annotated[
@@ -82,7 +82,8 @@ TorqueOption = Annotated[
     str | None,
     typer.Option(
         "--torque",
-        help="E.g. 110Nm, instead of the rig's: of the shaft that its operating point names, else the reference shaft.",
+        help="E.g. 110Nm; replaces the rig's torque. Refers to the shaft of the rig's operating point, else the "
+        "reference shaft.",
     ),
 ]
 
@@ -91,7 +92,7 @@ ChannelsOption = Annotated[
     typer.Option(
         "--channel",
         metavar="NAME",
-        help="Use this channel only; may be given several times. Default: all accelerations.",
+        help="Use only this channel; repeatable. Default: all accelerations.",
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON, for other programs.")]
@@ -102,8 +103,8 @@ MemoryOption = Annotated[
         "--memory",
         metavar="GB",
         min=0.25,
-        help="Memory for the analysis of one recording. A longer one is read in blocks: levels and spectra of all "
-        "of it, the detectors on its most telling parts.",
+        help="Memory for the analysis of one recording. A longer recording is read in blocks: levels and spectra "
+        "cover all of it, the detectors its most informative parts.",
     ),
 ]
 ClusterOption = Annotated[
@@ -111,15 +112,15 @@ ClusterOption = Annotated[
     typer.Option(
         "--cluster",
         metavar="ADDRESS",
-        help="Run on the workers of a Dask scheduler, e.g. tcp://10.0.0.5:8786, which see the same files. "
-        "Code is sent both ways: name only one that you trust.",
+        help="Run on the workers of a Dask scheduler, e.g. tcp://10.0.0.5:8786; they must see the same files. "
+        "Code is sent both ways: use only a scheduler that you trust.",
     ),
 ]
 
 
 @contextmanager
 def open_cluster(address: str) -> Iterator[Cluster | None]:
-    """Open the cluster that the option names; None without one."""
+    """Open the cluster at an address; yield None if the address is empty."""
     if not address:
         yield None
         return
@@ -130,20 +131,20 @@ def open_cluster(address: str) -> Iterator[Cluster | None]:
 
 
 def open_rig(path: Path | None, recording: Path | None = None) -> Rig | None:
-    """Read the rig file that is given, else the one of the same name beside the recording, and say so."""
+    """Read the given rig file, else announce and read the one next to the recording with the same name."""
     from gearsig.rig import read_rig, rig_file_beside
 
     if path is None and recording is not None:
         path = rig_file_beside(recording)
         if path is not None:
-            typer.echo(f"Using the rig file {path.name} beside {recording.name}.", err=True)
+            typer.echo(f"Using the rig file {path.name} next to {recording.name}.", err=True)
     return read_rig(path) if path is not None else None
 
 
 def stated_speed(speed_rpm: float | None, tach_times: Path | None, pulses_per_revolution: int) -> SpeedSource | None:
-    """Return the speed source that the options state, None if they state none."""
+    """Return the speed source given by the options, or None."""
     if speed_rpm is not None and tach_times is not None:
-        raise InputError("--speed-rpm and --tach-times are both given", remedy="give the one that is measured")
+        raise InputError("--speed-rpm and --tach-times are both given", remedy="give only the measured one")
     if tach_times is not None:
         from gearsig.recording import read_pulse_times
 
@@ -158,7 +159,7 @@ def stated_speed(speed_rpm: float | None, tach_times: Path | None, pulses_per_re
 def open_recording(
     path: Path, rig: Rig | None, sampling_rate_hz: float | None, speed: SpeedSource | None = None
 ) -> Recording:
-    """Read one recording with what the options say of it."""
+    """Read one recording with the rig, sampling rate and speed that the options give."""
     from gearsig.diagnosis import read_whole
 
     return read_whole(path, rig, sampling_rate_hz=sampling_rate_hz, speed=speed)
@@ -171,7 +172,7 @@ def open_reference(
     speed_rpm: float | None,
     reference_rate_hz: float | None,
 ) -> Recording | None:
-    """Read the recording of the healthy machine, if one is given; pulse times belong to the other recording."""
+    """Read the healthy reference, if one is given; it gets no pulse times, which belong to the other recording."""
     if path is None:
         return None
     from gearsig.diagnosis import REFERENCE_OPTIONS, rig_and_rate_of_reference
@@ -182,7 +183,7 @@ def open_reference(
 
 
 def torque_of(text: str | None) -> float | None:
-    """Return the torque that the option states, in N m."""
+    """Parse the option --torque; the result is in N m."""
     from gearsig.checks import positive
 
     return positive(quantity(text, "N m", "--torque"), "--torque", "N m") if text is not None else None
@@ -194,7 +195,7 @@ PresetOption = Annotated[
     typer.Option(
         "--preset",
         metavar="NAME",
-        help="Machine to start from, or a preset file, NAME.toml; default: the model's first.",
+        help="Machine to start from: a name or a preset file, NAME.toml. Default: the model's first preset.",
     ),
 ]
 SetOption = Annotated[
@@ -233,7 +234,7 @@ FreshOption = Annotated[
     bool,
     typer.Option(
         "--fresh",
-        help="Model reduced-fe: make reduced gears anew that another version of gearsig kept.",
+        help="Model reduced-fe: delete reduced gears that another version of gearsig kept, and make them again.",
     ),
 ]
 
@@ -249,14 +250,14 @@ def read_request(
     fs: str,
     seed: int,
 ) -> Simulation:
-    """Return what the options ask for; names and units are checked here, ranges by the simulator."""
+    """Return the simulation that the options describe; names and units are checked here, ranges by the simulator."""
     from app.cli.quantities import read_profile
     from sims.presets import is_file
     from sims.presets import preset as preset_named
     from sims.registry import Simulation, simulator, simulators
 
     if model is None:
-        raise InputError("no model is named", allowed=", ".join(simulators()), remedy="gearsig simulate --list")
+        raise InputError("no model is given", allowed=", ".join(simulators()), remedy="gearsig simulate --list")
     chosen = simulator(model)
     duration_s = quantity(duration, "s", "--duration")
     return Simulation(
@@ -273,25 +274,25 @@ def read_request(
 
 
 def clear_other_versions(model: str | None) -> None:
-    """Delete what other versions kept of finite-element gears, and say so.
+    """Delete the finite-element gears that other versions cached, and report how many.
 
     Raises
     ------
     InputError
-        If the model keeps nothing.
+        If the model has no cache.
     """
     from sims.fe_gear import forget_other_versions
     from sims.reduced_fe import NAME
 
     if model != NAME:
-        raise InputError(f"--fresh is given, but the model {model} keeps nothing", remedy="leave out --fresh")
+        raise InputError(f"--fresh is given, but the model {model} has no cache", remedy="leave out --fresh")
     gone = forget_other_versions()
     if gone:
-        typer.echo(f"{counted(len(gone), 'file')} of another version cleared away", err=True)
+        typer.echo(f"{counted(len(gone), 'file')} of another version deleted", err=True)
 
 
 def read_parameter(chosen: Simulator, text: str) -> tuple[str, ParameterValue]:
-    """Return name and value of "crack_depth_mm=2mm"."""
+    """Parse name and value of a parameter such as "crack_depth_mm=2mm"."""
     from sims.simulator import parameter
 
     name, value = _split(text, "--set", "crack_depth_mm=2mm")
@@ -301,7 +302,7 @@ def read_parameter(chosen: Simulator, text: str) -> tuple[str, ParameterValue]:
 
 
 def read_effect(text: str) -> EffectSetting:
-    """Return the setting of "root_crack=2mm,gear=driven,tooth=5"."""
+    """Parse an effect such as "root_crack=2mm,gear=driven,tooth=5"."""
     from sims.effects import EffectSetting, effect
 
     first, *assignments = text.split(",")
@@ -319,7 +320,7 @@ def read_effect(text: str) -> EffectSetting:
 
 
 def read_effect_options(effect: Effect, texts: Sequence[str]) -> dict[str, float | str]:
-    """Return the options of ["gear=driven", "tooth=5"]."""
+    """Parse the options of an effect such as ["gear=driven", "tooth=5"]."""
     from gearsig.checks import known_name
 
     options = {option.name: option for option in effect.options}
@@ -339,21 +340,23 @@ def _split(text: str, where: str, example: str) -> tuple[str, str]:
     return name.strip(), value.strip()
 
 
-MotionArgument = Annotated[Path, typer.Argument(help="Recording with the motion of both gears, better with torque.")]
+MotionArgument = Annotated[
+    Path, typer.Argument(help="Recording with the motion of both gears, preferably also torque.")
+]
 UseOption = Annotated[
     list[str] | None,
     typer.Option(
         "--use",
         metavar="ROLE=CHANNEL",
-        help='Which channel is what, e.g. "driven angle=enc2"; "driver speed=" leaves it out. Roles: driver or driven, '
+        help='Role of a channel, e.g. "driven angle=enc2"; "driver speed=" leaves it out. Roles: driver or driven with '
         "angle, speed or acceleration; torque; force. Default: by quantity, position and name. Repeatable.",
     ),
 ]
 BandwidthOption = Annotated[
     str | None,
-    typer.Option("--bandwidth", metavar="HZ", help="Smooth all motion to this, by a Savitzky–Golay filter."),
+    typer.Option("--bandwidth", metavar="HZ", help="Smooth all motion to this bandwidth by a Savitzky–Golay filter."),
 ]
-UnwrapOption = Annotated[bool, typer.Option("--unwrap", help="The angles start again after each revolution.")]
+UnwrapOption = Annotated[bool, typer.Option("--unwrap", help="The angles start again from zero after each revolution.")]
 
 
 def open_motion(
@@ -364,7 +367,7 @@ def open_motion(
     bandwidth: str | None,
     unwrap: bool,
 ) -> tuple[Recording, PairMotion]:
-    """Read a recording and the motion of its pair, as the options say; a machine that only stands is refused."""
+    """Read a recording and the motion of its pair as the options say; refuse a machine that does not turn."""
     from gearsig.motion import check_turns, measure_motion
 
     roles, band = read_uses(use), read_bandwidth(bandwidth)
@@ -375,7 +378,7 @@ def open_motion(
 
 
 def read_uses(texts: Sequence[str] | None) -> dict[str, str]:
-    """Return role → channel of "driven angle=enc2"; the channel may hold "=" itself."""
+    """Return a mapping from role to channel, parsed from "driven angle=enc2"; the channel may contain "="."""
     values = {}
     for text in texts or ():
         role, sign, channel = text.partition("=")
@@ -388,5 +391,5 @@ def read_uses(texts: Sequence[str] | None) -> dict[str, str]:
 
 
 def read_bandwidth(text: str | None) -> float | None:
-    """Return it in Hz."""
+    """Parse the option --bandwidth; the result is in Hz."""
     return quantity(text, "Hz", "--bandwidth") if text is not None else None

@@ -38,28 +38,28 @@ _KINDS: tuple[dict[str, float], ...] = (
     {"m/s2/sqrtHz": 1.0, "g/sqrtHz": 9.80665},
     {"%": 1.0},
 )
-"""Units that can stand for each other, by what one is worth; spelt as `_spelt` leaves them."""
+"""Interchangeable units with their conversion factors, spelt as `_normalised_unit` returns them."""
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _QUANTITY = re.compile(rf"\s*({_NUMBER})\s*(.*?)\s*", re.DOTALL)
 
 
 def quantity(text: str, unit: str, name: str) -> float:
-    """Return a number in `unit`; without a unit of its own it is taken to be in it.
+    """Parse a number and convert it to `unit`, which is also assumed if the text states no unit.
 
     Parameters
     ----------
     text : str
         E.g. "2", "2mm", "0.002 m".
     unit : str
-        The unit wanted; empty for a plain number.
+        Target unit; empty for a plain number.
     name : str
-        For the error.
+        Name of the quantity, for error messages.
 
     Raises
     ------
     InputError
-        If it is no number, or its unit measures something else.
+        If the text is not a number, or its unit has another dimension.
 
     Examples
     --------
@@ -71,7 +71,7 @@ def quantity(text: str, unit: str, name: str) -> float:
 
 
 def span(text: str, unit: str, name: str, *, example: str = "2..4") -> tuple[float, float]:
-    """Return both ends of "300..1500rpm"; a unit after the second number holds for both."""
+    """Parse both ends of "300..1500rpm"; a unit after the second number applies to both."""
     first, dots, second = text.partition("..")
     if not dots:
         raise InputError(f"{name} is {text!r}", allowed="FROM..TO", remedy=f"write for example {example}{unit}")
@@ -85,7 +85,7 @@ def span(text: str, unit: str, name: str, *, example: str = "2..4") -> tuple[flo
 
 
 def split_quantity(text: str, unit: str, name: str) -> tuple[float, str]:
-    """Return the number and what stands behind it."""
+    """Split a quantity into its number and its unit text."""
     match = _QUANTITY.fullmatch(text)
     if match is None or not isfinite(float(match[1])):
         example = f"a number in {unit}, e.g. 2 {unit}" if unit else "a number"
@@ -94,7 +94,7 @@ def split_quantity(text: str, unit: str, name: str) -> tuple[float, str]:
 
 
 def _scale_of_unit(stated: str, unit: str, text: str, name: str) -> float:
-    """How many of `unit` the given unit is worth."""
+    """Return the factor that converts the stated unit to `unit`."""
     stated_unit, target_unit = _normalised_unit(stated), _normalised_unit(unit)
     if stated_unit == target_unit:
         return 1.0
@@ -103,14 +103,14 @@ def _scale_of_unit(stated: str, unit: str, text: str, name: str) -> float:
         if stated_unit in kind:
             return float(f"{kind[stated_unit] / kind[target_unit]:.15g}")  # 1000 mm in a m, not 1000.0000000000001
     if not unit:
-        raise InputError(f"{name} is {text!r}", allowed="a number without unit")
+        raise InputError(f"{name} is {text!r}", allowed="a number without a unit")
     fitting_units = [u for kind in fitting for u in kind if u != target_unit]
     also = f" (or {', '.join(fitting_units)})" if fitting_units else ""
     raise InputError(f"{name} is {text!r}, in {stated!r}", remedy=f"give it in {unit}{also}")
 
 
 def _normalised_unit(unit: str) -> str:
-    """One spelling for all: no blanks, dots or carets, u for µ, deg for °, sqrt for √."""
+    """Normalise the spelling: no blanks, dots or carets, u for µ, deg for °, sqrt for √."""
     for sign, plain in (("µ", "u"), ("μ", "u"), ("°", "deg"), ("√", "sqrt"), ("²", "2"), ("³", "3")):
         unit = unit.replace(sign, plain)
     return re.sub(r"[\s·*^]", "", unit)
@@ -120,13 +120,13 @@ MAX_PROFILE_BYTES = 50_000_000
 
 
 def read_profile(text: str, name: str, unit: str, duration_s: float) -> Profile:
-    """Return a profile from "500rpm", "300..1500rpm" (in a straight line over the duration) or a CSV file.
+    """Return a profile from "500rpm", "300..1500rpm" (linear over the duration) or a CSV file.
 
     Parameters
     ----------
     text : str
     name : str
-        The column's, with its unit: "speed_rpm".
+        Column of the CSV file, with its unit: "speed_rpm".
     unit : str
     duration_s : float
     """
@@ -144,7 +144,7 @@ def read_profile(text: str, name: str, unit: str, duration_s: float) -> Profile:
 
 
 def _span_messages(profile: Profile, duration_s: float) -> list[str]:
-    """Return what is said of a profile that does not span the recording."""
+    """Return messages about a profile that does not span the recording."""
     first_s, last_s = float(profile.times_s[0]), float(profile.times_s[-1])
     begins = f"begins at {first_s:g} s; its first value is held from 0 s"
     ends = f"ends at {last_s:g} s of {duration_s:g} s; its last value is held"
@@ -163,7 +163,7 @@ def read_profile_file(path: Path, name: str) -> Profile:
     except OSError as error:
         raise InputError(f"cannot be read ({error.strerror})", where=str(path), remedy="check the path") from None
     except (UnicodeDecodeError, csv.Error):
-        raise InputError("is not a CSV text in UTF-8", where=path.name) from None
+        raise InputError("is not a CSV file in UTF-8", where=path.name) from None
     titles = [cell.strip() for cell in rows[0][1]] if rows else []
     if titles != ["time_s", name] or len(rows) < 2:
         raise InputError(

@@ -1,4 +1,4 @@
-"""`gearsig show METHOD`: a command for each method of the table, as figure, table, arrays and numbers."""
+"""`gearsig show METHOD`: a command for each method, which gives figure, table, arrays and numbers."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 
 
 def _common(
-    recording: Annotated[Path, typer.Argument(help="Recording to look at.")],
+    recording: Annotated[Path, typer.Argument(help="Recording to analyse.")],
     channel: Annotated[str, typer.Option(metavar="NAME", help="Default: the first acceleration.")] = "",
     part_from: Annotated[
-        str | None, typer.Option("--from", metavar="TIME", help="Start of the part looked at.")
+        str | None, typer.Option("--from", metavar="TIME", help="Start of the part to analyse.")
     ] = None,
-    part_to: Annotated[str | None, typer.Option("--to", metavar="TIME", help="End of the part looked at.")] = None,
+    part_to: Annotated[str | None, typer.Option("--to", metavar="TIME", help="End of the part to analyse.")] = None,
     rig: options.RigOption = None,
     fs: options.SamplingRateOption = None,
     speed_rpm: options.SpeedOption = None,
@@ -36,18 +36,18 @@ def _common(
             "--memory",
             metavar="GB",
             min=0.25,
-            help="Memory for one recording. Of a longer one, density, maps, average and envelope are computed in "
-            "blocks; the others ask for a part.",
+            help="Memory for one recording. For a longer one, density, maps, average and envelope are computed in "
+            "blocks; the others need --from and --to.",
         ),
     ] = 2.0,
     json: options.JsonOption = False,
     output: Annotated[Path | None, options.output_option("Folder for METHOD.png, .svg, .csv, .h5 and .json.")] = None,
 ) -> None:
-    """Hold what every method takes."""
+    """Hold the options that every method takes."""
 
 
 class MethodGroup(TyperGroup):
-    """The methods as commands, made when they are asked for: the table loads heavy libraries."""
+    """The methods as commands, built on demand because the table of methods loads heavy libraries."""
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names of the methods."""
@@ -86,14 +86,14 @@ show = typer.Typer(
 
 @show.callback()
 def _list(
-    list_all: Annotated[bool, typer.Option("--list", help="Print every method and what it takes.")] = False,
+    list_all: Annotated[bool, typer.Option("--list", help="Print every method and its options.")] = False,
 ) -> None:
     if list_all:
         _print_methods()
 
 
 def modes(context: typer.Context) -> None:
-    """Take a channel apart into variational modes; --then transforms the chosen one, as noisy records of cracks need.
+    """Decompose a channel into variational modes; --then transforms the chosen mode, as noisy crack records need.
 
     The same as gearsig show modes.
 
@@ -111,7 +111,7 @@ def flag(option: MethodOption) -> str:
 
 
 def _command(name: str, method: Method) -> Any:
-    """Return the command of a method: what every method takes, and its own options."""
+    """Return the command of a method, with the common options and its own."""
 
     def call(**given: Any) -> None:
         _answer(name, method, **given)
@@ -164,7 +164,7 @@ def _completion(option: MethodOption) -> Callable[[str], list[str]] | None:
 
 
 def _value(option: MethodOption, given: Any) -> Any:
-    """Return what was typed, as the method takes it."""
+    """Convert a typed value to what the method takes."""
     if option.kind == "numbers":
         return _numbers(given or "", flag(option))
     if given is None:
@@ -230,7 +230,7 @@ def _print_methods() -> None:
         typer.echo(f"{name:<{width}}  {method.about}")
         if method.options:
             typer.echo(f"{'':<{width}}  {', '.join(flag(option) for option in method.options)}")
-    typer.echo("Each takes --channel, --from and --to besides; gearsig show METHOD --help says what they mean.")
+    typer.echo("Each also takes --channel, --from and --to; see gearsig show METHOD --help.")
 
 
 def _numbers(text: str, name: str) -> tuple[float, ...]:

@@ -1,4 +1,4 @@
-"""`gearsig simulate`: a recording from a model; `sweep`: a grid of them; `bifurcation`: how the motion changes."""
+"""`gearsig simulate`: a recording from a model; `sweep`: a grid of them; `bifurcation`: bifurcation diagrams."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def simulate(
     model: Annotated[str | None, typer.Argument(help="Model, e.g. cracked; --list shows them.")] = None,
     preset: options.PresetOption = "",
     mode: Annotated[
-        str, typer.Option("--mode", help="Of the model forging: start-stop or continuous; short for --set mode=….")
+        str, typer.Option("--mode", help="Model forging: start-stop or continuous; short for --set mode=….")
     ] = "",
     settings: options.SetOption = None,
     effects: options.EffectOption = None,
@@ -42,7 +42,7 @@ def simulate(
     seed: options.SeedOption = 0,
     fresh: options.FreshOption = False,
     output: Annotated[Path | None, options.output_option("Recording: .csv .h5 .parquet .wav or .mat.", "FILE")] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace files that exist.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
     listing: Annotated[
         bool, typer.Option("--list", help="Show models, presets, parameters with units and ranges, effects.")
     ] = False,
@@ -52,8 +52,8 @@ def simulate(
 ) -> None:
     """Simulate a machine, healthy or with faults, and write the recording that a measurement would have given.
 
-    Beside FILE stand its rig file (NAME.toml) and what was put in (NAME.truth.json). Everything else in gearsig reads
-    the recording as it reads a measured one.
+    Its rig file (NAME.toml) and the simulated condition (NAME.truth.json) are written next to FILE. All of gearsig
+    reads the recording like a measured one.
 
     Example: gearsig simulate cracked --preset published_55_75 --effect root_crack=2mm,tooth=21 -o crack.h5
     """
@@ -89,12 +89,12 @@ def simulate(
         write_set(recording, names)
     typer.echo(f"{names.recording}: {recording.duration_s:g} s at {recording.sampling_rate_hz:g} Hz, ", nl=False)
     typer.echo(f"channels {', '.join(recording.channel_names)}")
-    typer.echo(f"Beside it: {names.rig.name} (rig), {names.truth.name} (what was put in).")
+    typer.echo(f"Next to it: {names.rig.name} (rig), {names.truth.name} (simulated condition).")
     for warning in recording.warnings:
         typer.echo(f"Note: {warning}", err=True)
     typer.echo(f"Next: gearsig analyze {names.recording}")
     if recording.rig is not None and recording.rig.contact is not None:
-        typer.echo("It holds the motion of both gears: gearsig start-stop, force and identify read it as well.")
+        typer.echo("It contains the motion of both gears: gearsig start-stop, force and identify read it, too.")
 
 
 def _convergence(request: Simulation) -> str:
@@ -106,7 +106,7 @@ def _convergence(request: Simulation) -> str:
 
 
 def preset_text(preset: Preset) -> str:
-    """Return all that is known of a preset."""
+    """Return everything known about a preset as text."""
     lines = [f"{preset.name}: {preset.title}", f"  {preset.speed_rpm:g} rpm, {preset.torque_nm:g} N m at the input"]
     for title, texts in (
         ("Sources", preset.sources),
@@ -142,7 +142,7 @@ def _model_text(simulator: Simulator) -> str:
     missing_effects = [name for name in effects() if name not in simulator.effects]
     lacking = [f"{', '.join(missing_effects)}: not represented."] if missing_effects else []
     if lacking or simulator.meaningless:
-        parts.append("Effects without a meaning here")
+        parts.append("Effects that have no meaning here")
         parts += [_wrapped(text, "  ", "  ") for text in (*lacking, *simulator.meaningless)]
     return "\n\n".join(parts)
 
@@ -194,7 +194,7 @@ def _columns(rows: Iterable[tuple[str, str]], indent: int = 2) -> str:
 
 
 def _wrapped(text: str, first: str, later: str) -> str:
-    """Wrap to 100 columns, wherever it is printed to; a narrower terminal gets less."""
+    """Wrap to 100 columns, or to the width of a narrower terminal."""
     width = 100
     if sys.stdout.isatty():
         width = max(60, min(width, shutil.get_terminal_size().columns))
@@ -207,7 +207,7 @@ def _wrapped(text: str, first: str, later: str) -> str:
 
 
 MAX_REASONS = 5
-"""Failures that are printed; the files hold them all."""
+"""Maximum number of failures printed; the files hold all of them."""
 
 
 def sweep(
@@ -217,7 +217,7 @@ def sweep(
         typer.Option(
             "--vary",
             metavar="NAME=VALUES",
-            help="speed=300..1500rpm:10 (from, to, how many), root_crack=0..4mm:5,gear=driven or "
+            help="speed=300..1500rpm:10 (from, to, number), root_crack=0..4mm:5,gear=driven or "
             "torque=20,50,110Nm; repeatable. NAME is speed, torque, a parameter or an effect.",
         ),
     ],
@@ -234,7 +234,7 @@ def sweep(
         bool,
         typer.Option(
             "--common-seed",
-            help="Draw the same noise and tolerances at every point, to compare points. Default: each its own.",
+            help="Draw the same noise and tolerances at every point, to compare points. Default: new ones at each.",
         ),
     ] = False,
     extension: Annotated[str, typer.Option("--format", metavar="EXT", help="csv, h5, parquet, wav or mat.")] = "h5",
@@ -243,8 +243,8 @@ def sweep(
 ) -> None:
     """Simulate a grid of conditions and faults on all processors, into a folder with an index.
 
-    It can be stopped with Ctrl-C at any time; the same command goes on from what is complete. The exit code is 1 if
-    some points could not be simulated (2 if none could); the index says why.
+    It can be stopped with Ctrl-C at any time; the same command continues from what is complete. The exit code is 1 if
+    some points could not be simulated (2 if none could be); the index says why.
 
     Example: gearsig sweep cracked --vary speed=300..1500rpm:10 --vary root_crack=0..4mm:10 --duration 1s -o grid
     """
@@ -264,7 +264,7 @@ def sweep(
     if len(result.failures) > MAX_REASONS:
         typer.echo(f"… and {len(result.failures) - MAX_REASONS} more points: see the index", err=True)
     n_made = len(result.outcomes) - len(result.failures)
-    kept = f"; {result.n_found} were there already" if result.n_found else ""
+    kept = f"; {result.n_found} existed already" if result.n_found else ""
     typer.echo(f"{result.n_points} points, {n_made} simulated{kept}. They are listed in {result.index_path}.{ran}")
     if result.failures:
         raise typer.Exit(EXIT_SOME_FAILED if n_made + result.n_found else EXIT_INPUT_ERROR)
@@ -277,7 +277,7 @@ def bifurcation(
         typer.Option(
             "--vary",
             metavar="NAME=VALUES",
-            help="speed=600..3000rpm:100 (from, to, how many), torque=5..50Nm:40, half_backlash_um=0..60:40, "
+            help="speed=600..3000rpm:100 (from, to, number), torque=5..50Nm:40, half_backlash_um=0..60:40, "
             "root_crack=0..4mm:20. NAME is speed, torque, a parameter or an effect.",
         ),
     ],
@@ -289,9 +289,9 @@ def bifurcation(
     torque: options.SimulatedTorqueOption = None,
     section: Annotated[
         str,
-        typer.Option("--section", metavar="CYCLE", help="A point once per mesh cycle (mesh) or revolution (shaft)."),
+        typer.Option("--section", metavar="CYCLE", help="One point per mesh cycle (mesh) or per revolution (shaft)."),
     ] = "mesh",
-    phase: Annotated[float, typer.Option("--phase", help="Place in the cycle at which the point lies, 0 to 1.")] = 0.0,
+    phase: Annotated[float, typer.Option("--phase", help="Position of the point in the cycle, 0 to 1.")] = 0.0,
     signal: Annotated[
         str,
         typer.Option(
@@ -300,20 +300,20 @@ def bifurcation(
         ),
     ] = "transmission_error_m",
     points: Annotated[
-        int | None, typer.Option("--points", help="Points at each value; default 100, 400 with --kind.")
+        int | None, typer.Option("--points", help="Points at each value; default 100, or 400 with --kind.")
     ] = (None),
     direction: Annotated[
         str,
         typer.Option(
             "--direction",
-            help="up or down, each value from where the last one ended; both shows hysteresis; rest: each from rest.",
+            help="up or down: each value starts from the last state; both shows hysteresis; rest: each from rest.",
         ),
     ] = "both",
     kind: Annotated[
         bool,
         typer.Option(
             "--kind",
-            help="Also the kind of motion at each value, told over ranges: Lyapunov exponent, 0–1 test. Takes longer.",
+            help="Also classify the motion at each value, by ranges: Lyapunov exponent, 0–1 test. Takes longer.",
         ),
     ] = False,
     fs: options.RateOption = "20480Hz",
@@ -323,8 +323,8 @@ def bifurcation(
 ) -> None:
     """Draw a bifurcation diagram: Poincaré points of the steady motion over speed, load, backlash, or anything else.
 
-    At each value the transient is left out: 8 time constants of the machine's slowest decay. It can be stopped with
-    Ctrl-C at any time; the same command goes on from what is complete.
+    At each value the transient, 8 time constants of the machine's slowest decay, is left out. It can be stopped with
+    Ctrl-C at any time; the same command continues from what is complete.
 
     Example: gearsig bifurcation cracked --preset symmetric_50_50 --torque 20Nm --vary speed=1600..2400rpm:41 -o jump
     """
@@ -351,7 +351,7 @@ def bifurcation(
 
 
 def _print_bifurcation(request: BifurcationRequest, values: Values, output: Path) -> None:
-    """Write the results and say what they show."""
+    """Write the results and print a summary."""
     from app import bifurcation as study
 
     paths = study.write_results(request, values, output)
@@ -378,7 +378,7 @@ def _print_bifurcation(request: BifurcationRequest, values: Values, output: Path
 
 
 def sweep_of(request: Simulation, vary: Sequence[str], common_seed: bool, extension: str) -> Sweep:
-    """Return the sweep that the options ask for."""
+    """Return the sweep that the options describe."""
     from sims.registry import simulator
     from sims.sweep import Sweep
 
@@ -387,14 +387,12 @@ def sweep_of(request: Simulation, vary: Sequence[str], common_seed: bool, extens
     varied = [axis.name for axis in axes]
     for name, value in (("speed_rpm", request.speed_rpm), ("torque_nm", request.torque_nm)):
         if name in varied and value is not None:
-            raise InputError(
-                f"{name} is given, and varied", remedy=f"leave one of --{name.split('_')[0]} and --vary out"
-            )
+            raise InputError(f"{name} is both given and varied", remedy=f"leave out --{name.split('_')[0]} or --vary")
     return Sweep(axes=axes, common_seed=common_seed, extension=extension, **vars(request))
 
 
 def read_axis(model: Simulator, text: str) -> Axis:
-    """Return the axis of "speed=300..1500rpm:10" or "root_crack=0,1,2mm,gear=driven"."""
+    """Parse an axis such as "speed=300..1500rpm:10" or "root_crack=0,1,2mm,gear=driven"."""
     from sims.effects import effect
     from sims.simulator import parameter
     from sims.sweep import Axis
@@ -415,7 +413,7 @@ def read_axis(model: Simulator, text: str) -> Axis:
     if not unit:
         varied = parameter(model.parameters, name)
         if varied.choices:
-            raise InputError(f"{name} is a word", where="--vary", allowed="numbers", remedy="give it with --set")
+            raise InputError(f"{name} is not a number", where="--vary", allowed="numbers", remedy="set it with --set")
         unit = varied.unit
     if settings:
         raise InputError(f"{name} has no options", where="--vary", remedy=f"leave out {settings[0]}")
@@ -423,7 +421,7 @@ def read_axis(model: Simulator, text: str) -> Axis:
 
 
 def read_values(items: Sequence[str], unit: str, name: str) -> tuple[float, ...]:
-    """Return the values of ["0..4mm:5"] or ["0", "1", "2mm"]; the last one's unit holds for those without."""
+    """Parse values such as ["0..4mm:5"] or ["0", "1", "2mm"]; values without a unit take that of the last."""
     if len(items) == 1 and ".." in items[0]:
         reach, sign, number = items[0].rpartition(":")
         if not sign or not number.strip().isdigit() or int(number) < 2:

@@ -1,4 +1,4 @@
-"""Three publications: their figures beside the model's own, each statement judged by numbers, and the page of both."""
+"""Three publications: their figures as computed by the models, statements checked by numbers, and the page of both."""
 
 from __future__ import annotations
 
@@ -26,22 +26,22 @@ PAPERS: Mapping[str, str] = {
     "reduced-fe": "Flexible gear wheels of reduced finite elements",
     "forging": "Start–stop drive of a forging manipulator",
 }
-"""The publications by the names that the command knows them by."""
+"""The publications by their names in the command."""
 
 
 @dataclass(frozen=True)
 class Claim:
-    """A statement of the publication and what the model gives.
+    """A statement of the publication and the corresponding result of the model.
 
     Parameters
     ----------
     statement : str
-        With its number.
+        The statement with its number.
     number : str
-        The model's number.
+        The number from the model.
     verdict : str
     because : str
-        Where it does not agree, or in part: why.
+        The reason, if it does not agree or agrees only in part.
     """
 
     statement: str
@@ -59,7 +59,7 @@ class Claim:
 
 
 def judged(statement: str, number: str, *, agrees: bool, partly: bool = False, because: str = "") -> Claim:
-    """Return a claim with the verdict that two comparisons of numbers give."""
+    """Return a claim whose verdict follows from two comparisons of numbers."""
     return Claim(
         statement,
         with_minus(number),
@@ -69,7 +69,7 @@ def judged(statement: str, number: str, *, agrees: bool, partly: bool = False, b
 
 
 def within_part(statement: str, published: float, value: float, unit: str, *, part: float, because: str = "") -> Claim:
-    """Return a claim that agrees within a part of the published number, and in part within three times that."""
+    """Return a claim that agrees within the fraction `part` of the published number, in part within three times it."""
     away = abs(value / published - 1.0)
     more_percent = 100.0 * (value / published - 1.0)
     text = f"{value:.4g} {unit} ({more_percent:{'+.2g' if abs(more_percent) < 99.5 else '+.0f'}} %)"
@@ -78,14 +78,14 @@ def within_part(statement: str, published: float, value: float, unit: str, *, pa
 
 @dataclass(frozen=True)
 class PaperFigure:
-    """One figure of the model that answers one or more of the publication's.
+    """A figure of the model that corresponds to one or more figures of the publication.
 
     Parameters
     ----------
     name : str
-        Of its file.
+        File name.
     answers : str
-        The publication's figures, e.g. "Figures 10 and 11".
+        Figures of the publication, e.g. "Figures 10 and 11".
     title : str
     figure : Figure
     claims : tuple of Claim
@@ -100,16 +100,16 @@ class PaperFigure:
 
 @dataclass(frozen=True)
 class Paper:
-    """A publication as the model answers it.
+    """A publication and the model's figures for it.
 
     Parameters
     ----------
     name, title, source : str
     machine : str
-        The preset, and what it assumes.
+        The preset and its assumptions.
     figures : tuple of PaperFigure
     unanswered : mapping
-        Figure of the publication → why there is none of the model.
+        Figure of the publication → why the model has no figure for it.
     """
 
     name: str
@@ -121,7 +121,7 @@ class Paper:
 
     @property
     def summary(self) -> str:
-        """How many statements agree."""
+        """Number of statements that agree, as a sentence."""
         verdicts = [claim.verdict for figure in self.figures for claim in figure.claims]
         n = len(verdicts)
         agree, part = verdicts.count("agrees"), verdicts.count("agrees in part")
@@ -136,7 +136,7 @@ def paper(name: str, on_progress: Progress = lambda _stage, _done: None) -> Pape
     name : str
         One of `PAPERS`.
     on_progress : callable
-        Told what is computed and how much is done, 0 to 1.
+        Takes the current stage and the fraction completed, 0 to 1.
     """
     one_of(name, "paper", tuple(PAPERS))
     module = import_module(f"app.papers.{name.replace('-', '_')}")
@@ -145,7 +145,7 @@ def paper(name: str, on_progress: Progress = lambda _stage, _done: None) -> Pape
 
 
 def write_paper(publication: Paper, folder: Path, *, command: str = "") -> tuple[Path, ...]:
-    """Write each figure as PNG and SVG, the claims as JSON, and the page that shows them beside each other."""
+    """Write each figure as PNG and SVG, the claims as JSON, and the page that shows both side by side."""
     from gearsig.report import Section, benchmark_html, write_folder
 
     header = ("the publication says", "the model gives", "verdict")
@@ -154,13 +154,13 @@ def write_paper(publication: Paper, folder: Path, *, command: str = "") -> tuple
             f"{item.answers}: {item.title}",
             header=header,
             rows=tuple((claim.statement, claim.number, claim.judgement) for claim in item.claims),
-            pictures=(embed(item.figure, "", f"{item.title}, as the model gives it"),),
+            pictures=(embed(item.figure, "", f"{item.title}, computed by the model"),),
             is_prose=True,
         )
         for item in publication.figures
     ]
     rows = tuple(publication.unanswered.items())
-    sections.append(Section("Figures without an answer", header=("figure", "why"), rows=rows, is_prose=True))
+    sections.append(Section("Figures without a counterpart", header=("figure", "reason"), rows=rows, is_prose=True))
     facts = [("publication", publication.source), ("machine", publication.machine)]
     facts += [("command", command)] if command else []
     page = benchmark_html(publication.title, publication.summary, sections, facts, datetime.now().astimezone())

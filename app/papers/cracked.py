@@ -1,6 +1,6 @@
 """The cracked spur pair: friction, backlash, stiffness with friction and cracks, responses, time and frequency.
 
-Machine: preset "published_55_75". Every run draws the same random phases, so that cases differ in one thing only.
+Machine: preset "published_55_75". Every run draws the same random phases, so that cases differ in only one respect.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ CRACKED_TOOTH = 20  # from 0, as mesh cycles count; the parameter counts from 1
 SEED = 1
 SETTLING_S = 0.5
 REACH_THRESHOLD = 0.01
-"""The reach of a crack ends where the change stays below this part of the healthy gear's rms for a mesh cycle."""
+"""The effect of a crack ends once the change stays below this fraction of the healthy rms for a mesh cycle."""
 PUBLISHED_LINES_HZ = (17.9, 26.9, 39.4, 59.1, 89.6, 133.4, 200.5, 300.8, 451.2, 667.7, 1016.0, 1524.0)
 SOURCE = (
     "Vibration characteristics of a spur gear system with a root crack, time-varying friction and dynamic backlash: 16 "
@@ -55,36 +55,36 @@ SOURCE = (
 
 
 def machine(**changed: ParameterValue) -> Machine:
-    """Return the preset's machine with some values changed."""
+    """Return the machine of the preset with some values changed."""
     return build_machine(complete_values(PARAMETERS, PRESET.parameters, changed))
 
 
 SOFT_SUPPORTS: Mapping[str, ParameterValue] = {"bending_stiffness_n_per_m": 2e7, "bearing_stiffness_n_per_m": 2e7}
-"""A tenth of what the preset assumes of shafts and bearings."""
+"""A tenth of the shaft and bearing stiffness assumed by the preset."""
 
 
 def rough(roughness_um: float, **changed: ParameterValue) -> Machine:
-    """Return it with a roughness; smooth flanks run without friction, as in the study."""
+    """Return the machine with a roughness; smooth flanks run without friction, as in the study."""
     return machine(roughness_um=roughness_um, friction="on" if roughness_um > 0 else "off", **changed)
 
 
 def cracked(depth_mm: float) -> Machine:
-    """Return it with a crack in one tooth of the pinion."""
+    """Return the machine with a crack in one tooth of the pinion."""
     return machine(crack_depth_mm=depth_mm, crack_tooth=CRACKED_TOOTH + 1)
 
 
 def crack_name(depth_mm: float) -> str:
-    """Name a crack."""
+    """Return the name of a crack depth for legends."""
     return f"crack {depth_mm:g} mm" if depth_mm else "no crack"
 
 
 def rq_name(roughness_um: float) -> str:
-    """Name a roughness."""
+    """Return the name of a roughness for legends."""
     return f"{roughness_um:.2f} µm"
 
 
 def steady(rig: Machine, duration_s: float, *signals: str, rpm: float = RPM) -> Response:
-    """Run at the preset's torque, and its speed unless another one is given."""
+    """Run at the torque of the preset, and at its speed unless another one is given."""
     rng = np.random.default_rng(SEED)
     operation = PRESET.operation if rpm == RPM else Operation.steady(rpm, TORQUE_NM)
     return respond(rig, operation, duration_s=duration_s, rng=rng, signals=signals)
@@ -92,7 +92,7 @@ def steady(rig: Machine, duration_s: float, *signals: str, rpm: float = RPM) -> 
 
 @cache
 def mesh_frequency_hz() -> float:
-    """Return the teeth that pass per second."""
+    """Return the mesh frequency in Hz."""
     return RPM / 60.0 * machine().mesh.pair.driver.teeth
 
 
@@ -100,7 +100,7 @@ def mesh_frequency_hz() -> float:
 
 
 def friction_curves() -> tuple[FloatArray, dict[str, FloatArray]]:
-    """Friction coefficient of one pair from entry to exit, signed by the direction of sliding."""
+    """Return the friction coefficient of one pair from entry to exit, signed by the direction of sliding."""
     mesh, viscosity = machine().mesh, machine().lubrication.viscosity_cp
     cycles = np.linspace(0.0, mesh.pair.contact_ratio, 601)
     slot = np.floor(cycles + mesh.ramp / 2.0).astype(int)
@@ -113,7 +113,7 @@ def friction_curves() -> tuple[FloatArray, dict[str, FloatArray]]:
 
 
 def friction_roughness() -> Figure:
-    """Draw the friction coefficient."""
+    """Draw the friction coefficient at four roughnesses."""
     pair = machine().mesh.pair
     cycles, curves = friction_curves()
     return plot.friction_figure(
@@ -122,7 +122,7 @@ def friction_roughness() -> Figure:
         pitch_point=(pair.pitch_point_radius_mm - pair.start_radius_mm) / pair.base_pitch_mm,
         single_pair=(pair.contact_ratio - 1.0, 1.0),
         heading="roughness Rq",
-        title=f"Friction coefficient of a tooth pair, {RPM:g} rpm, {TORQUE_NM:g} N·m (shaded: it carries alone)",
+        title=f"Friction coefficient of a tooth pair, {RPM:g} rpm, {TORQUE_NM:g} N·m (shaded: single contact)",
     )
 
 
@@ -131,7 +131,7 @@ def _friction() -> PaperFigure:
     rise, surge = largest[2] / largest[1], largest[3] / largest[2]
     values = ", ".join(f"{mu:.3f}" for mu in largest)
     claim = judged(
-        "the coefficient varies little for Rq of 0 to 0.84 µm and is great above",
+        "the coefficient varies little for Rq of 0 to 0.84 µm and is large above",
         f"at most {values} at 0, 0.45, 0.84 and 1.40 µm: × {rise:.2f} up to 0.84 µm, "
         f"× {surge:.2f} from there to 1.40 µm",
         agrees=surge > 1.5 * rise,
@@ -142,9 +142,9 @@ def _friction() -> PaperFigure:
         f"the regression gives {largest[0]:.3f}",
         agrees=largest[0] < 1e-3,
         partly=not rough(0.0).lubrication.friction,
-        because="the study sets it so against its equation, which has the roughness in exp(b₉ e^S) only: from 0.45 µm "
-        f"to 0 that is a factor of {largest[0] / largest[1]:.2f}, not 0, as a film shears between smooth flanks, too. "
-        "Runs at Rq 0 are made without friction, as there",
+        because="the study sets it to 0 contrary to its equation, in which the roughness occurs only in exp(b₉ e^S): "
+        f"from 0.45 µm to 0 that is a factor of {largest[0] / largest[1]:.2f}, not 0, as smooth flanks also shear a "
+        "film. Runs at Rq 0 are made without friction, as in the study",
     )
     return PaperFigure(
         "friction", "Figure 7", "friction coefficient at four roughnesses", friction_roughness(), (claim, zero)
@@ -152,7 +152,7 @@ def _friction() -> PaperFigure:
 
 
 def backlash_lines() -> tuple[FloatArray, dict[str, FloatArray], FloatArray, dict[str, FloatArray], list[float]]:
-    """Return time, half backlash locked to time, frequencies, spectra, and the lines that the profile consists of."""
+    """Return time, half backlash as a function of time, frequencies, spectra, and the lines of the profile."""
     rate_hz, half_m = 8192.0, machine().half_backlash_um * 1e-6
     time = np.arange(round(4.0 * rate_hz)) / rate_hz
     curves: dict[str, FloatArray] = {}
@@ -171,7 +171,7 @@ def backlash_lines() -> tuple[FloatArray, dict[str, FloatArray], FloatArray, dic
 
 
 def backlash_roughness() -> Figure:
-    """Draw the backlash locked to time, and the lines that it consists of."""
+    """Draw the backlash as a function of time, and the lines that it consists of."""
     time, curves, positions, amplitudes, lines = backlash_lines()
     return plot.backlash_figure(
         time,
@@ -192,7 +192,7 @@ def _backlash() -> PaperFigure:
         "lines at 17.9, 26.9, 39.4, 59.1, 89.6, 133.4, 200.5, 300.8, 451.2, 667.7, 1016 and 1524 Hz",
         f"twelve lines, within {100 * worst:.1f} % of them",
         agrees=worst < 0.02,
-        because="the frequencies of the fractal are other ones",
+        because="the frequencies of the fractal differ",
     )
     levels = [float(np.sqrt(np.sum(values**2) / 2.0)) for values in amplitudes.values()]
     grows = judged(
@@ -220,7 +220,7 @@ def pairs_with_friction(roughness_um: float, cycles: FloatArray, *, squared: boo
     friction = friction_over_mesh(mesh, TORQUE_NM, RPM, rig.lubrication.viscosity_cp, roughness_um, cycles)
     newest = np.floor(cycles + mesh.ramp / 2.0)
     progress = np.clip((cycles - newest)[:, None] + np.arange(pairs.shape[1]), 0.0, pair.contact_ratio)
-    mu = friction.coefficient * np.sign(friction.sliding_mps)  # above 0 in approach: stiffer
+    mu = friction.coefficient * np.sign(friction.sliding_mps)  # positive in approach: stiffer
     added = np.zeros(pairs.shape)
     for slot in range(pairs.shape[1]):
         rho = pair.contact_radii_mm(progress[:, slot])
@@ -236,7 +236,7 @@ def pairs_with_friction(roughness_um: float, cycles: FloatArray, *, squared: boo
 
 
 def stiffness_with_friction(roughness_um: float, cycles: FloatArray, *, squared: bool = False) -> FloatArray:
-    """Return the stiffness of the mesh with friction inside it."""
+    """Return the mesh stiffness with friction inside it, (n,), in N/m."""
     total: FloatArray = pairs_with_friction(roughness_um, cycles, squared=squared).sum(axis=1)
     return total
 
@@ -265,31 +265,31 @@ def _friction_inside() -> PaperFigure:
         title="Friction inside the stiffness",
         heading="",
     )
-    # Well inside single and double contact: where a pair takes up its load or lets go, its ramp hides the friction.
+    # Well inside single and double contact: at engagement and disengagement the load ramp hides the friction.
     single = (cycles % 1.0 > ratio - 1.0 + 0.05) & (cycles % 1.0 < 0.95)
     double = ~single & (cycles % 1.0 > 0.05) & (cycles % 1.0 < ratio - 1.0 - 0.05)
-    # Of one single contact its first and last place: sliding turns round in between.
+    # First and last position of a single contact: the sliding direction reverses in between.
     of_single = np.flatnonzero(single & (cycles < 1.0))
     first, last = float(change[of_single[0]]), float(change[of_single[-1]])
     means = [100.0 * float(np.mean(values[double])) for values in changes.values()]
-    # What either pair of a double contact does by itself: their changes nearly cancel in the sum.
+    # Change of each pair of a double contact by itself: the changes nearly cancel in the sum.
     pairs = pairs_with_friction(1.40, cycles[double]) / mesh_stiffness(mesh, cycles[double]).pairs_n_per_m
     entering, leaving = (100.0 * float(np.mean(pairs[:, slot]) - 1.0) for slot in (0, 1))
     claims = (
         judged(
-            "where one pair carries, the stiffness goes up, then down, as friction turns round at the pitch point",
+            "in single contact the stiffness rises, then falls, as friction reverses at the pitch point",
             f"at Rq 1.40 µm by {100 * first:+.2f} % in approach and {100 * last:+.2f} % in recess",
             agrees=first > 0.0 > last,
         ),
         judged(
-            "where two pairs carry, it decreases with roughness, most at 1.40 µm",
+            "in double contact it decreases with roughness, most at 1.40 µm",
             f"by {', '.join(f'{m:+.2f}' for m in means)} % at 0.45, 0.84 and 1.40 µm",
             agrees=means[2] < means[1] < means[0] < 0.0,
             partly=means[2] < 0.0,
             because="the entering pair is in approach and stiffer, the leaving one in recess and softer, at 1.40 µm "
-            f"by {entering:+.2f} % and {leaving:+.2f} %, of which little remains. With the square as printed the "
-            f"sum changes by {', '.join(f'{100 * float(np.mean(v[double])):+.2f}' for v in squared.values())} %: what "
-            "falls there is its term μ² c_tt, the work of the friction",
+            f"by {entering:+.2f} % and {leaving:+.2f} %, which nearly cancel. With the square as printed the "
+            f"sum changes by {', '.join(f'{100 * float(np.mean(v[double])):+.2f}' for v in squared.values())} %: this "
+            "decrease comes from its term μ² c_tt, the work of the friction",
         ),
         judged(
             "friction is inside the strain energy, squared",
@@ -297,7 +297,7 @@ def _friction_inside() -> PaperFigure:
             f"c_nn ± μ c_nt: {100 * float(np.abs(change).max()):.1f} %",
             agrees=False,
             because="the square doubles the effect, and friction does no work on a deflection along the normal; the "
-            "simulator has it in the forces instead",
+            "simulator includes it in the forces instead",
         ),
     )
     return PaperFigure("friction_stiffness", "Figure 9", "stiffness with friction at four roughnesses", figure, claims)
@@ -321,7 +321,7 @@ def _crack_stiffness() -> PaperFigure:
     fe = [100.0 * (1.0 - v / by_elements[0]) for v in by_elements[1:]]
     claims = (
         judged(
-            "the stiffness of single contact falls with the crack's length",
+            "the stiffness in single contact falls with the length of the crack",
             f"by {', '.join(f'{d:.1f}' for d in drops)} % at 1 to 4 mm",
             agrees=bool(np.all(np.diff(lowest) < 0.0)),
         ),
@@ -330,7 +330,7 @@ def _crack_stiffness() -> PaperFigure:
             f"finite elements: by {', '.join(f'{d:.1f}' for d in fe)} %",
             agrees=bool(np.all(np.abs(np.array(fe) / drops - 1.0) < 0.1)),
             partly=bool(np.all(np.diff(by_elements) < 0.0)),
-            because="they fall alike, but the lines behind a crack leave out half of what the crack gives way",
+            because="both fall alike, but the limiting lines behind a crack omit half of its added compliance",
         ),
     )
     return PaperFigure(
@@ -339,7 +339,7 @@ def _crack_stiffness() -> PaperFigure:
 
 
 def _stiffness_by_elements() -> list[float]:
-    """Mean stiffness where the cracked pair carries alone, healthy pair and what the crack adds by finite elements."""
+    """Return the mean stiffness in single contact of the cracked pair: healthy pair plus crack by finite elements."""
     rig, gear = machine(), ready_gear("z55_m2")
     pair = rig.mesh.pair
     at = np.linspace(0.82, 0.95, 40)
@@ -367,16 +367,17 @@ def _crack_laws() -> PaperFigure:
         for place, title in ((n // 4, "low on the flank"), (n // 2, "halfway"), (3 * n // 4, "high on the flank"))
     ]
     figure = panels_figure(
-        panels, n_columns=3, title="What a crack adds, by law (55 teeth, module 2 mm, width 20 mm)", height_in=2.6
+        panels, n_columns=3, title="Compliance of a crack, by law (55 teeth, module 2 mm, width 20 mm)", height_in=2.6
     )
     whole = compare_crack_laws(ready_gear("z55_m2"), np.array([1.0, 2.0, 3.0, 4.0]))
     fe, line = (whole.added_m_per_n[name][:, n // 2] for name in ("finite elements", "limiting line"))
     claim = judged(
-        "the line behind the crack stands for what carries no load",
-        f"halfway up the flank it adds {', '.join(f'{v:.2f}' for v in line / fe)} of what elements do at 1 to 4 mm",
+        "the line behind the crack bounds the part that carries no load",
+        f"halfway up the flank it adds {', '.join(f'{v:.2f}' for v in line / fe)} of the compliance by finite elements "
+        "at 1 to 4 mm",
         agrees=bool(np.all(np.abs(line / fe - 1.0) < 0.15)),
         partly=bool(np.all(np.diff(line) > 0.0)),
-        because="the crack's mouth opens also by what lies below it; near the tip of the tooth the laws agree",
+        because="the deformation below the crack also opens its mouth; near the tip of the tooth the laws agree",
     )
     return PaperFigure(
         "crack_laws", "Figures 14 and 15", "laws of a crack: lines, and finite elements", figure, (claim,)
@@ -387,7 +388,7 @@ def _crack_laws() -> PaperFigure:
 
 
 def response_case(roughness_um: float, **changed: ParameterValue) -> ResponseCase:
-    """Run at a roughness; states once per mesh period of the mean rotation."""
+    """Run at a roughness, with Poincaré points once per mesh period of the mean rotation."""
     signals = ("driver angle", "driver y", "driver y velocity")
     rig = rough(roughness_um, **changed)
     run = steady(rig, SETTLING_S + 4.0, *signals)
@@ -395,7 +396,7 @@ def response_case(roughness_um: float, **changed: ParameterValue) -> ResponseCas
     time = run.time_s[settled] - SETTLING_S
     angle, y, v = (run[name][settled] for name in signals)
     spectrum = amplitude_spectrum(y - y.mean(), 1.0 / run.interval_s, window="blackman-harris")
-    # The mean rotation: the angle itself swings with the mesh, and a section on it would follow the swing.
+    # The mean rotation, because the angle oscillates with the mesh and a section based on it would follow.
     slope, start = np.polyfit(time, angle * rig.mesh.pair.driver.teeth / (2.0 * np.pi), 1)
     strobe = (np.arange(np.ceil(start), np.ceil(start) + 400.0) - start) / slope
     shown = time < 0.2
@@ -428,7 +429,7 @@ def _at(case: ResponseCase, hz: float) -> float:
 
 
 def _scatter(case: ResponseCase) -> float:
-    """How far the Poincaré points scatter, over the whole motion, in both directions of the phase plane together."""
+    """Return the scatter of the Poincaré points relative to the whole motion, over both phase-plane coordinates."""
     return float(
         np.hypot(
             np.std(case.poincare_displacement_m) / np.std(case.displacement_m),
@@ -440,12 +441,12 @@ def _scatter(case: ResponseCase) -> float:
 def _responses() -> PaperFigure:
     cases = [response_case(roughness) for roughness in ROUGHNESS_UM]
     mesh = mesh_frequency_hz()
-    # The same on softer shafts tells the resonance of a bending mode from what the mesh does.
+    # The same on softer shafts distinguishes the resonance of a bending mode from the effect of the mesh.
     harmonics = [_at(cases[0], k * mesh) for k in (1, 2, 3, 4)]
     softer = [_at(response_case(0.0, **SOFT_SUPPORTS), k * mesh) for k in (1, 2, 3, 4)]
     natural = eigenfrequencies_hz(machine(), TORQUE_NM / (1e-3 * machine().mesh.pair.driver.base_radius_mm))
     mode = float(natural[np.argmin(np.abs(natural - 3.0 * mesh))])
-    # The roughness's own lines, but for the one that the mesh frequency hides.
+    # The lines of the roughness, except the one hidden by the mesh frequency.
     lines = [[_at(case, hz) for hz in PUBLISHED_LINES_HZ if abs(hz - mesh) > 20.0] for case in cases]
     grown = [float(np.sqrt(np.sum(np.square(values)))) for values in lines]
     scatter = [_scatter(case) for case in cases]
@@ -456,8 +457,8 @@ def _responses() -> PaperFigure:
             f"harmonics 1 to 4: {', '.join(f'{1e6 * h:.2g}' for h in harmonics)} µm",
             agrees=bool(np.all(np.diff(harmonics) < 0.0)),
             partly=bool(np.all(np.diff(softer) < 0.0)),
-            because=f"with shafts and bearings as stiff as assumed a bending mode of {mode:.0f} Hz meets the "
-            f"third mesh harmonic, {3 * mesh:.0f} Hz; with a tenth of that stiffness they fall: "
+            because=f"with the assumed shaft and bearing stiffness, a bending mode at {mode:.0f} Hz coincides with "
+            f"the third mesh harmonic, {3 * mesh:.0f} Hz; with a tenth of that stiffness they fall: "
             f"{', '.join(f'{1e6 * h:.2g}' for h in softer)} µm",
         ),
         judged(
@@ -475,7 +476,7 @@ def _responses() -> PaperFigure:
             f"scatter {', '.join(f'{s:.2g}' for s in scatter)} of the motion",
             agrees=False,
             partly=bool(np.all(np.diff(scatter) > 0.0)),
-            because="they scatter more and more, but form a ring: a motion of many periods, not chaos",
+            because="the scatter increases, but the points form a ring: a motion of many periods, not chaos",
         ),
     )
     return PaperFigure(
@@ -502,8 +503,8 @@ def _friction_force() -> PaperFigure:
     floor = float(np.median(spectrum.values[spectrum.positions < 2000.0]))
     side = float(spectrum.values[near].max())
     claim = judged(
-        "sidebands appear near the mesh frequency and its harmonics by the friction",
-        f"the strongest within 60 Hz of the mesh frequency stands {20 * np.log10(side / floor):.0f} dB above the floor",
+        "friction causes sidebands near the mesh frequency and its harmonics",
+        f"the strongest within 60 Hz of the mesh frequency is {20 * np.log10(side / floor):.0f} dB above the floor",
         agrees=side > 10.0 * floor,
     )
     return PaperFigure(
@@ -515,7 +516,7 @@ def _friction_force() -> PaperFigure:
 
 
 def cycles_until_below(cycles: FloatArray, change: FloatArray, threshold: float) -> float:
-    """Mesh cycles from the cracked tooth's entry until the change stays below `threshold` for a whole mesh cycle."""
+    """Return the mesh cycles from the cracked tooth's entry until |change| stays below `threshold` for one cycle."""
     last = 0.0
     while last < 30.0:
         above = cycles[(cycles > last) & (cycles <= last + 1.0) & (np.abs(change) > threshold)]
@@ -526,7 +527,7 @@ def cycles_until_below(cycles: FloatArray, change: FloatArray, threshold: float)
 
 
 def crack_reach(signal: str = "driver y acceleration") -> tuple[FloatArray, dict[str, FloatArray], dict[str, float]]:
-    """Return revolutions, the signal at each crack depth, and how many mesh cycles the cracks are felt."""
+    """Return revolutions, the signal at each crack depth, and the mesh cycles for which each crack has an effect."""
     n_teeth = machine().mesh.pair.driver.teeth
     revolutions: FloatArray = np.arange(4.0, 7.0, 1.0 / (n_teeth * 100))
     values: dict[str, FloatArray] = {}
@@ -536,7 +537,7 @@ def crack_reach(signal: str = "driver y acceleration") -> tuple[FloatArray, dict
         values[crack_name(depth)] = CubicSpline(turned, run[signal])(revolutions)
     healthy = values[crack_name(0)]
     cycles = (revolutions - 5.0 - CRACKED_TOOTH / n_teeth) * n_teeth
-    # Of an acceleration that of its rms, of a transmission error that of its swing.
+    # The threshold is relative to the rms of an acceleration, to the oscillation of a transmission error.
     size = np.std(healthy) if "acceleration" in signal else np.ptp(healthy)
     threshold = REACH_THRESHOLD * float(size)
     reach = {
@@ -546,7 +547,7 @@ def crack_reach(signal: str = "driver y acceleration") -> tuple[FloatArray, dict
 
 
 def crack_comparison() -> Figure:
-    """Draw the pinion's acceleration over three revolutions at five crack depths, at equal angles."""
+    """Draw the pinion's acceleration over three revolutions at five crack depths, sampled at equal angles."""
     revolutions, values, reach = crack_reach()
     n_teeth = machine().mesh.pair.driver.teeth
     entry = CRACKED_TOOTH / n_teeth
@@ -569,12 +570,12 @@ def _cracks() -> PaperFigure:
     cycles = [reach[crack_name(d)] for d in CRACKS_MM[1:]]
     claims = (
         judged(
-            "an impact per revolution that is enhanced with the crack",
+            "one impact per revolution, which grows with the crack",
             f"{', '.join(f'{s:.3g}' for s in strength)} m/s² at 1 to 4 mm",
             agrees=bool(np.all(np.diff(strength) > 0.0)),
         ),
         judged(
-            "a crack of 1 or 2 mm is felt for three mesh cycles",
+            "a crack of 1 or 2 mm has an effect for three mesh cycles",
             f"{cycles[0]:.1f} and {cycles[1]:.1f} cycles in the transmission error",
             agrees=max(abs(c - 3.0) for c in cycles[:2]) < 1.5,
         ),
@@ -583,7 +584,8 @@ def _cracks() -> PaperFigure:
             f"{cycles[2]:.1f} and {cycles[3]:.1f} cycles",
             agrees=min(cycles[2:]) > 8.0,
             partly=min(cycles[2:]) > max(cycles[:2]),
-            because="it grows with the crack, but rings down sooner: the torsional damping is not published",
+            because="the duration grows with the crack, but the ringing decays sooner: the torsional damping is not "
+            "published",
         ),
     )
     return PaperFigure(
@@ -601,7 +603,7 @@ def _crack_maps() -> tuple[PaperFigure, PaperFigure]:
     period_s = 60.0 / 1000.0
     for depth in (0, 1, 4):
         run = steady(cracked(depth), 1.0, "driver y acceleration", rpm=1000.0)
-        # To the recorder's rate through its anti-alias filter.
+        # Resample to the recorder's rate through its anti-aliasing filter.
         step = round(1.0 / run.interval_s / rate_hz)
         kept = resample_poly(run["driver y acceleration"], 1, step)
         rate = 1.0 / run.interval_s / step
@@ -614,25 +616,25 @@ def _crack_maps() -> tuple[PaperFigure, PaperFigure]:
     spread = [float(np.std(x - levels[0])) / float(np.std(levels[0])) for x in levels[1:]]
     times = UniformSignal(levels[2], rate)
     high = maps[4].positions > 2000.0
-    # What the crack adds, without the mesh, which would repeat each tooth: its shocks come once a turn.
+    # The contribution of the crack only, as the mesh repeats with every tooth: its impacts come once a revolution.
     shocks = np.abs(levels[2] - levels[0])
     lag = _repeats_after(shocks - shocks.mean(), 1.0 / rate, period_s)
     time_claims = (
-        within_part("the period of the shocks is 60/n, 60 ms at 1000 rpm", 1e3 * period_s, 1e3 * lag, "ms", part=0.03),
+        within_part("the period of the impacts is 60/n, 60 ms at 1000 rpm", 1e3 * period_s, 1e3 * lag, "ms", part=0.03),
         judged(
-            "the impact is enhanced with the crack",
+            "the impact grows with the crack",
             f"the change is {spread[0]:.2g} of the healthy signal's rms at 1 mm and {spread[1]:.2g} at 4 mm",
             agrees=spread[1] > 2.0 * spread[0],
         ),
     )
     time_figure = PaperFigure("crack_times", "Figure 18", "time signals at 1000 rpm", figure, time_claims)
-    # The most impulsive mode of the signal holds the shocks, apart from the mesh harmonics.
+    # The most impulsive mode of the signal contains the impacts, separated from the mesh harmonics.
     modes = vmd(times, None, VmdSettings(5, penalty=2000.0))
     kurtosis, whole = [indicators.kurtosis(m) for m in modes.waveforms], indicators.kurtosis(levels[2])
     chosen = int(np.argmax(kurtosis))
     squeezed = squeezed_cwt_map(modes.signal(chosen), lowest=float(modes.centres[chosen]) / 4.0)
     drawn = plot.time_frequency_figure(squeezed)
-    # Power of the map above 2 kHz at its greatest, and how much it swings below 1 kHz, over time.
+    # Maximum over time of the power above 2 kHz, and its fluctuation over time below 1 kHz.
     peaks = [float(np.sum(maps[d].values[:, high] ** 2, axis=1).max()) for d in (0, 1, 4)]
     share = [peak / peaks[0] for peak in peaks[1:]]
     low = maps[4].positions < 1000.0
@@ -640,10 +642,10 @@ def _crack_maps() -> tuple[PaperFigure, PaperFigure]:
     map_claims = (
         judged(
             "the high frequencies (above 2 kHz) surge with the crack",
-            f"their greatest power is {share[0]:.3g} times the healthy gear's at 1 mm, {share[1]:.3g} times at 4 mm",
+            f"their maximum power is {share[0]:.3g} times the healthy gear's at 1 mm, {share[1]:.3g} times at 4 mm",
             agrees=share[1] > 2.0,
             partly=share[1] > 1.05 and share[1] > share[0],
-            because="they grow, but the shock of the stiffness change is small beside the mesh harmonics there",
+            because="they grow, but the impact of the stiffness change is small compared with the mesh harmonics there",
         ),
         judged(
             "the fluctuation of the low frequencies grows with the crack",
@@ -651,7 +653,7 @@ def _crack_maps() -> tuple[PaperFigure, PaperFigure]:
             agrees=swing[2] > swing[1] > swing[0],
         ),
         judged(
-            "modes of the signal (VMD, penalty 2000) express the fault clearly",
+            "modes of the signal (VMD, penalty 2000) show the fault clearly",
             f"of {modes.n_modes} modes the most impulsive has a kurtosis of {kurtosis[chosen]:.1f}, the signal "
             f"{whole:.1f}",
             agrees=kurtosis[chosen] > whole,
@@ -662,7 +664,7 @@ def _crack_maps() -> tuple[PaperFigure, PaperFigure]:
 
 
 def _repeats_after(x: FloatArray, step_s: float, near_s: float) -> float:
-    """Return the lag of the greatest autocorrelation within 30 % of the expected one."""
+    """Return the lag (s) of the maximum autocorrelation within 30 % of the expected lag."""
     correlation = np.correlate(x, x, "full")[len(x) - 1 :]
     lags = np.arange(len(correlation)) * step_s
     inside = np.flatnonzero(np.abs(lags / near_s - 1.0) < 0.3)
@@ -672,7 +674,7 @@ def _repeats_after(x: FloatArray, step_s: float, near_s: float) -> float:
 UNANSWERED = {
     "1 to 6": "sketches of the model",
     "17": "a photograph of the test rig",
-    "19 and 21": "measured signals of the test rig, which are not at hand",
+    "19 and 21": "measured signals of the test rig, which are not available",
 }
 
 

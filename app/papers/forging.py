@@ -1,6 +1,6 @@
 """The forging drive: interaction force and its errors, starts and stops and continuous rotation.
 
-Machine: preset "manipulator_formula", with the study's 95 N·m, 290 kg, 1 ms; sensors without noise unless said.
+Machine: preset "manipulator_formula", with the study's 95 N·m, 290 kg, 1 ms; sensors without noise unless stated.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ SOURCE = (
 
 @cache
 def recording(mode: str, preset_name: str = PRESETS[0]) -> Recording:
-    """Run the drive: "start-stop" or "continuous"."""
+    """Return a recording of the drive in mode "start-stop" or "continuous"."""
     return simulate(
         "forging",
         preset=preset_name,
@@ -63,7 +63,7 @@ def recording(mode: str, preset_name: str = PRESETS[0]) -> Recording:
 
 @cache
 def estimated(mode: str, preset_name: str = PRESETS[0]) -> ForceEstimate:
-    """Estimate the force from the motion, and compare it with torque over base radius."""
+    """Estimate the force from the motion and compare it with torque over base radius."""
     return estimate_forces(measure_motion(recording(mode, preset_name)))
 
 
@@ -72,7 +72,7 @@ def _relative(estimate: ForceEstimate, model: str, reference: str = FROM_TORQUE)
 
 
 def _reason_not_as_printed(estimate: ForceEstimate) -> str:
-    """Say what the printed inertia term adds, and how much of the formula's error that is."""
+    """Return a text about the contribution of the printed inertia term and its share of the formula's error."""
     motion, contact = estimate.motion, estimate.motion.contact
     r1, r2 = motion.path.base_radii_m
     pinion_kg, load_kg = contact.driver_inertia_kg_m2 / r1**2, (contact.driven_inertia_kg_m2 or 0.0) / r2**2
@@ -80,9 +80,9 @@ def _reason_not_as_printed(estimate: ForceEstimate) -> str:
     error = estimate.forces_n[AS_PRINTED] - estimate.references_n[FROM_TORQUE]
     explained = 1.0 - float(np.mean((error - added) ** 2) / np.mean(error**2))
     return (
-        "it is an identity of two free bodies, with the other sign. A torque on the pinion's shaft moves the pinion, "
-        f"{pinion_kg:.3g} kg at its base radius, and not m₀ = J₂/rb₂² = {load_kg:.3g} kg: that term in place of "
-        f"J₁α₁/rb₁ is {100 * explained:.1f} % of the error's mean square"
+        "it is an identity of two free bodies, with the opposite sign. A torque on the pinion shaft accelerates the "
+        f"pinion, {pinion_kg:.3g} kg at its base radius, and not m₀ = J₂/rb₂² = {load_kg:.3g} kg: using that term "
+        f"instead of J₁α₁/rb₁ explains {100 * explained:.1f} % of the mean square error"
     )
 
 
@@ -122,7 +122,7 @@ def _force(mode: str, answers: str) -> PaperFigure:
 
 
 def _back_impact(estimate: ForceEstimate) -> Claim:
-    """Judge the force after the torque has gone, which acts up to 1 s: the load, which still turns, strikes back."""
+    """Judge the force after the torque ends at 1 s: the load, which still turns, strikes back."""
     time = estimate.motion.time_s
     after = (time > 1.0) & (time < 3.0)
     reverse = estimate.references_n[FROM_TORQUE][after]
@@ -135,7 +135,7 @@ def _back_impact(estimate: ForceEstimate) -> Claim:
 
 
 def _force_figure(estimate: ForceEstimate, mode: str) -> Figure:
-    """Draw forces and errors of the start and, where the drive stops, of the back impact after 1 s."""
+    """Draw forces and errors of the start and, if the drive stops, of the back impact after 1 s."""
     time = estimate.motion.time_s
     shown = (time < 1.4) if mode == "start-stop" else (time < 0.6)
     measured = estimate.references_n[FROM_TORQUE][shown]
@@ -148,7 +148,7 @@ def _force_figure(estimate: ForceEstimate, mode: str) -> Figure:
     panels = [
         curve_panel(time[shown], {k: 1e-3 * v for k, v in curves.items()}, "time (s)", f"{label} (kN)", title)
         for curves, label, title in (
-            (forces, "force", "total interaction force; the piecewise one lies beneath the first"),
+            (forces, "force", "total interaction force; the piecewise curve is hidden by the first"),
             (errors, "error", "force errors"),
         )
     ]
@@ -160,7 +160,7 @@ YOUNG_PA, POISSON = 210e9, 0.3
 
 
 def _contact_ratio(addendum: float) -> float:
-    """ε = (Σ √(ra² − rb²) − a sin α)/(π m cos α), lengths in modules."""
+    """Return the contact ratio ε = (Σ √(ra² − rb²) − a sin α)/(π m cos α), lengths in modules."""
     cosine, sine = np.cos(PRESSURE_ANGLE_RAD), np.sin(PRESSURE_ANGLE_RAD)
     reach = sum(np.sqrt((z / 2 + addendum) ** 2 - (z / 2 * cosine) ** 2) for z in TEETH_OF_BOTH)
     return float((reach - sum(TEETH_OF_BOTH) / 2 * sine) / (np.pi * cosine))
@@ -172,14 +172,14 @@ def _addendum_of(contact_ratio: float) -> float:
 
 
 def _why_not_in_the_table(by_formula: float) -> str:
-    """Say what formula (13) would need for the table's number, and what else has its unit."""
+    """Return a text about what formula (13) would need for the table's number, and what else has its unit."""
     modulus_pa = YOUNG_PA / (2 * (1 - POISSON**2))  # E*
     width_mm = 1e3 * 1.72e9 / (np.pi / 4 * modulus_pa)
     part = 1.72e9 / by_formula
     return (
         f"formula (13) with the stated geometry gives {1 / part:.2f} times as much, in N/m^1.5; for the table's "
-        f"number it would need {part:.4f} of the steel's modulus, or {part**2:.4f} of the radius. In the table's unit, "
-        f"N/m, it is a line contact's (π/4) E* b on a face of {width_mm:.1f} mm. Both numbers are presets"
+        f"number it would need {part:.4f} of the steel modulus, or {part**2:.4f} of the radius. In the table's unit, "
+        f"N/m, it equals (π/4) E* b of a line contact on a face of {width_mm:.1f} mm. Both numbers are presets"
     )
 
 
@@ -193,7 +193,7 @@ def _parameters() -> PaperFigure:
             path.contact_ratio,
             "",
             part=0.02,
-            because="standard teeth of 20 and 100, addendum 1.00 module, have that; the printed value is that of "
+            because="gears of 20 and 100 standard teeth, addendum 1.00 module, have that; the printed value belongs to "
             f"{_addendum_of(1.749):.3f} modules",
         ),
         within_part(
@@ -217,7 +217,7 @@ def _parameters() -> PaperFigure:
             )
         )
     figure = panels_figure(
-        panels, n_columns=2, title="Force of the flanks at rest: the formula's stiffness, and the table's"
+        panels, n_columns=2, title="Static force of the flanks: stiffness of the formula and of the table"
     )
     return PaperFigure("parameters", "Table 1", "parameters", figure, claims)
 
@@ -229,8 +229,8 @@ def _start_stop() -> PaperFigure:
     first = [impact for impact in impacts if impact.time_s < 1.0]
     claims = (
         judged(
-            "starts and stops make intermittent motion: the flanks part and strike",
-            f"{len(impacts)} impacts, {len(back)} of them on the back flank, {len(first)} while it starts",
+            "starts and stops cause intermittent motion: the flanks separate and strike",
+            f"{len(impacts)} impacts, {len(back)} of them on the back flank, {len(first)} during the start",
             agrees=len(impacts) > 2 and len(back) > 0,
         ),
     )
@@ -247,7 +247,7 @@ UNANSWERED = {
     "1, 2 and 4": "sketches of gear meshing",
     "3": "an impact test rig of another publication",
     "5": "a photograph of the manipulator",
-    "6 and 7, measured curves": "torque and motion of the manipulator, which are not at hand: the drive is simulated",
+    "6 and 7, measured curves": "torque and motion of the manipulator, which are not available: the drive is simulated",
 }
 
 

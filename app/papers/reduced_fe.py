@@ -1,6 +1,6 @@
 """Flexible gear wheels: stiffness and transmission-error maps, frequencies over the mesh angle, sweeps, stress maps.
 
-Machine: preset "flexible_50_50" at the study's 8 % of damping; the hub inertia is chosen, as the study states none.
+Machine: preset "flexible_50_50" at the study's 8 % damping; the hub inertia is assumed, as the study states none.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ TORQUES_NM = (85.0, 170.0, 340.0)
 SWEEP_S = 4.0
 """Up and down at three torques: some five million steps. `gearsig flexible --duration` sweeps more slowly."""
 MESH_DOF = 90_000
-"""Of the gear whose stress is drawn: 270,000 show the same fields in four times the time."""
+"""Degrees of freedom of the gear whose stress is drawn: 270,000 give the same fields in four times the time."""
 N_MODES = 120
 NEIGHBOURS = (-2, -1, 0, 1, 2)
 SOURCE = (
@@ -48,14 +48,14 @@ def _maps(study: Study, drawn: dict[str, Figure]) -> list[PaperFigure]:
     maps = study.maps
     stiffness, error = maps.secant_stiffness_n_per_m, maps.transmission_error_m
     at = len(maps.torque_nm) // 2
-    # Both are periodic in the mesh cycle: the shorter way round counts.
+    # Both are periodic in the mesh cycle: the shorter distance counts.
     lowest, highest = int(np.argmin(stiffness[:, at])), int(np.argmax(error[:, at]))
     apart = abs((lowest - highest + len(stiffness) // 2) % len(stiffness) - len(stiffness) // 2) / len(stiffness)
     peaks = error.max(axis=0)
     forces = maps.pair_forces_n
     claims = (
         judged(
-            "the stiffness falls where one pair carries and never to zero",
+            "the stiffness falls in single contact, but never to zero",
             f"from {1e-8 * stiffness[:, at].max():.3g} to {1e-8 * stiffness[:, at].min():.3g} × 10⁸ N/m at "
             f"{maps.torque_nm[at]:g} N·m",
             agrees=0.5 < stiffness[:, at].min() / stiffness[:, at].max() < 0.95,
@@ -69,14 +69,14 @@ def _maps(study: Study, drawn: dict[str, Figure]) -> list[PaperFigure]:
     )
     share = (
         judged(
-            "what the leaving pair carries falls to zero while the entering one takes it over",
-            f"the greatest force of one pair is {forces[:, at].max():.4g} N, the least {forces[:, at].min():.3g} N",
+            "the load of the leaving pair falls to zero while the entering one takes it over",
+            f"the maximum force of one pair is {forces[:, at].max():.4g} N, the minimum {forces[:, at].min():.3g} N",
             agrees=float(forces[:, at].min()) < 0.01 * float(forces[:, at].max()),
         ),
     )
     errors = (
         judged(
-            "the static transmission error peaks where the stiffness is least",
+            "the static transmission error peaks where the stiffness has its minimum",
             f"{100 * apart:.1f} % of a mesh cycle apart",
             agrees=apart < 0.1,
         ),
@@ -105,7 +105,7 @@ def _maps(study: Study, drawn: dict[str, Figure]) -> list[PaperFigure]:
 
 
 def _drop(study: Study) -> Claim:
-    """Judge the drop of a curve: of the flanks' mode, where one pair carries, with the hubs and without."""
+    """Judge the frequency drop of the flank mode in single contact, with the hubs and without."""
     bare = _pair({"hub_inertia_driver_kg_m2": 0.0, "hub_inertia_driven_kg_m2": 0.0})[0]
     at_load = Operation.steady(4100.0, study.torque_nm)
     curves = study.angle_hz, reduced_fe.eigenfrequencies_hz(bare, at_load, study.angle_cycles)
@@ -120,10 +120,10 @@ def _drop(study: Study) -> Claim:
         )
     return judged(
         "a drop of some curves near 3500 to 4000 Hz at 5 to 10 degrees",
-        f"the flanks' mode drops where one pair carries: {'; '.join(gear_texts)}",
+        f"the flank mode drops in single contact: {'; '.join(gear_texts)}",
         agrees=False,
         partly=min(depths) > 0.05,
-        because="the drop and its angle agree; its frequency is that of the gears' inertia, which is not stated",
+        because="the drop and its angle agree; its frequency depends on the inertia of the gears, which is not stated",
     )
 
 
@@ -140,11 +140,11 @@ def _frequencies(study: Study, drawn: dict[str, Figure]) -> PaperFigure:
             f"{', '.join(f'{f:.0f}' for f in natural)} Hz at {', '.join(f'{t:g}' for t in TORQUES_NM)} N·m",
             agrees=all(2640.0 < f < 2710.0 for f in natural),
             partly=any(2640.0 < f < 2710.0 for f in natural),
-            because="contact is softer under less load; the hub inertia was chosen for these frequencies",
+            because="contact is softer at lower load; the hub inertia was chosen to give these frequencies",
         ),
         judged(
-            "frequencies oscillate little over the mesh angle, single modes more",
-            f"modes of 1 to 12 kHz by {100 * np.median(swing):.2g} % in the median, {100 * swing.max():.2g} % at most",
+            "frequencies oscillate little over the mesh angle, individual modes more",
+            f"modes of 1 to 12 kHz by {100 * np.median(swing):.2g} % (median), {100 * swing.max():.2g} % at most",
             agrees=float(np.median(swing)) < 0.02 < float(swing.max()) or float(swing.max()) < 0.1,
         ),
         _drop(study),
@@ -162,7 +162,7 @@ RELIEF_UM, RELIEF_MM = 20.0, 2.0
 
 
 def _relieved_jumps(study: Study) -> tuple[str, bool]:
-    """Return where sweeps up and down jump with tip relief at the study's damping, and whether either does."""
+    """Return the jump frequencies of sweeps with tip relief at the study's damping, as text, and whether any jumps."""
     relief = {"tip_relief_um": RELIEF_UM, "tip_relief_length_mm": RELIEF_MM}
     pair, _, step_s = _pair(relief)
     low, high = (part * study.natural_hz[study.torque_nm] for part in RANGE)
@@ -186,19 +186,19 @@ def _sweeps(study: Study, drawn: dict[str, Figure]) -> PaperFigure:
         jump_text = ", ".join("no jump" if jump is None else f"a jump at {jump:.0f} Hz" for jump in jumps)
         claims += [
             within_part(
-                "the primary resonance lies at 2700 Hz",
+                "the primary resonance is at 2700 Hz",
                 2700.0,
                 peak,
                 f"Hz at {torque:g} N·m",
                 part=0.04,
-                because="contact is softer under less load",
+                because="contact is softer at lower load",
             ),
             judged(
                 "hysteretic jumps in sweeps up and down",
                 f"{torque:g} N·m, up and down: {jump_text}",
                 agrees=any(jump is not None for jump in jumps),
                 partly=jumps_relieved,
-                because=f"flawless flanks hardly part at 8 % of damping; with tip relief, up and down: {relieved}",
+                because=f"perfect flanks hardly separate at 8 % damping; with tip relief, up and down: {relieved}",
             ),
         ]
     return PaperFigure("sweeps", "Figure 22 and the sweeps", "sweeps up and down", drawn["sweeps"], tuple(claims))
@@ -215,11 +215,11 @@ def _spectra(study: Study, drawn: dict[str, Figure]) -> PaperFigure:
         levels.append((speed, 1 + int(np.argmax(lines)), mesh))
     nearest = [abs(k * mesh / natural - 1.0) for _, k, mesh in levels]
     claim = judged(
-        "peaks at distinct frequencies near the natural ones, also at a half and a third of them",
+        "peaks at distinct frequencies near the natural ones, and at a half and a third of them",
         "; ".join(f"{speed:g} rpm: harmonic {k} at {k * mesh:.0f} Hz" for speed, k, mesh in levels),
         agrees=sum(near < 0.3 for near in nearest) >= 3,
         partly=any(near < 0.3 for near in nearest),
-        because="only some of these speeds put a mesh harmonic near the torsional mode",
+        because="a mesh harmonic is near the torsional mode at only some of these speeds",
     )
     return PaperFigure("spectra", "Figures 19 and 20", "spectra at 1000 to 5000 rpm", drawn["spectra"], (claim,))
 
@@ -247,7 +247,7 @@ def _kinematics(pair: FlexiblePair, torque_nm: float, step_s: float) -> PaperFig
     last, before = x[-n:] - x[-n:].mean(), x[-2 * n : -n] - x[-2 * n : -n].mean()
     repeat = float(np.corrcoef(last, before)[0, 1])
     claim = judged(
-        "after a transient a stable, periodic regime",
+        "after a transient the motion is stable and periodic",
         f"one mesh cycle correlates with the one before by {repeat:.4f}",
         agrees=repeat > 0.98,
     )
@@ -259,10 +259,10 @@ def _kinematics(pair: FlexiblePair, torque_nm: float, step_s: float) -> PaperFig
 def _between_heights(
     pair: FlexiblePair, mesh: fe_gear.SectorMesh, force_n: float, stress: Callable[[FloatArray], FloatArray]
 ) -> tuple[float, float, int]:
-    """Return the relative rms error of the reduced gear's stress halfway between the heights whose answer it keeps.
+    """Return the relative rms stress error of the reduced gear halfway between its stored heights.
 
-    Of the face drawn, of it where the stress is below half the greatest, and the number of heights; between them the
-    reduction takes a cubic spline.
+    The errors are those of the whole face drawn and of the part with stress below half the maximum; the third value is
+    the number of heights. Between heights, the reduction interpolates with a cubic spline.
     """
     heights = pair.gears[0].grid.roll_rad
     middle = slice(max(len(heights) // 2 - 3, 0), len(heights) // 2 + 3)
@@ -278,7 +278,7 @@ def _between_heights(
 
 
 def _stress(pair: FlexiblePair, torque_nm: float) -> list[PaperFigure]:
-    """Full static stress, by modes alone, and what these leave out; then two contacts that move."""
+    """Return figures of the full static stress, the modal stress, their difference, and the moving contacts."""
     blank = pair.gears[0].blank
     mesh = fe_gear.sector_mesh(blank, fe_gear.mesh_size_for(blank, MESH_DOF))
     gear = fe_gear.CyclicGear(mesh)
@@ -294,7 +294,7 @@ def _stress(pair: FlexiblePair, torque_nm: float) -> list[PaperFigure]:
     pair_geometry = pair.machine.mesh.pair
 
     def contacts(row: int) -> tuple[FloatArray, list[float]]:
-        """Superpose the contacts of the driver at one mesh angle; tooth 0 is the older pair's."""
+        """Superpose the contacts of the driver at one mesh angle; tooth 0 belongs to the older pair."""
         field = np.zeros((g.teeth, mesh.n_nodes, 3))
         forces = []
         slots = [float(force) for force in maps.pair_forces_n[row, 0]]
@@ -312,14 +312,14 @@ def _stress(pair: FlexiblePair, torque_nm: float) -> list[PaperFigure]:
             forces.append(force)
         return field, forces
 
-    # One tooth alone, all of the torque on it: only there can the modes' answer be held against the whole mesh's.
+    # All of the torque on one tooth: only there can the modal solution be compared with that of the whole mesh.
     force = torque_nm / (g.base_radius_mm * 1e-3)
     load = fe_gear.load_tooth(mesh, force)
     full = shown(load.displacement_m)
     with fe_gear.one_thread():
         modes = fe_gear.cyclic_modes(gear, N_MODES, "bore")
     modal = shown(fe_gear.modal_load(gear, modes, load))
-    # What the modes leave out, and what the reduction leaves out between the heights whose static answer it keeps.
+    # Error of the modes alone, and error of the reduction between the heights whose static solution it stores.
     error = {f"{name}, full less modal": full[name] - modal[name] for name in full}
     between, body, n_heights = _between_heights(pair, mesh, force, lambda field: shown(field)["von Mises"])
     residual_share = float(np.sqrt(np.mean(error["von Mises, full less modal"] ** 2) / np.mean(full["von Mises"] ** 2)))
@@ -327,7 +327,7 @@ def _stress(pair: FlexiblePair, torque_nm: float) -> list[PaperFigure]:
     drawn = partial(plot.stress_maps_figure, view.points_mm, view.triangles, near_mm=near)
     static, by_modes = drawn(full, title=f"Static: {title}"), drawn(modal, title=f"{N_MODES} modes alone: {title}")
     error_maps = drawn(error, title=f"Full less {N_MODES} modes: {title}")
-    # Four angles of a mesh cycle: two with both pairs in contact, two with one, as the contact ratio lies below two.
+    # Four angles of a mesh cycle: two with two pairs in contact, two with one, as the contact ratio is below two.
     moving, n_contacts = {}, []
     for row in (0, 2, 5, 7):
         field, forces = contacts(row)
@@ -335,38 +335,38 @@ def _stress(pair: FlexiblePair, torque_nm: float) -> list[PaperFigure]:
         words = " and ".join(f"{f:.0f} N" for f in forces)
         moving[f"mesh cycle {maps.mesh_cycles[row]:.2f}: {words}"] = shown(field)["von Mises"]
     track = drawn(moving, title=f"Von Mises stress of the driver as its contacts move, {torque_nm:g} N·m")
-    # The study's statements, each judged by one of these numbers.
+    # The study's statements, each checked by one of these numbers.
     far = view.values(np.array([np.full(mesh.n_nodes, float(abs(k) == 2)) for k in NEIGHBOURS])) > 0.5
     quiet = float(np.median(full["von Mises"][far]) / full["von Mises"].max())
     no_contact = judged(
         "stress near zero where teeth do not touch",
-        f"two teeth away {100 * quiet:.1f} % of the greatest, in the median",
+        f"two teeth away, {100 * quiet:.1f} % of the maximum (median)",
         agrees=quiet < 0.05,
         partly=quiet < 0.1,
-        because="the body below those teeth carries torque as well",
+        because="the body below those teeth also carries torque",
     )
     patterns = judged(
         "static and modal maps show the same contact patterns",
-        f"von Mises stress differs by {percent(residual_share)} rms",
+        f"the von Mises stress differs by {percent(residual_share)} rms",
         agrees=residual_share < 0.1,
         partly=residual_share < 1.0,
-        because="a local contact needs the static rest besides the modes, which the reduction keeps",
+        because="a local contact needs the static residual in addition to the modes; the reduction keeps it",
     )
     small = judged(
         "the error of the reduced model stays small",
-        f"{100 * between:.1f} % rms halfway between two of the {n_heights} heights whose static answer the reduction "
-        f"keeps, {100 * body:.1f} % where stress is below half the greatest; at those heights none; {N_MODES} modes "
+        f"{100 * between:.1f} % rms halfway between two of the {n_heights} heights whose static solution the reduction "
+        f"stores, {100 * body:.1f} % where stress is below half the maximum; none at those heights; {N_MODES} modes "
         f"alone: {percent(residual_share)}",
         agrees=between < 0.1,
         partly=body < 0.1,
-        because="the patch under the contact lies elsewhere than at the heights kept",
+        because="the patch under the contact lies between the stored heights",
     )
     peaks = judged(
-        "two peaks where two pairs share the load, one where one carries",
+        "two peaks where two pairs share the load, one in single contact",
         f"{', '.join(map(str, n_contacts))} contacts at the four angles",
         agrees=set(n_contacts) == {1, 2},
         partly=2 in n_contacts,
-        because="none of the angles lies where one pair carries",
+        because="none of the angles lies in single contact",
     )
     words = "radial, tangential, shear and von Mises stress"
     return [
@@ -374,14 +374,14 @@ def _stress(pair: FlexiblePair, torque_nm: float) -> list[PaperFigure]:
         PaperFigure(
             "stress_modal", "Figures 8 to 14 and 18 to 110, modal maps", f"{words} by modes", by_modes, (patterns,)
         ),
-        PaperFigure("stress_error", "Figures 6, 7 and 11, errors", "what modes alone leave out", error_maps, (small,)),
+        PaperFigure("stress_error", "Figures 6, 7 and 11, errors", "error of the modes alone", error_maps, (small,)),
         PaperFigure("stress_moving", "Figure 7, contacts that move", "stress over a mesh cycle", track, (peaks,)),
     ]
 
 
 UNANSWERED = {
     "1, 5, 6, 7, 14 and 15": "pictures of the mesh and sketches of the contact; gearsig gear-body draws mesh and modes",
-    "comparison with measured DTE": "the measured amplitudes of the reference experiment are not at hand",
+    "comparison with measured DTE": "the measured amplitudes of the reference experiment are not available",
     "20 hours on one processor": "a sweep of six million steps takes seconds to minutes here; see docs/how_good.md",
 }
 
@@ -400,5 +400,5 @@ def compute(on_progress: Progress) -> Paper:
     on_progress("stress", 0.7)
     paper_figures += _stress(pair, torque_nm)
     on_progress("done", 1.0)
-    machine = "preset flexible_50_50; bore, torques and hub inertia are chosen, the study states none"
+    machine = "preset flexible_50_50; bore, torques and hub inertia are assumed, as the study states none"
     return Paper("reduced-fe", "Flexible gear wheels", SOURCE, machine, tuple(paper_figures), UNANSWERED)

@@ -1,4 +1,4 @@
-"""How the numbers that ship were made: calibrations and the population of the gap diagnosis."""
+"""Studies that produced the shipped numbers: calibrations and the population of the gap diagnosis."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ Answer = TypeVar("Answer")
 
 
 def run_study(*commands: Callable[..., None]) -> None:
-    """Run what a module that was started by `python -m` can do, one function or several by name.
+    """Run the commands of a module started by `python -m`: one function, or several by name.
 
-    They run in the module as others import it, not in its copy `__main__`, of which other processes know nothing.
+    They run in the module as others import it, not in its copy `__main__`, which other processes cannot import.
     """
     spec = sys.modules["__main__"].__spec__
     module = import_module(spec.name if spec is not None else __name__)
@@ -31,7 +31,7 @@ def run_study(*commands: Callable[..., None]) -> None:
 def answers_of(
     function: Callable[[Job], Answer], jobs: Sequence[Job], n_processes: int
 ) -> Iterator[tuple[Job, Answer]]:
-    """Yield each job with its answer, in order, and say how many are done; the processes are fresh ones."""
+    """Yield each job with its answer, in order, and print how many are done; the processes are new ones."""
     with process_pool(n_processes) as pool:
         for n_done, (job, answer) in enumerate(zip(jobs, pool.map(function, jobs), strict=True), start=1):
             typer.echo(f"{n_done} of {len(jobs)} done")

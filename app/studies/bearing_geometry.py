@@ -1,12 +1,12 @@
-"""Balls of bearings from their published load ratings: `python -m app.studies.bearing_geometry`.
+"""Ball counts of bearings from their published load ratings: `python -m app.studies.bearing_geometry`.
 
-Makers publish no numbers of balls, but ratings that standards compute from them: C0r by ISO 76, Cr by ISO 281, often
-with the factor f0 of C0r. Of all numbers of balls Z and standard diameters Dw, on the pitch diameter (d + D)/2, the one
-is taken that gives them all, if none with another Z comes near. Prints rows for `gearsig/rig/bearings.csv`, and to
-the standard error stream what the ratings leave open.
+Makers do not publish the number of balls, but ratings computed from it: C0r by ISO 76, Cr by ISO 281, often with the
+factor f0 of C0r. Of all numbers of balls Z and standard diameters Dw, on the pitch diameter (d + D)/2, the combination
+that reproduces all ratings is taken if none with another Z comes close. Prints rows for `gearsig/rig/bearings.csv`, and
+to the standard error stream the bearings that the ratings leave undecided.
 
-Rollers cannot be found so: of number Z and length L their ratings are C0r ∝ Z L and Cr ∝ Z^(3/4) L^(7/9), so that both
-together go with Z^(1/36) only.
+This does not work for rollers: with number Z and length L, their ratings are C0r ∝ Z L and Cr ∝ Z^(3/4) L^(7/9), so
+that both together depend only on Z^(1/36).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ import numpy as np
 RATINGS = Path(__file__).with_name("bearing_ratings.csv")
 
 # fmt: off
-# ISO 76:2006, table 1: f0 over Dw cos(a)/Dpw, every 0.01 from 0; groove bearings and self-aligning ones.
+# ISO 76:2006, table 1: f0 over Dw cos(a)/Dpw, every 0.01 from 0; deep groove and self-aligning ball bearings.
 F0_GROOVE = np.array([
     14.7, 14.9, 15.1, 15.3, 15.5, 15.7, 15.9, 16.1, 16.3, 16.5,
     16.4, 16.1, 15.9, 15.6, 15.4, 15.2, 14.9, 14.7, 14.4, 14.2,
@@ -46,10 +46,10 @@ FC_SELF_ALIGNING = np.array([
 ])
 # fmt: on
 BM = 1.3
-"""Of ISO 281, table 1, for all ball bearings here."""
+"""Factor bm of ISO 281, table 1, for all ball bearings considered here."""
 
 SMALLEST_TABLED = 0.09
-"""Ratio Dw/Dpw below which makers' f0 of thin sections goes on rising where the table's falls."""
+"""Ratio Dw/Dpw below which makers' f0 of thin sections keeps rising while the table's falls."""
 
 INCH_MM = 25.4
 DIAMETERS_MM = (
@@ -57,12 +57,12 @@ DIAMETERS_MM = (
     *(k * INCH_MM / 32 for k in range(12, 90)),
     *(k / 2 for k in range(4, 15)),
 )
-"""Of standard balls."""
+"""Diameters of standard balls."""
 
 
 @dataclass(frozen=True)
 class PublishedRatings:
-    """What a maker publishes of a bearing; f0 is 0 where it is not."""
+    """Data that a maker publishes about a bearing; f0 is 0 if not published."""
 
     name: str
     source: str
@@ -77,13 +77,13 @@ class PublishedRatings:
 
     @property
     def pitch_mm(self) -> float:
-        """Return the pitch diameter, halfway between bore and outside."""
+        """Pitch diameter in mm, the mean of bore and outside diameter."""
         return (self.bore_mm + self.outside_mm) / 2
 
 
 @dataclass(frozen=True)
 class BallFit:
-    """Balls of one row, and how far the worst of the figures is from those published."""
+    """Balls of one row, and the largest relative deviation of the ratings from those published."""
 
     n_balls: int
     diameter_mm: float
@@ -91,7 +91,7 @@ class BallFit:
 
 
 def read_ratings() -> list[PublishedRatings]:
-    """Return the published ratings."""
+    """Read the published ratings."""
     lines = (line for line in RATINGS.read_text(encoding="utf-8").splitlines() if not line.startswith("#"))
     return [
         PublishedRatings(
@@ -111,11 +111,11 @@ def read_ratings() -> list[PublishedRatings]:
 
 
 def fits(of: PublishedRatings) -> list[BallFit]:
-    """Return every number of balls with the diameter that suits the ratings best, the best first."""
+    """Return every number of balls with the diameter that fits the ratings best, in order of fit."""
     best: dict[int, BallFit] = {}
     for diameter_mm in DIAMETERS_MM:
         for n_balls in range(5, 40):
-            chord = sin(pi / n_balls) * of.pitch_mm / diameter_mm  # balls touch at 1
+            chord = sin(pi / n_balls) * of.pitch_mm / diameter_mm  # balls touch each other at 1
             if 1.02 < chord < 2.2 and diameter_mm * 2 < of.outside_mm - of.bore_mm:
                 off = max(_deviations(of, n_balls, diameter_mm))
                 if n_balls not in best or off < best[n_balls].off:
@@ -142,9 +142,9 @@ def _deviations(of: PublishedRatings, n_balls: int, diameter_mm: float) -> Itera
 
 
 def decided(of: PublishedRatings) -> BallFit | None:
-    """Return the balls, if ratings leave no doubt of their number.
+    """Return the balls if the ratings determine their number; else None.
 
-    They are published with two and a half digits, within 0.5 %; f0 of self-aligning bearings is tabled with two.
+    Ratings are published with two and a half digits, within 0.5 %; f0 of self-aligning bearings has two digits.
     """
     first, second, *_ = fits(of)
     near, far = (0.016, 0.03) if of.is_self_aligning else (0.014, 0.012)
@@ -152,7 +152,7 @@ def decided(of: PublishedRatings) -> BallFit | None:
 
 
 def main() -> None:
-    """Print the rows of all that is decided."""
+    """Print the rows of all bearings that are decided."""
     for of in read_ratings():
         fit = decided(of)
         if fit is None:

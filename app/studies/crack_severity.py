@@ -1,8 +1,8 @@
 """Make the calibration of crack severity: `python -m app.studies.crack_severity [--cases N] [--to FILE]`.
 
 Draws and simulates gearboxes (some 2.5 s each on one core), each with its crack, healthy, and with a chip or spall;
-fits the models, and writes the JSON file that the library reads. Errors on cases that were left out of a fit make the
-intervals.
+fits the models, and writes the JSON file that the library reads. The intervals come from errors on cases left out of
+a fit.
 """
 
 from __future__ import annotations
@@ -52,15 +52,15 @@ from gearsig.severity import (
 )
 
 # --------------------
-# One case of the calibration: a drawn rig, its recording and its reference, and what they show of either gear.
+# One case of the calibration: a random rig, its recording and reference, and the resulting features of both gears.
 # --------------------
 
 
 OTHER_FLANKS_SHARE = 0.15
-"""Healthy machines whose flanks are others than in the reference: run in, or ground again."""
+"""Share of healthy machines whose flanks differ from the reference: run in, or ground again."""
 
 RELIEF_ERROR = 0.2
-"""Largest one of the tip relief that the estimator is told, relative: tips are never ground as they were drawn."""
+"""Maximum relative error of the tip relief given to the estimator: tips never have exactly the specified relief."""
 
 CHIP_HEIGHT_MODULES = (0.25, 1.5)
 SPALL_WIDTH_PERCENT, SPALL_LENGTH_MODULES = (20.0, 90.0), (0.3, 1.2)
@@ -68,7 +68,7 @@ SPALL_WIDTH_PERCENT, SPALL_LENGTH_MODULES = (20.0, 90.0), (0.3, 1.2)
 
 @dataclass(frozen=True)
 class CrackCase:
-    """A drawn rig with its recording, a reference of the healthy gears, and the healthy gears once more."""
+    """A random rig with its recording, a reference of the healthy gears, and a second healthy recording."""
 
     drawn: DrawnRig
     recording: Recording
@@ -78,7 +78,7 @@ class CrackCase:
 
 @dataclass(frozen=True)
 class CaseFeatures:
-    """What a case shows.
+    """Features of a case.
 
     Parameters
     ----------
@@ -88,14 +88,14 @@ class CaseFeatures:
     percent : float
         Depth of the crack in percent of the root; 0: none.
     with_reference, alone, healthy, healthy_with_reference : arrays, (2, n_features)
-        Of both gears: the recording against its reference, by itself, the reference by itself, and the healthy gears
-        once more against the reference.
+        For both gears: the recording against its reference, the recording alone, the reference alone, and the second
+        healthy recording against the reference.
     looks : mapping
-        (kind, "with_reference" or "alone") → features, (n_features,), and event's shape, (n_shape,), of the cracked
-        gear, and of the gear with the other fault.
+        (kind, "with_reference" or "alone") → features, (n_features,), and shape of the event, (n_shape,), for the
+        cracked gear and for the gear with the other fault.
     lag_pitches : float
-        By how much the event, with a reference, follows the middle of the cracked tooth's engagement; nan where no
-        mark tells.
+        Lag of the event, with a reference, behind the middle of the cracked tooth's engagement; nan if there is no
+        mark.
     reach : mapping
         Quantities that limit the calibration.
     """
@@ -113,7 +113,7 @@ class CaseFeatures:
 
 
 def draw_case(seed: int, index: int, *, for_the_check: bool, even: bool = False) -> CrackCase | None:
-    """Draw and simulate a case; None where the drawn gears cannot be made (undercut, a crack past the tooth)."""
+    """Draw and simulate a case; None if the random gears cannot be made (undercut, a crack through the tooth)."""
     rng = np.random.default_rng([seed, index, int(for_the_check)])
     drawn = draw_rig(rng, for_the_check=for_the_check, even=even)
     speed = float(rng.uniform(1.0 - LARGEST_SPEED_DIFFERENCE, 1.0 + LARGEST_SPEED_DIFFERENCE))
@@ -131,9 +131,9 @@ def draw_case(seed: int, index: int, *, for_the_check: bool, even: bool = False)
 
 
 def draw_tooth_fault(drawn: DrawnRig, rng: np.random.Generator) -> tuple[str, Recording] | None:
-    """Draw and simulate a chip or a spall on the tooth that has the crack otherwise; return its kind and the recording.
+    """Draw and simulate a chip or a spall on the tooth instead of the crack; return its kind and the recording.
 
-    None where the gears do not allow its size.
+    None if the gears do not allow its size.
     """
     module = float(drawn.parameters["module_mm"])
     if rng.uniform() < 0.5:
@@ -153,7 +153,7 @@ def draw_tooth_fault(drawn: DrawnRig, rng: np.random.Generator) -> tuple[str, Re
 def observe(
     case: CrackCase, other_fault: tuple[str, Recording] | None = None, relief_error: float = 0.0
 ) -> CaseFeatures:
-    """Return what a case shows, without any fitted model.
+    """Return the features of a case, without any fitted model.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def observe(
     other_fault : (str, Recording) or None
         See `draw_tooth_fault`.
     relief_error : float
-        Of the tip relief that the estimator is told, relative.
+        Relative error of the tip relief given to the estimator.
     """
     drawn, rig = case.drawn, case.recording.rig
     if rig is None:
@@ -214,17 +214,17 @@ def _lag(evidence: GearEvidence, tooth: int) -> float:
 
 
 FALSE_ALARMS = 0.02
-"""Part of the healthy gear pairs whose score lies above the threshold."""
+"""Share of healthy gear pairs whose score exceeds the threshold."""
 
 TAUGHT = 0.10
-"""Part of the healthy gear pairs whose score lies above the least one of a crack that the depth is learned from: cracks
-just below the threshold tell as well, and without a reference few are above."""
+"""Share of healthy gear pairs whose score exceeds the minimum score of cracks used to learn the depth: cracks just
+below the threshold are informative as well, and without a reference few exceed it."""
 
 CLEAR_MM = 1.0
-"""Cracks at least so deep teach the detection what to look for."""
+"""Minimum depth of the cracks used to train the detection."""
 
 OUTSIDE = 0.01
-"""Part of the calibration's own cracks that count as unlike a crack."""
+"""Share of the calibration's own cracks that count as unlike a crack."""
 
 _RIDGE = 3.0
 _FOLDS = 10
@@ -240,10 +240,10 @@ class Cases:
     Parameters
     ----------
     features : array, (n, n_features)
-        Of the cracked gear.
+        Features of the cracked gear.
     percent, depth_mm : arrays, (n,)
     healthy : array, (n_healthy, 2, n_features)
-        Of both gears of healthy pairs.
+        Features of both gears of healthy pairs.
     """
 
     features: FloatArray
@@ -253,7 +253,7 @@ class Cases:
 
 
 def fit_model(cases: Cases, *, relief_known: bool) -> DepthModel:
-    """Fit detection, depth and spread to all cases, and quantiles to errors of models that did not see the case."""
+    """Fit detection, depth and spread to all cases, and quantiles to the errors of cross-validated models."""
     linear = [i for i, name in enumerate(FEATURES) if name not in RISING and (relief_known or name not in RELIEF)]
     mean, scale = cases.features.mean(axis=0), cases.features.std(axis=0)
     z = (cases.features - mean) / scale
@@ -301,7 +301,7 @@ def _predicted(depth: tuple[float, FloatArray, FloatArray], z: FloatArray, knots
 
 
 def _cross_validation_errors(z: FloatArray, y: FloatArray, knots: FloatArray, linear: list[int]) -> FloatArray:
-    """Return (y − ŷ)/σ of each case by the model fitted to the other nine tenths of the cases.
+    """Return (y − ŷ)/σ of each case for the model fitted to the other nine tenths of the cases.
 
     R. F. Barber, E. J. Candès, A. Ramdas, R. J. Tibshirani, "Predictive inference with the jackknife+", 2021 (CV+).
     """
@@ -316,7 +316,7 @@ def _cross_validation_errors(z: FloatArray, y: FloatArray, knots: FloatArray, li
 
 
 def _detection_weights(cracked: FloatArray, healthy: FloatArray) -> FloatArray:
-    """Logistic regression, crack against none, on what a crack raises; weights are not negative."""
+    """Return weights of a logistic regression, crack or none, on features that a crack raises; all are ≥ 0."""
     from scipy.optimize import minimize
 
     used = [FEATURES.index(name) for name in ("band_excess", "prominence", "pattern_excess")]
@@ -335,14 +335,14 @@ def _detection_weights(cracked: FloatArray, healthy: FloatArray) -> FloatArray:
 
 
 def _curves(z: FloatArray, knots: FloatArray) -> FloatArray:
-    """Columns of the rising curves, three per shaped feature."""
+    """Return the columns of the rising curves, three per shaped feature."""
     return np.hstack([segments(z[:, i], pair) for i, pair in zip(_SHAPED, knots, strict=True)])
 
 
 def _depth_weights(
     z: FloatArray, y: FloatArray, knots: FloatArray, linear: list[int]
 ) -> tuple[float, FloatArray, FloatArray]:
-    """Ridge regression: rising curves of what the depth is read from, and straight lines of the rest."""
+    """Fit the depth by ridge regression: rising curves of the depth features, linear terms of the rest."""
     from scipy.optimize import lsq_linear
 
     columns = np.c_[np.ones(len(z)), _curves(z, knots), z[:, linear]]
@@ -357,7 +357,7 @@ def _depth_weights(
 
 
 def _spread_weights(z: FloatArray, error: FloatArray) -> FloatArray:
-    """Linear model of the size of errors over excess and prominence, σ where the error is √(2/π) σ on the mean."""
+    """Fit a linear model of σ over excess and prominence; the mean absolute error is √(2/π) σ."""
     used = [FEATURES.index(name) for name in ("band_excess", "prominence")]
     rows = np.c_[np.ones(len(z)), z[:, used]]
     ridge = 30.0 * np.diag([0.0, 1.0, 1.0])
@@ -368,7 +368,7 @@ def _spread_weights(z: FloatArray, error: FloatArray) -> FloatArray:
 
 
 def _precision(z: FloatArray, linear: list[int]) -> FloatArray:
-    """Inverse covariance of the features that the depth is read from; 0 for the others."""
+    """Return the inverse covariance of the features used for the depth; 0 for the others."""
     used = sorted([*_SHAPED, *linear])
     precision = np.zeros((z.shape[1], z.shape[1]))
     precision[np.ix_(used, used)] = np.linalg.inv(np.cov(z[:, used].T) + 1e-3 * np.eye(len(used)))
@@ -376,7 +376,7 @@ def _precision(z: FloatArray, linear: list[int]) -> FloatArray:
 
 
 def _conformal(scaled: FloatArray) -> tuple[float, float]:
-    """Quantiles of n errors for a new case: the k-th of n + 1, rounded outwards."""
+    """Return the quantiles of n errors for a new case: the k-th of n + 1, rounded outwards."""
     ordered, n = np.sort(scaled), len(scaled)
     low = int(np.floor(_COVERAGE[0] * (n + 1))) - 1
     high = int(np.ceil(_COVERAGE[1] * (n + 1))) - 1
@@ -384,19 +384,19 @@ def _conformal(scaled: FloatArray) -> tuple[float, float]:
 
 
 # --------------------
-# From the looks of simulated cracks, chips and spalls to a model of which it is.
+# From the features of simulated cracks, chips and spalls to a model that classifies them.
 # --------------------
 
 
 def fit_kind(vectors: FloatArray, kinds: list[str]) -> KindModel:
-    """Fit a softmax regression; cracks weigh as much as chips and spalls together.
+    """Fit a softmax regression; cracks have the same total weight as chips and spalls together.
 
     Parameters
     ----------
     vectors : array, (n, n_features)
-        Of events that are seen; see `gearsig.severity.kind_vector`.
+        Features of detected events; see `gearsig.severity.kind_vector`.
     kinds : list of str
-        What each is.
+        True kind of each.
     """
     from sklearn.linear_model import LogisticRegression
 
@@ -404,7 +404,7 @@ def fit_kind(vectors: FloatArray, kinds: list[str]) -> KindModel:
     z = np.clip((vectors - mean) / scale, -4.0, 4.0)
     shares = {name: 0.5 if name == CRACKED else 0.5 / (len(KINDS) - 1) for name in KINDS}
     weights = [len(kinds) * shares[kind] / kinds.count(kind) for kind in kinds]
-    # Penalty: the sum of the squared weights, without the offsets, doubled.
+    # Penalty: twice the sum of the squared weights, without the offsets.
     model = LogisticRegression(C=0.25, tol=1e-9, max_iter=10_000)
     model.fit(z, [KINDS.index(kind) for kind in kinds], sample_weight=weights)
     return KindModel(mean, scale, np.c_[model.intercept_, model.coef_])
@@ -413,13 +413,13 @@ def fit_kind(vectors: FloatArray, kinds: list[str]) -> KindModel:
 SEED = 2611
 N_CASES = 540
 EVEN_EVERY = 6
-"""The last of so many cases has teeth that hardly differ."""
+"""One case in this many, the last of each group, has teeth that hardly differ."""
 
 _DIGITS = 7
 
 
 def main(cases: int = N_CASES, processes: int = 2, to: Path = FILE, state: str = "") -> None:
-    """Simulate, fit, write; `state` is the simulator's commit, for the provenance."""
+    """Simulate, fit and write; `state` is the commit of the simulator, for the provenance."""
     observed = observe_all(cases, processes)
     text = json.dumps(calibration_of(observed, cases, state), indent=1)
     to.write_text(text + "\n", encoding="utf-8")
@@ -427,13 +427,13 @@ def main(cases: int = N_CASES, processes: int = 2, to: Path = FILE, state: str =
 
 
 def observe_all(n_cases: int, n_processes: int) -> list[tuple[int, CaseFeatures]]:
-    """Return what the drawn cases show, by their index; some cannot be made, or show too few mesh harmonics."""
+    """Return features by case index, without cases that cannot be made or have too few mesh harmonics."""
     answers = answers_of(observe_case, range(n_cases), n_processes)
     return [(index, answer) for index, answer in answers if isinstance(answer, CaseFeatures)]
 
 
 def observe_case(index: int) -> CaseFeatures | str:
-    """Return what one case shows, or why it shows nothing."""
+    """Return the features of one case, or the reason why there are none."""
     case = draw_case(SEED, index, for_the_check=False, even=index % EVEN_EVERY == EVEN_EVERY - 1)
     if case is None:
         return ""
@@ -464,7 +464,7 @@ def calibration_of(observed: Sequence[tuple[int, CaseFeatures]], n_drawn: int, s
 
 
 def cases_of(observed: Sequence[tuple[int, CaseFeatures]], kind: str) -> Cases:
-    """Return the cases of one model; each machine is there healthy, too."""
+    """Return the cases of one model, which include each machine in its healthy state."""
     cracked = [(i, o) for i, o in observed if o.percent > 0]
     healthy = [o.healthy if kind == ALONE else o.healthy_with_reference for _, o in observed]
     return Cases(
@@ -476,7 +476,7 @@ def cases_of(observed: Sequence[tuple[int, CaseFeatures]], kind: str) -> Cases:
 
 
 def kind_of(observed: Sequence[tuple[int, CaseFeatures]], way: str, model: DepthModel) -> KindModel:
-    """Return the model of the kind, from the events that are seen."""
+    """Return the model of the kind of fault, fitted to the detected events."""
     vectors = [
         (kind, kind_vector(*looks))
         for _, o in observed

@@ -1,4 +1,4 @@
-"""Gearboxes drawn at random, as recordings: for crack severity and its check, and for the gap's population."""
+"""Recordings of random gearboxes, for crack severity and its check, and for the population of the gap diagnosis."""
 
 from __future__ import annotations
 
@@ -28,26 +28,26 @@ from sims.simulator import ParameterValue, SimulationSetup
 
 CALIBRATION_MODULES_MM = (1.5, 2.0, 2.5, 3.0, 4.0)
 OTHER_MODULES_MM = (1.75, 2.25, 2.75, 3.5)
-"""Modules of the rigs for the check: none is a module of the calibration."""
+"""Modules of the rigs for the check; the calibration uses none of them."""
 
 DEPTHS_MM = (0.3, 4.0)
 DEPTHS_OF_THE_CHECK_MM = (0.5, 4.0)
 DEEPEST_SHARE = 0.9
-"""Of the deepest crack that the tooth model allows."""
+"""Maximum depth, as a share of the deepest crack that the tooth model allows."""
 
 MESH_HZ = (180.0, 1600.0)
 MIN_REVOLUTIONS = 15
-"""Of the slower shaft."""
+"""Minimum number of revolutions of the slower shaft."""
 
 HEALTHY_SHARE, HEALTHY_SHARE_OF_THE_CHECK = 0.2, 0.3
-"""Rigs that get no crack."""
+"""Shares of rigs without a crack."""
 
 
 @dataclass(frozen=True)
 class DrawnHousingMode:
-    """One mode between bearings and sensors: shape at bearings 1 and 3, where the sensors sit, and at all four.
+    """One mode between bearings and sensors: shape at bearings 1 and 3, where the sensors are, and at all four.
 
-    The bearings move it along `direction_deg` from the x axis, across the line of action; None: along the sensors' own.
+    The bearings excite it along `direction_deg` from the x axis, across the line of action; None: along the sensors.
     """
 
     frequency_hz: float
@@ -59,25 +59,25 @@ class DrawnHousingMode:
 
 @dataclass(frozen=True)
 class DrawnRig:
-    """A gearbox with its operation, and the crack that it gets.
+    """A random gearbox with its operating point and its crack.
 
     Parameters
     ----------
     parameters : mapping
-        Of the simulator "cracked", without the crack.
-    modes : tuple of HousingMode
+        Parameters of the simulator "cracked", without the crack.
+    modes : tuple of DrawnHousingMode
     sensor_gain : float
-        Of everything between bearing and recording: the estimator must not need it.
+        Gain of everything between bearing and recording, which the estimator must not need.
     speed_rpm, torque_nm : float
     duration_s : float
     gear : str
-        "driver" or "driven": which gets the crack.
+        The cracked gear, "driver" or "driven".
     tooth : int
-        From 0, as the simulator counts.
+        Number from 0, as the simulator counts.
     depth_mm : float
-        0: none.
+        Depth of the crack; 0: none.
     seed : int
-        Of roughness and noise.
+        Seed of roughness and noise.
     """
 
     parameters: Mapping[str, ParameterValue]
@@ -93,24 +93,24 @@ class DrawnRig:
 
     @property
     def teeth(self) -> tuple[int, int]:
-        """Of driver and driven gear."""
+        """Tooth counts of driver and driven gear."""
         return int(self.parameters["teeth_driver"]), int(self.parameters["teeth_driven"])
 
 
 def is_for_the_check(teeth: tuple[int, int]) -> bool:
-    """Whether a pair of teeth belongs to the rigs of the check; the calibration never sees it."""
+    """Return whether a pair of tooth counts belongs to the rigs of the check, which the calibration never sees."""
     return sum(teeth) % 3 == 0
 
 
 def draw_rig(rng: np.random.Generator, *, for_the_check: bool, even: bool = False) -> DrawnRig:
-    """Draw a gearbox; those of the check have other teeth and modules than those of the calibration.
+    """Draw a gearbox; tooth counts and modules of the check differ from those of the calibration.
 
     Parameters
     ----------
     rng : numpy.random.Generator
     for_the_check : bool
     even : bool
-        Teeth that hardly differ, as those of the demonstration machines and of master gears; and lower loads.
+        Teeth that hardly differ, like those of demonstration machines and master gears, and lower loads.
     """
     teeth = _teeth(rng, for_the_check)
     module = float(rng.choice(OTHER_MODULES_MM if for_the_check else CALIBRATION_MODULES_MM))
@@ -160,7 +160,7 @@ def _speed_rpm(rng: np.random.Generator, teeth: tuple[int, int]) -> float:
 def _gears(
     rng: np.random.Generator, teeth: tuple[int, int], module: float, width: float, load: float
 ) -> dict[str, ParameterValue]:
-    deflection_um = load * module / 14.0  # at 14 N/(mm µm), the usual stiffness of a pair of steel gears
+    deflection_um = load * module / 14.0  # 14 N/(mm µm): typical stiffness of a pair of steel gears
     relief = 0.0 if rng.uniform() < 0.25 else deflection_um * rng.uniform(0.2, 1.4)
     return {
         "teeth_driver": teeth[0],
@@ -201,7 +201,7 @@ def _even_teeth(rng: np.random.Generator) -> dict[str, ParameterValue]:
 
 
 def _further_parameters(rng: np.random.Generator, module: float, teeth: tuple[int, int]) -> dict[str, ParameterValue]:
-    """Bearings, shafts and rotors; larger gears sit in larger machines."""
+    """Draw bearings, shafts and rotors; larger gears belong to larger machines."""
     size = module / 2.0
     inertia = 2e-3 * size**4 * (sum(teeth) / 80.0) ** 3
     return {
@@ -235,7 +235,7 @@ def _modes(rng: np.random.Generator) -> tuple[DrawnHousingMode, ...]:
 
 
 # --------------------
-# A drawn gearbox, healthy or with its crack, as a recording.
+# Recording of a random gearbox, healthy or with its crack.
 # --------------------
 
 
@@ -266,17 +266,17 @@ def simulate_rig(
     severity : float or None
         None: the drawn depth of the crack; 0: a healthy gearbox.
     run : int
-        Another run has other noise and begins at another place of the driven shaft; the flanks stay the same.
+        Another run has different noise and starts at another angle of the driven shaft, with the same flanks.
     speed_factor, torque_factor : float
     flanks : int
-        Another number draws other profiles of the flanks.
+        Another number draws different flank profiles.
     options : mapping or None
-        Of the effect, besides or instead of the drawn gear and tooth.
+        Options of the effect, in addition to or instead of the drawn gear and tooth.
     further : sequence of EffectSetting
-        Effects that are switched on as well.
+        Additional effects.
     step_angle_rad : float or None
-        Of "cracked": step times the greatest angular eigenfrequency; None: the simulator's own, finer than floors
-        need.
+        For "cracked": time step times the maximum angular eigenfrequency; None: the simulator's default, finer than
+        needed for floors.
     model : str
         "cracked" or "reduced-fe".
     """
@@ -307,7 +307,7 @@ def simulate_rig(
 
 
 def _prepared(model: str, drawn: DrawnRig, operation: Operation, rng: np.random.Generator) -> ReadyPair | PreparedPair:
-    """Return the healthy machine; finite-element gears are of full discs, with the mesh of a twin's."""
+    """Return the healthy machine; finite-element gears are full discs with the mesh used for a twin."""
     if model == CRACKED:
         setup = SimulationSetup("", drawn.parameters, (), operation)
         return CrackedPair().prepare(setup, rng, sampling_rate_hz=SAMPLING_RATE_HZ)
@@ -316,18 +316,18 @@ def _prepared(model: str, drawn: DrawnRig, operation: Operation, rng: np.random.
 
 
 def turns_before(drawn: DrawnRig, run: int) -> int:
-    """Return the whole turns of the driver that a run's recording leaves out at its beginning."""
+    """Return the whole revolutions of the driver that a recording omits at its beginning."""
     return _random_start(drawn, run)[1] if run else 0
 
 
 def _random_start(drawn: DrawnRig, run: int) -> tuple[np.random.Generator, int]:
-    """Return a run's generator and the first it draws: whole turns before the recording."""
+    """Return a run's random generator and its first draw: the whole revolutions before the recording."""
     rng = np.random.default_rng([drawn.seed, run])
     return rng, int(rng.integers(0, MAX_LEAD_REV))
 
 
 def _with_fixed_flanks(machine: Machine, seed: list[int]) -> Machine:
-    """Draw the flanks' profiles now: they belong to the gears, and are the same in each run."""
+    """Draw the flank profiles now: they belong to the gears and are the same in each run."""
     if machine.roughness.locked_to != "flank":
         return machine
     machine, _ = draw_roughness(machine, np.random.default_rng(seed))
@@ -335,7 +335,7 @@ def _with_fixed_flanks(machine: Machine, seed: list[int]) -> Machine:
 
 
 def _with_path(machine: Machine, drawn: DrawnRig) -> Machine:
-    """Replace the housing's modes by the drawn ones; the sensors stay at bearings 1 and 3."""
+    """Replace the housing modes by the drawn ones; the sensors stay at bearings 1 and 3."""
     channels = tuple(
         _with_modes(channel, bearing, drawn) for channel, bearing in zip(machine.chain.channels, (1, 3), strict=True)
     )
@@ -362,7 +362,7 @@ def _with_modes(channel: MeasuredChannel, bearing: int, drawn: DrawnRig) -> Meas
 
 
 def _direction(mode: DrawnHousingMode, of_the_sensor: tuple[float, ...]) -> tuple[float, ...]:
-    """Return the parts of a bearing's x and y that move a mode."""
+    """Return the components of a bearing's x and y that excite a mode."""
     if mode.direction_deg is None:
         return of_the_sensor
     phi = radians(mode.direction_deg)

@@ -77,7 +77,7 @@ def test_kinds_are_told_over_ranges_and_two_motions_with_their_bounds():
     ranges = [{"first": 1.0, "last": 2.0}, {"first": 4.0, "last": 4.0}]
     told = coexistence_lines({"coexisting_ranges": ranges, "coexisting_step": 0.5}, "rpm")
     assert told[0] == "Two motions coexist at 1 to 2, 4 rpm; values tried are 0.5 rpm apart."
-    assert "may go on beyond" in told[1]
+    assert "may extend beyond it" in told[1]
     assert coexistence_lines({}, "rpm") == []
 
 
@@ -142,7 +142,7 @@ def test_values_that_cannot_be_run_are_named_and_stop_nothing(tmp_path, capsys):
     [
         (("--vary", "speed=600..900rpm"), "FROM..TO:COUNT"),
         (("--vary", "sped=600..900rpm:3"), "there is no parameter 'sped'"),
-        (("--vary", "torque=5..9Nm:3", "--torque", "5Nm"), "torque_nm is given, and varied"),
+        (("--vary", "torque=5..9Nm:3", "--torque", "5Nm"), "torque_nm is both given and varied"),
         (("--vary", "torque=5..9Nm:3", "--direction", "sideways"), "direction is 'sideways'"),
         (("--vary", "torque=5..9Nm:3", "--signal", "a7"), "there is no signal or channel 'a7'"),
         (("--vary", "torque=5..9Nm:3", "--section", "tooth"), "section is 'tooth'"),

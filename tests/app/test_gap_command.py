@@ -100,7 +100,7 @@ def test_a_folder_with_foreign_files_is_refused_before_the_work(capsys, stub, tm
     (tmp_path / name).write_text("mine")
     code, out, err = run(capsys, CRACKED, "-o", tmp_path)
     assert (code, out) == (2, "")
-    assert "belong to no gap diagnosis" in err
+    assert "do not belong to a gap diagnosis" in err
     assert not stub.given
     assert [p.name for p in tmp_path.iterdir()] == [name]
 

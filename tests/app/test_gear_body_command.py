@@ -67,7 +67,7 @@ def test_a_gear_of_another_version_is_named_until_it_is_cleared_away(tmp_path, m
     assert not (tmp_path / "out").exists()
     again = _run(*arguments, "--fresh")
     assert again.exit_code == 0
-    assert "1 file of another version cleared away" in again.stderr
+    assert "1 file of another version deleted" in again.stderr
     assert read_gear(kept).key == gear_key(blank, plan_for(blank, 5000))
 
 

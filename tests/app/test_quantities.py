@@ -56,7 +56,7 @@ def test_worth(text: str, unit: str, value: float) -> None:
         ("2 nm", "N m", "give it in N m"),  # nanometres are no torque
         ("20Hz", "rpm", "give it in rpm"),
         ("5rpm", "s", "give it in s"),
-        ("3mm", "", "without unit"),
+        ("3mm", "", "without a unit"),
         ("3 furlongs", "mm", "'furlongs'"),
         ("mm", "mm", "a number in mm"),
         ("", "mm", "a number in mm"),

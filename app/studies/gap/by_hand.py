@@ -1,4 +1,4 @@
-"""Effects put into healthy recordings by hand, as the literature has them; foreign vibration."""
+"""Synthetic signatures of effects, from the literature, added to healthy recordings; foreign vibration."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def scene_of(recording: Recording) -> textbook.SyntheticScene:
 
 
 def vibrations(recording: Recording) -> list[int]:
-    """Return the rows of a recording that hold vibration."""
+    """Return the row numbers of a recording's vibration channels."""
     return [i for i, channel in enumerate(recording.channels) if channel.is_vibration]
 
 
@@ -67,14 +67,14 @@ AS_SHIPPED = (
     "bearing_clearance",
     "clipping",
 )
-"""Order in which the shipped population's seeds draw; effects that came later follow by themselves."""
+"""Order in which the seeds of the shipped population draw; effects added later follow automatically."""
 _BOOKS = {name: effect.textbook.draw for name, effect in effects().items() if effect.textbook and effect.textbook.draw}
 SIGNATURES = {name: _BOOKS[name] for name in dict.fromkeys((*AS_SHIPPED, *_BOOKS))}
-"""Effect → what draws its signature; the others are as the simulators make them."""
+"""Effect → function that draws its signature; other effects come only from the simulators."""
 
 
 def with_signature(recording: Recording, name: str, rng: np.random.Generator) -> tuple[Recording, float]:
-    """Return the recording with an effect's signature, and how strong it is, 0 to 1."""
+    """Return the recording with an effect's signature added, and its strength, 0 to 1."""
     scene, strength = scene_of(recording), float(rng.uniform())
     signature = SIGNATURES[name](scene, textbook.SIZES[0] * (textbook.SIZES[1] / textbook.SIZES[0]) ** strength, rng)
     samples = recording.samples.copy()
@@ -84,13 +84,13 @@ def with_signature(recording: Recording, name: str, rng: np.random.Generator) ->
 
 
 def made_by_hand(healthy: Recording, torque_nm: float) -> tuple[str, ...]:
-    """Return whose signatures are put into a machine's healthy recordings: no backlash where teeth never part."""
+    """Return the effects whose signatures are added to healthy recordings; no backlash if teeth never separate."""
     light = tooth_load_n_per_mm(rig_of(healthy).pairs[0], torque_nm) < LIGHT_LOAD_N_PER_MM
     return tuple(name for name in SIGNATURES if light or name != "backlash")
 
 
 # --------------------
-# Vibration that no effect of the catalogue makes, added to recordings of healthy machines: what "unknown" looks like.
+# Vibration that no effect of the catalogue causes, added to recordings of healthy machines: examples of "unknown".
 # --------------------
 
 
@@ -108,7 +108,7 @@ def with_foreign_vibration(recording: Recording, rng: np.random.Generator) -> tu
 
 
 def _strange_order(rng: np.random.Generator, low: float, high: float) -> float:
-    """An order that is no whole number and no half of one."""
+    """Return a random order that is neither an integer nor a half-integer."""
     whole = float(rng.integers(int(low), int(high) + 1))
     return whole + float(rng.choice((rng.uniform(0.07, 0.43), rng.uniform(0.57, 0.93))))
 
@@ -124,7 +124,7 @@ def _strange_impacts(scene: textbook.SyntheticScene, rng: np.random.Generator) -
 
 
 def _once_per_revolution(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    """A loose key or coupling: longer than a tooth, and not of one mesh."""
+    """A loose key or coupling: longer than one tooth, and unrelated to the mesh."""
     order = 1.0 if rng.uniform() < 0.5 else scene.teeth[0] / scene.teeth[1]
     return textbook.impact_train(order * float(rng.choice((1.0, 2.0))), 0.01, scene, rng)
 
@@ -134,7 +134,7 @@ def _strange_tone(scene: textbook.SyntheticScene, rng: np.random.Generator) -> F
 
 
 def _ghost(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    """A ghost line: a whole order of one shaft that the cutting machine left."""
+    """A ghost line: an integer order of one shaft left by the cutting machine."""
     ghost = float(rng.integers(20, 4 * scene.teeth[0]))
     order = ghost if rng.uniform() < 0.5 else ghost * scene.teeth[0] / scene.teeth[1]
     line: FloatArray = np.sin(2 * np.pi * order * scene.revolutions) * (
@@ -144,21 +144,21 @@ def _ghost(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArr
 
 
 def _whirl(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    """Oil whirl or a rub below the shaft's order."""
+    """Oil whirl or a rub, below the shaft order."""
     order = float(rng.uniform(0.38, 0.49))
     waves = [np.sin(2 * np.pi * k * order * scene.revolutions + rng.uniform(0, 6)) / k**2 for k in (1, 2, 3)]
     return np.asarray(np.sum(waves, axis=0))
 
 
 def _neighbouring_machine(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    """Lines at fixed frequencies, and their multiples."""
+    """Lines at fixed frequencies and their multiples."""
     first = log_uniform(rng, 17.0, 900.0)
     waves = [np.sin(2 * np.pi * k * first * scene.time_s + rng.uniform(0, 6)) / k for k in range(1, 6)]
     return np.asarray(np.sum(waves, axis=0))
 
 
 def _inverter(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    """A carrier at a fixed frequency with pairs of lines about it."""
+    """A carrier at a fixed frequency with pairs of sidebands."""
     carrier, apart = float(rng.uniform(2000.0, 0.45 * scene.sampling_rate_hz)), float(rng.uniform(30.0, 250.0))
     wave: FloatArray = np.sin(2 * np.pi * carrier * scene.time_s) * (
         1.0 + rng.uniform(0.3, 1.0) * np.cos(2 * np.pi * apart * scene.time_s)
@@ -167,13 +167,13 @@ def _inverter(scene: textbook.SyntheticScene, rng: np.random.Generator) -> Float
 
 
 def _asynchronous(scene: textbook.SyntheticScene, turn_hz: float, rng: np.random.Generator) -> FloatArray:
-    """Return the revolutions of a neighbour's shaft, whose speed wanders a little."""
+    """Return the revolutions of a neighbouring machine's shaft, whose speed wanders slightly."""
     unsteady = rng.uniform(0.0, 0.004) * np.sin(2 * np.pi * rng.uniform(0.05, 1.0) * scene.time_s + rng.uniform(0, 6))
     return np.asarray(np.cumsum(turn_hz * (1.0 + unsteady)) * (scene.time_s[1] - scene.time_s[0]))
 
 
 def _neighbouring_gear(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    """A neighbour's gear, pump or fan: multiples of its teeth or blades, modulated by its shaft, and that shaft."""
+    """A neighbouring gear, pump or fan: tooth or blade multiples modulated by its shaft, and that shaft's line."""
     turns = _asynchronous(scene, log_uniform(rng, 4.0, 60.0), rng)
     teeth, steep = float(rng.integers(3, 60)), rng.uniform(0.5, 2.0)
     waves = [np.cos(2 * np.pi * k * teeth * turns + rng.uniform(0, 6)) / k**steep for k in range(1, 5)]
@@ -182,7 +182,7 @@ def _neighbouring_gear(scene: textbook.SyntheticScene, rng: np.random.Generator)
 
 
 def _loose_foot(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    """A foot or a pedestal that lifts: many multiples of a shaft, of its half as often as not."""
+    """A foot or a pedestal that lifts: many multiples of a shaft order, in half the cases of half that order."""
     first = scene.shaft_orders[textbook.draw_side(rng)] * float(rng.choice((0.5, 1.0)))
     steep = rng.uniform(0.3, 1.2)
     waves = [textbook.tone(k * first, scene, rng) / k**steep * rng.uniform(0.3, 1.0) for k in range(1, 13)]
@@ -190,7 +190,7 @@ def _loose_foot(scene: textbook.SyntheticScene, rng: np.random.Generator) -> Flo
 
 
 def _belt(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    """Slaps by a clock of their own, nearly regular, each nearly as hard."""
+    """Slaps of a belt with an independent clock, nearly regular and nearly equal in strength."""
     passed = _asynchronous(scene, log_uniform(rng, 3.0, 60.0), rng)
     at = np.flatnonzero(np.diff(np.floor(passed)) > 0).astype(np.float64)
     scatter = rng.uniform(0.0, 0.02) * float(np.median(np.diff(at))) if len(at) > 1 else 0.0
@@ -199,7 +199,7 @@ def _belt(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArra
 
 
 def _motor_field(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    """A motor's field: twice the line's frequency and its multiples, beating with twice the slip."""
+    """The field of a motor: twice the line frequency and its multiples, beating at twice the slip."""
     line_hz, slip_hz = float(rng.choice(MAINS_HZ)) * rng.uniform(0.998, 1.002), rng.uniform(0.3, 4.0)
     waves = [np.cos(4 * np.pi * k * line_hz * scene.time_s + rng.uniform(0, 6)) / k**1.5 for k in (1, 2, 3)]
     beat = 1.0 + rng.uniform(0.2, 0.9) * np.cos(2 * np.pi * slip_hz * scene.time_s + rng.uniform(0, 6))
@@ -207,14 +207,14 @@ def _motor_field(scene: textbook.SyntheticScene, rng: np.random.Generator) -> Fl
 
 
 def _random_impacts(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    """Now and then, as of loose parts, or in great number, as of bubbles that collapse."""
+    """Random impacts: occasional, as of loose parts, or numerous, as of collapsing bubbles."""
     n = max(3, int(scene.time_s[-1] * log_uniform(rng, 1.0, 400.0)))
     places = rng.integers(0, len(scene.time_s), n).astype(np.float64)
     return textbook.struck(places, np.abs(rng.standard_normal(n)) + 0.2, scene, textbook.ring(scene, rng))
 
 
 def _swelling_noise(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    """Noise of a band that swells with an order: a pump, a rub, lacking oil."""
+    """Band noise modulated by an order: a pump, a rub, lack of oil."""
     order = float(rng.choice((1.0, scene.teeth[0] / scene.teeth[1], _strange_order(rng, 2, 9))))
     swelling: FloatArray = textbook.band_noise(scene, rng) * (
         1.0 + rng.uniform(0.3, 1.0) * np.cos(2 * np.pi * order * scene.revolutions)
@@ -223,12 +223,12 @@ def _swelling_noise(scene: textbook.SyntheticScene, rng: np.random.Generator) ->
 
 
 def _steady_noise(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    """Noise of a band: flow, cavitation, a neighbour."""
+    """Steady band noise: flow, cavitation, a neighbouring machine."""
     return textbook.band_noise(scene, rng)
 
 
 def _bad_contact(scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
-    """A plug that works loose: the signal jumps now and then, and what couples it to the amplifier takes that back."""
+    """A loose plug: the signal jumps occasionally, and the AC coupling of the amplifier lets each jump decay."""
     n = max(2, int(scene.time_s[-1] * log_uniform(rng, 1.0, 60.0)))
     places = rng.integers(0, len(scene.time_s), n).astype(np.float64)
     back = np.exp(-np.arange(int(scene.sampling_rate_hz)) / (log_uniform(rng, 0.001, 0.2) * scene.sampling_rate_hz))

@@ -1,9 +1,9 @@
 """Calibrate the gap's probabilities on simulators left out of learning: `python -m app.studies.gap.calibrate`.
 
-A user's machine is as strange to all simulators as each of them is to the others. So the machines of the population's
-simulators are diagnosed in turn, each simulator's by what the others alone have taught; nothing is simulated anew. What
-is printed, by simulator, is how good recognition is on machines of a kind that it has not learned from. The biases and
-the sharpness are fitted to the same cases: a dozen numbers for some thousand cases.
+A user's machine differs from all simulators as each of them differs from the others. So the machines of each simulator
+in the population are diagnosed after learning only from the other simulators; nothing is simulated again. The output,
+by simulator, is the accuracy on machines of a kind not used for learning. The biases and the sharpness are fitted to
+the same cases: a dozen numbers for some thousand cases.
 """
 
 from __future__ import annotations
@@ -43,42 +43,42 @@ from gearsig.gap import (
 from sims.cracked import CrackedPair
 
 # --------------------
-# From cases with known causes to the numbers that make the gap's probabilities right on the average.
+# From cases with known causes to the numbers that make the probabilities of the gap diagnosis right on average.
 # --------------------
 
 
 FALSE_ON_NONE, FALSE_ON_UNKNOWN = 0.05, 0.15
-"""Parts of the healthy cases, and of those outside the catalogue, on which an effect may be named."""
+"""Maximum shares of healthy cases, and of cases outside the catalogue, for which an effect is named."""
 
 THRESHOLDS = tuple(round(0.5 + 0.01 * i, 2) for i in range(46))
 
 APART = 0.75
-"""The likeliest of two effects is named alone from three to one: below that it was right three times in twelve, on
-development and calibration cases."""
+"""The more probable of two effects is named alone from odds of three to one: below that it was right in three of
+twelve development and calibration cases."""
 _START = np.array([1.0, 0.0, 0.3, 0.0, 0.0, 0.0, 0.0])
 _BOUNDS = ((0.1, 5.0), (0.0, 10.0), (-1.0, 1.0), (-4.0, 4.0), (-4.0, 4.0), (0.0, 1.0), (-4.0, 0.0))
 _BIAS_BOUNDS = (-2.0, 2.0)
 _SEVERAL_BOUNDS = (0.5, 4.0)
 _PRIOR = 0.5
-"""Weight of the start, at which trials say nothing, beside that of one case."""
+"""Weight of the starting values, at which trials have no influence, relative to one case."""
 BIAS_SCATTER = 0.3
-"""Of effects' biases, in which a handful of cases each must not be learned by heart."""
+"""Prior scatter of the effects' biases, which prevents overfitting to a handful of cases each."""
 
 
 @dataclass(frozen=True)
 class AttributedCase:
-    """One case: what the forests and the trials said, and the truth.
+    """One case: results of the forests and the trials, and the truth.
 
     Parameters
     ----------
     truths : tuple of str
-        Causes that are right; two for a pair.
+        Correct causes; two for a pair.
     forest, scores : mapping
     size : float
         See `gearsig.gap.Attribution`.
     n_conditions : int
     simulator : str
-        That made it.
+        Simulator that made it.
     """
 
     truths: tuple[str, ...]
@@ -89,19 +89,19 @@ class AttributedCase:
     simulator: str = ""
 
     def by(self, calibration: GapCalibration) -> dict[str, float]:
-        """Return cause → probability, likeliest first."""
+        """Return cause → probability, most probable first."""
         return calibration.probabilities(self.forest, self.scores, self.size, self.n_conditions)
 
 
 def fit_calibration(cases: Sequence[AttributedCase], several: Sequence[AttributedCase] = ()) -> GapCalibration:
-    """Fit sharpness, what trials say and all biases by likelihood; then the threshold for naming an effect.
+    """Fit sharpness, weight of trials and all biases by maximum likelihood; then the threshold for naming an effect.
 
     Parameters
     ----------
     cases : sequence of AttributedCase
-        Of one operating condition each.
+        Cases of one operating condition each.
     several : sequence of AttributedCase
-        Of several: by how much more than one they say is fitted to these, all else kept.
+        Cases of several conditions; their extra weight over one condition is fitted to these, all else fixed.
 
     J. C. Platt, "Probabilistic outputs for support vector machines", 1999; C. Guo, G. Pleiss, Y. Sun, K. Q. Weinberger,
     "On calibration of modern neural networks", 2017 (one temperature for all classes, a bias for each).
@@ -126,7 +126,7 @@ def fit_calibration(cases: Sequence[AttributedCase], several: Sequence[Attribute
 
 
 def log_loss(calibration: GapCalibration, cases: Sequence[AttributedCase]) -> float:
-    """Return −mean ln p of what is true."""
+    """Return −mean ln p of the true causes."""
     right = [sum(p.get(t, 0.0) for t in c.truths) for c in cases for p in (c.by(calibration),)]
     return float(-np.mean(np.log(np.maximum(right, 1e-9))))
 
@@ -140,7 +140,7 @@ def _calibration(x: FloatArray, effects: Sequence[str]) -> GapCalibration:
 
 
 def _named_from(fitted: GapCalibration, cases: Sequence[AttributedCase]) -> float:
-    """Return the least probability of effects together from which naming keeps both false rates."""
+    """Return the minimum total probability of effects at which naming keeps both false rates."""
     without = [
         (rate, [c.by(fitted) for c in cases if c.truths == (cause,)])
         for cause, rate in ((NONE, FALSE_ON_NONE), (UNKNOWN, FALSE_ON_UNKNOWN))
@@ -157,25 +157,25 @@ def _named_from(fitted: GapCalibration, cases: Sequence[AttributedCase]) -> floa
 
 @cache
 def known_effects() -> Mapping[str, GapEffect]:
-    """Return the effects that a gear pair's twin can try."""
+    """Return the effects that the twin of a gear pair can simulate."""
     return CrackedPair().gap_effects()
 
 
 # --------------------
-# The population's own machines as cases, each simulator's known to the others' forests only.
+# The machines of the population as cases, diagnosed by forests that have not learned from their simulator.
 # --------------------
 
 
 SEED = 9203
 AT_TWO_POINTS = (INDEPENDENT, LUMPED)
 PER_EFFECT, PER_NO_EFFECT = 24, 96
-"""Rows of each simulator: of each effect, and of healthy machines and of unknown changes; a case in five is either."""
+"""Rows of each simulator: per effect, and for healthy machines and unknown changes, together one case in five."""
 
 
 def cases_of(population: Population, simulator: str, *, with_reference: bool) -> tuple[list[AttributedCase], ...]:
-    """Return the cases of one simulator's machines, by forests without it: of one condition, and of two.
+    """Return the cases of one simulator, by forests trained without it: with one condition, and with two.
 
-    Only machines of some simulators were recorded at two operating points with the same effect.
+    Only some simulators have machines recorded at two operating points with the same effect.
     """
     rng = np.random.default_rng(SEED)
     rows_of_simulator = np.flatnonzero((population.simulators == simulator) & ~population.by_hand)
@@ -194,9 +194,9 @@ def cases_of(population: Population, simulator: str, *, with_reference: bool) ->
 
 
 def two_conditions(population: Population, rows: Iterable[int]) -> list[tuple[int, int]]:
-    """Return the rows that are of one machine with one cause at both of its points: machine 2k and 2k + 1.
+    """Return pairs of rows of one machine with the same cause at both points: machines 2k and 2k + 1.
 
-    Of healthy machines and of unknown changes as many as of four effects each, as among the cases of one condition.
+    Healthy machines and unknown changes each have as many as four effects, as among the cases of one condition.
     """
     at = {(int(population.rigs[row]), str(population.causes[row])): row for row in rows}
     pairs = {
@@ -222,13 +222,13 @@ def _attributed(
 def attributed_case(
     cause: str, changes: Sequence[Features], loads: Sequence[float], classifier: EffectClassifier, simulator: str
 ) -> AttributedCase:
-    """Return what forests say of one machine's change at one or several operating points, without trials.
+    """Return the forests' result for one machine's change at one or several operating points, without trials.
 
     Parameters
     ----------
     cause : str
     changes, loads : sequences
-        Of each point; load of the teeth in N/mm.
+        For each point: change of the features; tooth load in N/mm.
     classifier : EffectClassifier
     simulator : str
     """
@@ -240,7 +240,7 @@ def attributed_case(
 
 
 def _change(population: Population, learned: Learned, row: int, *, with_reference: bool) -> Features:
-    """Return what a row's machine changed, the twin as credible as the others' machines show it to be."""
+    """Return the change of a row's machine, with the twin's credibility taken from the other simulators' machines."""
     if with_reference:
         return Features(population.change_names, population.changes[row], population.change_scatter[row])
     values = population.features[row] - learned.credibility * population.simulated[row]
@@ -249,7 +249,7 @@ def _change(population: Population, learned: Learned, row: int, *, with_referenc
 
 
 # --------------------
-# How good that is, by simulator.
+# Accuracy by simulator.
 # --------------------
 
 
@@ -258,7 +258,7 @@ STRONG = 3.0
 
 
 def table(calibration: GapCalibration, cases: Sequence[AttributedCase]) -> list[str]:
-    """Return a line for each simulator and one for all: of strong effects, and of all."""
+    """Return a line for each simulator and one for all, with figures for strong effects and for all."""
     named = [*dict.fromkeys(case.simulator for case in cases)]
     rows = [(name, [case for case in cases if case.simulator == name]) for name in named]
     return [_line(name, calibration, some) for name, some in [*rows, ("all", list(cases))]]
@@ -278,7 +278,7 @@ def _line(name: str, calibration: GapCalibration, cases: Sequence[AttributedCase
     )
     return (
         f"{name}: strong {len(strong)}: likeliest {_share(first)}, two {_share(two)}, group {_share(group)}; "
-        f"said with 0.9 {len(sure)}, right {_share(sure)}; calibration error {calibration_error(answers):.3f}; "
+        f"probability ≥ 0.9: {len(sure)}, right {_share(sure)}; calibration error {calibration_error(answers):.3f}; "
         f"named on healthy {_share(healthy)}, on unknown {_share(unknown)}; log loss {log_loss(calibration, cases):.3f}"
     )
 
@@ -293,7 +293,7 @@ def _most_probable_group(probabilities: Mapping[str, float], known: Mapping[str,
 
 
 def calibration_error(answers: Sequence[tuple[AttributedCase, Mapping[str, float]]], n_bins: int = 10) -> float:
-    """Return Σ_b n_b/n |share right − mean probability| of the likeliest, over equal bins of its probability."""
+    """Return Σ_b n_b/n |share right − mean probability| of the most probable cause, over equal probability bins."""
     largest = np.array([max(p.values()) for _, p in answers])
     right = np.array([next(iter(p)) in case.truths for case, p in answers], dtype=float)
     bins = np.minimum((largest * n_bins).astype(int), n_bins - 1)
@@ -302,7 +302,7 @@ def calibration_error(answers: Sequence[tuple[AttributedCase, Mapping[str, float
 
 
 def main(to: Path = CALIBRATION_FILE) -> None:
-    """Weigh the population's machines, fit, write, and print how good that is."""
+    """Diagnose the machines of the population, fit the calibration, write it, and print its accuracy."""
     population = load_population()
     values: dict[str, Any] = {}
     n_cases = 0

@@ -1,4 +1,4 @@
-"""Rows of the population of the gap diagnosis, from gearboxes drawn at random: healthy, with effects, by hand."""
+"""Rows of the population of the gap diagnosis from random gearboxes: healthy, with effects, with signatures."""
 
 from __future__ import annotations
 
@@ -47,48 +47,48 @@ from sims.gear_pair import BODY_SHAPES, body_gain
 from sims.machine import log_uniform, nominal_of
 
 # --------------------
-# Gearboxes drawn at random, and how they stand on another day.
+# Random gearboxes, and their state on another day.
 # --------------------
 
 
 LIGHT_SHARE, LIGHT_TORQUE = 0.4, (0.0005, 0.3)
-"""Machines that run at light load, and their torque over that of the others: down to what idling takes."""
+"""Share of machines at light load, and their torque relative to that of the others: down to idling."""
 
 DURATION_S = (3.0, 7.0)
 MOUNTED_ANEW_SHARE = 0.6
-"""Recordings between which and their reference the sensors were taken off."""
+"""Share of recordings whose sensors were removed after the reference and mounted again."""
 
 COUPLING_BENDING_SHARES = (0.002, 0.05)
-"""Bending stiffness of a coupling over its shaft's torsional one, by catalogues of steel discs to elastomers."""
+"""Bending stiffness of a coupling over the torsional stiffness of its shaft; catalogues, steel discs to elastomers."""
 
 RIGID_SHARE = 0.25
 MOUNTS_HZ, MOUNTS_DAMPING, BODY_KG = (4.0, 40.0), (0.05, 0.3), (20.0, 120.0)
-"""Machines on rigid ground; mounts or frames of the others, and their housings with what moves along, at module 2."""
+"""For machines not on rigid ground: mounts or frames, and mass of the housing with attached parts, at module 2."""
 
 SPEED_SCATTER, TORQUE_SCATTER = 0.006, 0.05
 GAIN_SCATTER, MODE_SCATTER, MODE_GAIN_SCATTER = 0.10, 0.03, 0.20
-"""Relative standard deviations of what a changed mounting changes; gains are those of each channel and mode."""
+"""Relative standard deviations of the effects of remounting: gain per channel, mode frequency, gain per mode."""
 
 NOISE_SCATTER = 0.12
-"""Of the natural logarithm of the sensors' noise."""
+"""Standard deviation of the natural logarithm of the sensor noise."""
 
 WANDER_PERCENT, WANDER_HZ, WANDER_SCATTER = (0.005, 0.3), (0.03, 1.0), 0.4
-"""Of every drive's speed: amplitude and frequency, and by how much the amplitude's logarithm differs on another day."""
+"""Speed wander of every drive: amplitude, frequency, and scatter of the log amplitude between days."""
 
 
 @dataclass(frozen=True)
 class OperatingDay:
-    """How a machine stands and runs on one day.
+    """State and operation of a machine on one day.
 
     Parameters
     ----------
     drawn : DrawnRig
-        With that day's path and noise.
+        The machine with the path and noise of that day.
     speed_factor, torque_factor : float
     gains : tuple of float
-        Of the channels.
+        Gains of the channels.
     wander : EffectSetting
-        Of the speed, as every drive's.
+        Speed wander, which every drive has.
     """
 
     drawn: DrawnRig
@@ -99,11 +99,11 @@ class OperatingDay:
 
 
 def draw_machine(rng: np.random.Generator) -> DrawnRig:
-    """Draw a healthy gearbox, full or lightly loaded, with the length of its recordings.
+    """Draw a healthy gearbox, fully or lightly loaded, with the length of its recordings.
 
-    Gears lie side by side, above each other or aslant, and a housing's modes move each in a direction of their own:
-    what pushes across the line of action is heard as well. Most housings stand on something that yields, so that the
-    low orders of the shafts are heard, too.
+    Gears are arranged side by side, above each other or obliquely, and each housing mode has its own direction, so that
+    forces across the line of action are measured as well. Most housings stand on a compliant support, so that low
+    shaft orders are measured, too.
     """
     drawn = draw_rig(rng, for_the_check=False, even=bool(rng.uniform() < 0.1))
     aslant = np.random.default_rng([drawn.seed, 6])
@@ -129,19 +129,19 @@ def _on_mounts(drawn: DrawnRig, rng: np.random.Generator) -> tuple[DrawnHousingM
 
 
 def first_day(drawn: DrawnRig, rng: np.random.Generator) -> OperatingDay:
-    """Return the machine as it was drawn."""
+    """Return the first day, with the machine as drawn."""
     return OperatingDay(drawn, 1.0, 1.0, (1.0, 1.0), _wander(drawn, rng))
 
 
 def another_day(drawn: DrawnRig, rng: np.random.Generator) -> OperatingDay:
-    """Return the machine as it stands on another day: nearly the same point, perhaps with sensors mounted anew."""
+    """Return the machine on another day: at nearly the same operating point, perhaps with remounted sensors."""
     speed, torque = (1.0 + s * float(rng.standard_normal()) for s in (SPEED_SCATTER, TORQUE_SCATTER))
     noise = float(drawn.parameters["noise_mps2"]) * float(np.exp(NOISE_SCATTER * rng.standard_normal()))
     parameters, wander = {**drawn.parameters, "noise_mps2": noise}, _wander(drawn, rng)
     if rng.uniform() >= MOUNTED_ANEW_SHARE:
         return OperatingDay(replace(drawn, parameters=parameters), speed, torque, (1.0, 1.0), wander)
     first, second = np.exp(GAIN_SCATTER * rng.standard_normal(2))
-    # Where the whole housing moves, it matters little how a sensor sits.
+    # If the whole housing moves, the mounting of a sensor matters little.
     modes = tuple(_remounted(mode, rng) if mode.frequency_hz > MOUNTS_HZ[1] else mode for mode in drawn.modes)
     return OperatingDay(
         replace(drawn, parameters=parameters, modes=modes), speed, torque, (float(first), float(second)), wander
@@ -149,7 +149,7 @@ def another_day(drawn: DrawnRig, rng: np.random.Generator) -> OperatingDay:
 
 
 def _wander(drawn: DrawnRig, rng: np.random.Generator) -> EffectSetting:
-    """Return the drive's wander on one day: its kind belongs to the machine."""
+    """Return the speed wander of the drive on one day; its character belongs to the machine."""
     machine_rng = np.random.default_rng([drawn.seed, 5])
     percent, frequency_hz = (log_uniform(machine_rng, *span) for span in (WANDER_PERCENT, WANDER_HZ))
     today = float(np.exp(WANDER_SCATTER * rng.standard_normal()))
@@ -166,35 +166,32 @@ def _remounted(mode: DrawnHousingMode, rng: np.random.Generator) -> DrawnHousing
 
 
 # --------------------
-# What every machine has, healthy or not: run-out, unbalance, uneven pitch, a housing that swallows high frequencies.
+# Properties of every machine, healthy or not: run-out, unbalance, uneven pitch, a housing that damps high frequencies.
 #
-# The simulated machines are too good: few lines of their shafts, few sidebands, most of the vibration at high multiples
-# of the mesh. Measured ones have sidebands 15 to 35 dB below the mesh and most energy at its first two harmonics. So
-# each machine of the population gets tolerances and paths of its own, the same on every day; the twin knows nothing of
-# them.
+# The simulated machines are too perfect: few shaft lines, few sidebands, most of the vibration at high mesh harmonics.
+# Measured ones have sidebands 15 to 35 dB below the mesh and most energy at its first two harmonics. So each machine of
+# the population gets its own tolerances and paths, the same on every day, which the twin does not know.
 #
-# Source of what is usual: ISO 21940-11:2016 (unbalance), ISO 1328-1:2013 (run-out and pitch, grades 5 to 8);
+# Source of typical values: ISO 21940-11:2016 (unbalance), ISO 1328-1:2013 (run-out and pitch, grades 5 to 8);
 # R. B. Randall, *Vibration-based Condition Monitoring*, 2nd ed., 2021, chapter 2.
 # --------------------
 
 
 SWINGS, LINES, PITCH, PULLS = (0.005, 0.2), (0.0006, 0.1), (0.006, 0.4), (0.003, 0.1)
-"""Sizes, as in `sims.effects.Signature`: of a swing of the mesh per turn, of a shaft's line, of uneven pitch
-(what the teeth repeat by themselves is 30 dB below the mesh with good ones, as loud as the mesh at light load), of the
-drive's pulling."""
+"""Sizes, as in `sims.effects.Signature`: mesh modulation per revolution, shaft line, uneven pitch (the part repeated
+with the teeth is 30 dB below the mesh for good teeth, equal to it at light load), torque variation of the drive."""
 
 CORNER_MESH_ORDERS, STEEPEST, FLAT_SHARE = (0.4, 4.0), 3, 0.2
-"""Where a path begins to fall, in mesh frequencies; by how many 6 dB per octave; paths that do not."""
+"""Corner of a falling path, in mesh frequencies; maximum slope, in 6 dB per octave; share of flat paths."""
 
 NOISE, HUM = (0.0004, 0.1), (0.0005, 0.05)
-"""Of a sensor, over the vibration."""
+"""Noise and hum of a sensor, relative to the vibration."""
 
 MOUNTING_GAIN, MOUNTING_CORNER, MOUNTING_LINES = 0.12, 0.05, 0.08
-"""Standard deviations of the logarithms of what a sensor that was mounted anew changes: its gain, its path's corner,
-each mesh harmonic by itself."""
+"""Standard deviations of the log changes by remounting a sensor: gain, corner of the path, each mesh harmonic."""
 
 TACHOMETER_REV = (5e-6, 1e-3)
-"""By which a mark comes too early or too late, in revolutions: marks, thresholds and clocks are not exact."""
+"""Timing error of a tachometer mark, in revolutions: marks, thresholds and clocks are not exact."""
 
 
 @dataclass(frozen=True)
@@ -204,11 +201,11 @@ class Ordinary:
     Parameters
     ----------
     seed : int
-        Of the machine.
+        Seed of the machine.
     scales : tuple of float
-        The channels' standard deviations when the machine was new, which all sizes are relative to.
+        Standard deviations of the channels when the machine was new, to which all sizes are relative.
     paths : tuple of (int, float)
-        Each channel's steepness, 0: flat, and corner frequency in Hz, the same whatever the day's speed.
+        Slope of each channel (0: flat) and corner frequency in Hz, independent of speed.
     """
 
     seed: int
@@ -236,16 +233,16 @@ class Ordinary:
         rng: np.random.Generator,
         changed_paths: Sequence[textbook.PathChange] = (),
     ) -> Recording:
-        """Return a recording as this machine makes it; noise and the phase of the hum are that day's.
+        """Return a recording with the tolerances of this machine; noise and the phase of the hum vary by day.
 
         Parameters
         ----------
         recording : Recording
         turns : int
-            Of the driver, before the recording begins: what belongs to the driven shaft comes at its own place.
+            Driver revolutions before the recording begins, which determine the angle of the driven shaft.
         rng : numpy.random.Generator
         changed_paths : sequence of PathChange
-            One for each vibration channel; none: they are as ever.
+            One for each vibration channel; empty: unchanged.
         """
         scene = scene_of(recording)
         scene = replace(scene, revolutions=scene.revolutions + turns)
@@ -270,7 +267,7 @@ class Ordinary:
         return replace(recording, samples=samples)
 
     def _jittered(self, pulses: FloatArray, scene: textbook.SyntheticScene, rng: np.random.Generator) -> FloatArray:
-        """Return a tachometer's signal with each of its pulses a little off."""
+        """Return a tachometer signal with jitter on each of its pulses."""
         from scipy.ndimage import map_coordinates
 
         spread_rev = log_uniform(np.random.default_rng([self.seed, 14]), *TACHOMETER_REV)
@@ -282,7 +279,7 @@ class Ordinary:
 
 
 def mounted_anew(recording: Recording, rng: np.random.Generator) -> Recording:
-    """Return a recording as sensors would give it that were taken off and put back."""
+    """Return a recording as measured by remounted sensors."""
     scene = scene_of(recording)
     samples = recording.samples.copy()
     for i in vibrations(recording):
@@ -297,7 +294,7 @@ def mounted_anew(recording: Recording, rng: np.random.Generator) -> Recording:
 
 
 def _shelf(values: FloatArray, corner_hz: float, moved_hz: float, rate_hz: float) -> FloatArray:
-    """Return values through a path whose corner moved: (1 + jf/f0)/(1 + jf/f1)."""
+    """Return values filtered by a path whose corner moved: (1 + jf/f0)/(1 + jf/f1)."""
     frequency = np.fft.rfftfreq(len(values), 1.0 / rate_hz)
     answer = (1.0 + 1j * frequency / corner_hz) / (1.0 + 1j * frequency / moved_hz)
     return np.asarray(np.fft.irfft(np.fft.rfft(values) * answer, len(values)))
@@ -308,13 +305,13 @@ def _mains_hz(seed: int) -> float:
 
 
 def _paths(seed: int, scene: textbook.SyntheticScene, n_channels: int) -> list[tuple[int, float]]:
-    """Return each channel's steepness, 0: flat, and corner frequency in Hz."""
+    """Return the slope (0: flat) and corner frequency in Hz of each channel."""
     rng = np.random.default_rng([seed, 10])
     turns_hz = (scene.revolutions[-1] - scene.revolutions[0]) / (scene.time_s[-1] - scene.time_s[0])
     mesh_hz = scene.teeth[0] * turns_hz
     flat, steep = rng.uniform() < FLAT_SHARE, int(rng.integers(1, STEEPEST + 1))
     corner = log_uniform(rng, *CORNER_MESH_ORDERS)
-    # Sensors on one housing differ less than housings do.
+    # Sensors on one housing differ less than different housings.
     return [(0 if flat else steep, mesh_hz * corner * log_uniform(rng, 0.6, 1.6)) for _ in range(n_channels)]
 
 
@@ -328,7 +325,7 @@ def _filtered(values: FloatArray, path: tuple[int, float], rate_hz: float) -> Fl
 
 
 def _tolerances(scene: textbook.SyntheticScene, rng: np.random.Generator) -> list[textbook.Signature]:
-    """Return what the machine's own shafts, gears and drive do."""
+    """Return the signatures of the machine's own shafts, gears and drive."""
     tolerances = []
     for order in scene.shaft_orders:
         swing, late = log_uniform(rng, *SWINGS), log_uniform(rng, *SWINGS)
@@ -345,14 +342,14 @@ def _tolerances(scene: textbook.SyntheticScene, rng: np.random.Generator) -> lis
 
 
 # --------------------
-# One recording of the population, reduced and compared, and how all of them are written.
+# One recording of the population, reduced and compared, and the table of all recordings.
 # --------------------
 
 
 SEED = 4107
 
 ONE_SENSOR_SHARE = 0.4
-"""Machines of which one sensor's signal is known."""
+"""Share of machines with only one known sensor."""
 
 Recorded = tuple[str, str, float, Recording, float]
 """Label, detail, severity, recording and torque."""
@@ -366,15 +363,16 @@ class PopulationSample:
     Parameters
     ----------
     simulator : str
-        Of the machine.
+        Simulator of the machine.
     rig : int
     label, detail : str
         Effect, "none" or "unknown"; `BY_HAND`, options, or the foreign vibration's name.
     severity, torque_nm : float
     load_n_per_mm : float
-        Of the teeth.
+        Tooth load.
     change, features, simulated : Features
-        Against the healthy reference; of the recording itself; of the twin that knows the rig file only.
+        Change from the healthy reference; features of the recording; features of the twin, which knows only the rig
+        file.
     """
 
     simulator: str
@@ -390,14 +388,14 @@ class PopulationSample:
 
 
 def samples_of(simulator: str, rig: int, made: Callable[[], Made]) -> list[PopulationSample]:
-    """Return what the recordings of a simulator's machine show; what cannot be made or reduced is told and left out.
+    """Return the samples of a simulated machine; what cannot be made or reduced is reported and left out.
 
     Parameters
     ----------
     simulator : str
     rig : int
     made : callable
-        Makes the healthy reference, the reduced run of the twin that knows the rig file only, and all recordings.
+        Makes the healthy reference, the reduced run of the twin, which knows only the rig file, and all recordings.
     """
     samples: list[PopulationSample] = []
     try:
@@ -423,7 +421,7 @@ def _alone(features: Features) -> Features:
 
 
 def reduced(recording: Recording, rig: int) -> ReducedRecording:
-    """Return a recording's sums, with the channels that are known of its machine."""
+    """Return a recording reduced to its sums, with the known channels of its machine."""
     reduced_recording = reduce_recording(recording, rig_of(recording))
     draw = np.random.default_rng([SEED, rig, 1])
     if draw.uniform() >= ONE_SENSOR_SHARE:
@@ -435,7 +433,7 @@ def reduced(recording: Recording, rig: int) -> ReducedRecording:
 def put_in_by_hand(
     healthy: Sequence[Recording], n_foreign: int, n_by_hand: int, torque_nm: float, rng: np.random.Generator
 ) -> Iterator[Recorded]:
-    """Yield healthy recordings, in turn, with foreign vibration, then with as many effects' signatures, each once."""
+    """Yield the healthy recordings, in turn, with foreign vibration, then with `n_by_hand` different signatures."""
     for i in range(n_foreign):
         recording, foreign = with_foreign_vibration(healthy[i % len(healthy)], rng)
         yield UNKNOWN, foreign, 0.0, recording, torque_nm
@@ -445,7 +443,7 @@ def put_in_by_hand(
 
 
 def write(path: Path, samples: Sequence[PopulationSample]) -> None:
-    """Write the table as arrays of numbers and text."""
+    """Write the table of samples as arrays of numbers and text."""
     columns = ("simulator", "rig", "label", "detail", "severity", "torque_nm", "load_n_per_mm")
     rows = {key: np.array([getattr(s, key) for s in samples]) for key in columns}
     for name, stem in (("change", "change"), ("features", "feature"), ("simulated", "simulated")):
@@ -457,7 +455,7 @@ def write(path: Path, samples: Sequence[PopulationSample]) -> None:
 
 
 AT_THE_END = ("clipping", "transfer_path")
-"""Effects of what records: made by hand only, since what a machine's tolerances do comes before."""
+"""Effects of the measurement chain: added only as signatures, because the machine's tolerances act before them."""
 
 
 @dataclass(frozen=True)
@@ -470,10 +468,10 @@ class PopulationModel:
     first_rig : int
         Number of its first gearbox.
     n_mounted_anew, n_foreign, n_by_hand : int
-        Recordings of each gearbox: healthy with sensors mounted anew, with foreign vibration, of each signature.
+        Recordings of each gearbox: healthy with remounted sensors, with foreign vibration, of each signature.
     simulated : tuple of float
-        Of each recording with a simulated effect the share of the range of severities, see `PairTwin.draw`, that is
-        left out: what hardly shows tells nothing, and beside what is usual most does not.
+        For each recording with a simulated effect, the share of the range of severities that is left out, see
+        `PairTwin.draw`: weak effects carry no information, and most are weak compared with the usual tolerances.
     """
 
     name: str
@@ -487,14 +485,14 @@ class PopulationModel:
 CRACKED = PopulationModel("cracked", 0, 4, 7, 3, (0.3, 0.6))
 REDUCED = PopulationModel("reduced-fe", 50_000, 3, 4, 1, (0.3, 0.6))
 PLAY_SHARE = 0.5
-"""That a run-out may take away: others, and pitch errors, need some as well."""
+"""Maximum share of the play that a run-out may use: other run-outs and pitch errors need some as well."""
 N_HEALTHY = 3
 N_PATHS = 2
-"""Changed paths for each signature: nothing else shows them."""
+"""Number of changed paths for each signature: no other recordings contain them."""
 
 
 def one_rig(model: PopulationModel, index: int) -> list[PopulationSample]:
-    """Return the samples of one drawn gearbox; none where its teeth cannot be made."""
+    """Return the samples of one random gearbox; none if its teeth cannot be made."""
     rig = model.first_rig + index
 
     def made() -> Made:
@@ -515,9 +513,9 @@ def one_rig(model: PopulationModel, index: int) -> list[PopulationSample]:
 def _recordings(
     model: PopulationModel, drawn: DrawnRig, twin: CrackedTwin, ordinary: Ordinary, rig: int
 ) -> Iterator[Recorded]:
-    """Yield everything that is recorded of one gearbox.
+    """Yield all recordings of one gearbox.
 
-    Each draws from a seed of its own: where one effect is drawn otherwise, the others stay as they are.
+    Each has its own seed: if one effect is drawn differently, the others stay the same.
     """
     bare: list[Recording] = []
     healthy: list[Recording] = []
@@ -559,7 +557,7 @@ def _recordings(
 
 
 def _turning(name: str, severity: float, drawn: DrawnRig, twin: CrackedTwin) -> float:
-    """Return a severity with which this machine, whose play the twin does not know, turns freely at any load."""
+    """Return a severity at which this machine, whose play the twin does not know, turns freely at any load."""
     if name != "eccentricity":
         return severity
     play_um = 2.0 * float(drawn.parameters["half_backlash_um"])
@@ -589,21 +587,21 @@ def _record(model: PopulationModel, day: OperatingDay, run: int, setting: Effect
 # --------------------
 # Cases of the independent rig's development gears for the population of the gap diagnosis.
 #
-# How an effect looks differs from simulator to simulator: what is learned from several holds better for one that none
-# of them is. Gears of the calibration and evaluation cases are not among these, nor is what the independent rig has
-# outside the catalogue: what nothing explains must be told by being like nothing.
+# The signs of an effect differ between simulators: learning from several generalises better to a machine unlike any of
+# them. The gears of the calibration and evaluation cases are not among these, nor are the independent rig's effects
+# outside the catalogue: unknown causes must be recognised by being unlike all known ones.
 # --------------------
 
 
 FIRST_RIG, MAX_CONDITIONS = 100_000, 2
 MIN_LEVEL = 0.25
-"""0 (barely noticeable) to 1 (strong)."""
+"""Minimum level, 0 (barely noticeable) to 1 (strong)."""
 ROUND = (*CATALOGUE, NONE)
 N_BY_HAND = 2
 
 
 def one_case(index: int) -> list[PopulationSample]:
-    """Return the samples of one case: its effect, the same without it, and a few made by hand of the latter."""
+    """Return the samples of one case: with its effect, without it, and some with signatures added to the latter."""
     rng = np.random.default_rng([SEED, 2, index])
     cause = ROUND[index % len(ROUND)]
     case = draw_case(
@@ -633,7 +631,7 @@ def _condition(
     recordings: tuple[Recording, Recording, Recording],
     rng: np.random.Generator,
 ) -> Made:
-    """Return what one condition is compared with, the twin at its speed and stated torque, and what is compared."""
+    """Return the reference of one condition, the twin at its speed and stated torque, and the recordings to compare."""
     now, healthy, reference = recordings
 
     def compared() -> Iterator[Recorded]:
@@ -647,7 +645,7 @@ def _condition(
 
 
 def reduced_twin(recording: Recording, rig: int, torque_nm: float) -> ReducedRecording:
-    """Return the run of the twin at a recording's speed and the stated torque, reduced, under its channels' names."""
+    """Return the reduced run of the twin at a recording's speed and the stated torque, with its channel names."""
     reduced_recording, known = reduced(recording, rig), rig_of(recording)
     simulated = CrackedTwin(known, nominal_of(known)).run(
         OperatingCondition(60.0 * reduced_recording.speed_hz, torque_nm),

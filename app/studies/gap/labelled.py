@@ -1,9 +1,9 @@
-"""How much labelled recordings of a rig tell: `python -m app.studies.gap.labelled simulate --to RAW`, then `score`.
+"""Benefit of labelled recordings of a rig: `python -m app.studies.gap.labelled simulate --to RAW`, then `score`.
 
-Each machine is recorded several times with every effect, of another severity and at another place each time, on another
-day with sensors mounted anew, and compared with one healthy reference. What is learned of the population leaves out
-the simulator that the machine is of; then one, two, four of its own recordings of each effect are labelled, and the
-others are diagnosed.
+Each machine is recorded several times with every effect, each time with another severity and location, on another day
+with remounted sensors, and compared with one healthy reference. Learning from the population leaves out the simulator
+of the machine; then one, two or four of the machine's own recordings of each effect are labelled, and the others are
+diagnosed.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ from sims.blind import Fault as BlindFault
 
 SEED, FIRST_RIG = 77_013, 400_000
 N_RUNS = 6
-"""Recordings of each effect, healthy ones, and ones with vibration from outside the catalogue, of each machine."""
+"""Recordings per machine: of each effect, healthy, and with vibration from outside the catalogue."""
 
 MODEL = PopulationModel(CRACKED.name, FIRST_RIG, 0, N_RUNS, 0, (0.3, 0.35, 0.4, 0.5, 0.6, 0.7))
 
@@ -154,11 +154,11 @@ def samples_of_job(job: tuple[str, int]) -> list[PopulationSample]:
 
 
 COUNTS, STRONG = (0, 1, 2, 4), 3.0
-"""Labelled recordings of each effect; structural floors from which an effect counts as strong."""
+"""Numbers of labelled recordings of each effect; structural floors from which an effect counts as strong."""
 
 
 def score(raw: Path) -> None:
-    """Print how often the likeliest effect is the true one, by how many recordings of each are labelled."""
+    """Print how often the most probable effect is the true one, by the number of labelled recordings of each effect."""
     table = np.load(raw, allow_pickle=False)
     simulators = table["simulator"].astype(str)
     for simulator in np.unique(simulators):
@@ -213,7 +213,7 @@ def _scored(cases: Sequence[_Case], classifier: EffectClassifier, n: int) -> str
         sure += [first == case.cause] if posterior[first] >= 0.9 else []
         loss.append(-np.log(max(posterior[case.cause], 1e-9)))
     return (
-        f"likeliest right {np.mean(right):.2f} of {len(right)}; said with 0.9 {len(sure)}, right "
+        f"likeliest right {np.mean(right):.2f} of {len(right)}; probability ≥ 0.9: {len(sure)}, right "
         f"{np.mean(sure) if sure else 0.0:.2f}; log loss {np.mean(loss):.2f}"
     )
 
@@ -223,7 +223,7 @@ def simulate(
     machines: Annotated[int, typer.Option(help="of each simulator")] = 4,
     simulator: Annotated[list[str] | None, typer.Option(help=f"{', '.join(_MAKE)}; default: all of these")] = None,
 ) -> None:
-    """Record machines."""
+    """Record machines and write their samples."""
     names = [one_of(name, "simulator", _MAKE) for name in simulator or _MAKE]
     samples: list[PopulationSample] = []
     for _, new_samples in answers_of(samples_of_job, [(name, i) for i in range(machines) for name in names], 2):

@@ -1,8 +1,8 @@
-"""Rows of the population from drawn machines of the lumped rig, at two operating points each.
+"""Rows of the population from random machines of the lumped rig, at two operating points each.
 
-Each machine is recorded healthy, with every effect as its author understands them, and with vibration from outside the
-catalogue, at both points, against a healthy reference of another day. One machine in four is hardly loaded, so that
-flanks part.
+At both points each machine is recorded healthy, with every effect as its author understands it, and with vibration from
+outside the catalogue, and compared with a healthy reference of another day. One machine in four is hardly loaded, so
+that flanks separate.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ from sims.machine import log_uniform
 LUMPED = "lumped"
 
 # --------------------
-# The effects, each as this rig's author understands it; severities from hardly visible to strong.
+# The effects as the author of this rig understands them; severities from hardly visible to strong.
 # --------------------
 
 
 Draw = np.random.Generator
 LumpedEffect = Callable[[LumpedRig, LumpedGeometry, Draw], LumpedFault]
 Foreign = Callable[[FloatArray, FloatArray, float, Draw], tuple[FloatArray, FloatArray]]
-"""Time of each step, of each slow step, usual mesh force, chance → forces (2, n) on the housing, N; share of torque."""
+"""Times of steps and of slow steps, typical mesh force, generator → housing forces (2, n), N; share of torque."""
 
 
 def _side_and_tooth(rig: LumpedRig, rng: Draw) -> tuple[int, int]:
@@ -46,7 +46,7 @@ def _side_and_tooth(rig: LumpedRig, rng: Draw) -> tuple[int, int]:
 
 
 def _root_crack(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
-    """A chord of 2.05 modules, cut to a part; the longer the lever, the softer. Neighbours give a little."""
+    """A root chord of 2.05 modules, partly cut; compliance grows with the lever. Neighbouring teeth yield slightly."""
     side, tooth = _side_and_tooth(rig, rng)
     softer = (1.0 - log_uniform(rng, 0.15, 0.75)) ** -2.2 - 1.0
     lever = np.clip(0.35 + 0.65 * shape.heights[side], 0.1, 1.1)
@@ -59,7 +59,7 @@ def _root_crack(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault
 
 
 def _tooth_spall(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
-    """Less width carries near the pitch line; only a spall of the whole width is a step."""
+    """Reduced carrying width near the pitch line; only a spall over the whole width makes a step."""
     side, tooth = _side_and_tooth(rig, rng)
     whole = shape.before + shape.after
     length, width = log_uniform(rng, 0.25, 0.9) * rig.module_mm * 1e-3, min(0.98, log_uniform(rng, 0.3, 1.0))
@@ -73,7 +73,7 @@ def _tooth_spall(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFaul
 
 
 def _chipped_tooth(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
-    """A corner of the tip is gone, wider towards the tip; nearly the whole width leaves a gap."""
+    """A missing corner of the tip, wider towards the tip; if nearly the whole width is missing, it leaves a gap."""
     side, tooth = _side_and_tooth(rig, rng)
     width, height = min(1.0, log_uniform(rng, 0.3, 1.1)), rng.uniform(0.4, 0.65)
     above = np.clip((shape.heights[side] - (1.0 - height)) / height, 0.0, None)
@@ -84,7 +84,7 @@ def _chipped_tooth(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFa
 
 
 def _tooth_wear(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
-    """Archard: as deep as flanks slide, nothing at the pitch point; both gears."""
+    """Wear by Archard's law, proportional to sliding and zero at the pitch point, on both gears."""
     depth = log_uniform(rng, 8e-6, 90e-6) * (rig.module_mm / 2.0) ** 0.5
     sliding = np.abs(shape.path) / max(shape.before, shape.after)
     uneven = 1.0 + 0.25 * np.sign(shape.path) * rng.choice([-1.0, 1.0])
@@ -96,7 +96,7 @@ def _tooth_wear(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault
 
 
 def _pitch_error(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
-    """One tooth stands ahead or behind, or all of them do as they were badly cut."""
+    """One tooth ahead or behind, or all teeth displaced by poor cutting."""
     side, tooth = _side_and_tooth(rig, rng)
     error = log_uniform(rng, 6e-6, 45e-6) * rng.choice([-1.0, 1.0])
     if rng.uniform() < ONE_TOOTH_SHARE:
@@ -120,7 +120,7 @@ def _surface_roughness(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> Lump
 
 
 def _eccentricity(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
-    """A gear off its axis, which its mass is as well, by less."""
+    """An eccentric gear, whose mass is also off the axis, by less."""
     del shape
     side = int(rng.integers(2))
     runout = log_uniform(rng, 30e-6, 160e-6) * np.exp(2j * pi * rng.uniform())
@@ -138,7 +138,7 @@ def _unbalance(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
 
 
 def _misalignment(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
-    """Part of the face carries, and a coupling pushes one, two and three times a turn."""
+    """Only part of the face carries, and a coupling pushes one, two and three times per revolution."""
     angle = log_uniform(rng, 0.5e-3, 4e-3)
     force = rig.loads_nm[0] / shape.base_radii[1]
     opened = angle * rig.face_mm * 1e-3 / (2.0 * force * shape.pair_m_per_n)
@@ -158,7 +158,7 @@ def _torque_ripple(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFa
 
 
 def _race(kind: float, narrow_mm: float, wide_mm: float) -> LumpedEffect:
-    """A ball drops into a pit, as deep as its shape lets it; on the outer race near the load, on the inner anywhere."""
+    """Balls drop into a pit as deep as its shape allows; on the outer race near the load, on the inner one anywhere."""
 
     def race(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
         del shape
@@ -175,7 +175,7 @@ def _race(kind: float, narrow_mm: float, wide_mm: float) -> LumpedEffect:
 
 
 def _transfer_path(rig: LumpedRig, shape: LumpedGeometry, rng: Draw) -> LumpedFault:
-    """A loose sensor, or a housing that has become softer here and stiffer there."""
+    """A loose sensor, or a housing that has become softer in some modes and stiffer in others."""
     del shape
     if rng.uniform() < 0.6:
         resonance_hz, damping = log_uniform(rng, 1900.0, 6500.0), rng.uniform(0.04, 0.12)
@@ -212,12 +212,12 @@ EFFECTS: dict[str, LumpedEffect] = {
 }
 
 # --------------------
-# What is no effect of the catalogue: from outside on the housing, by a clock of its own.
+# Vibration from outside the catalogue: external forces on the housing, with an independent clock.
 # --------------------
 
 
 def _clock(time: FloatArray, rng: Draw) -> FloatArray:
-    """A clock that wanders a little, s."""
+    """Return the time of a slightly wandering clock, in s."""
     coarse = np.linspace(0.0, time[-1], 2000)
     wander = 1.0 + 0.002 * np.cumsum(rng.standard_normal(2000)) / 2000**0.5
     return np.asarray(np.interp(time, coarse, np.cumsum(wander) / 2000 * time[-1]))
@@ -234,7 +234,7 @@ def _pump(size: float, turn_hz: float, n_blades: float) -> Foreign:
 
 
 def _bursts(size: float, rate_hz: float, *, regular: bool) -> Foreign:
-    """Slaps of a belt, nearly regular; or collapsing bubbles, at random and many."""
+    """Slaps of a belt, nearly regular; or collapsing bubbles, random and numerous."""
 
     def forces(time: FloatArray, slow: FloatArray, force: float, rng: Draw) -> tuple[FloatArray, FloatArray]:
         rate = 1.0 / (time[1] - time[0])
@@ -255,7 +255,7 @@ def _bursts(size: float, rate_hz: float, *, regular: bool) -> Foreign:
 
 
 def _lines(size: float, lines: tuple[tuple[float, float], ...], beat_hz: float, torque: float) -> Foreign:
-    """Lines (Hz, strength) that beat, as of an induction motor's field or an inverter, and its torque with them."""
+    """Beating lines (Hz, strength), as of an induction motor's field or an inverter, with the corresponding torque."""
 
     def forces(time: FloatArray, slow: FloatArray, force: float, rng: Draw) -> tuple[FloatArray, FloatArray]:
         phase = rng.uniform(0, 2 * pi)
@@ -267,7 +267,7 @@ def _lines(size: float, lines: tuple[tuple[float, float], ...], beat_hz: float, 
 
 
 def outside(rig: LumpedRig, rng: Draw) -> tuple[str, LumpedFault]:
-    """Draw something from outside the catalogue, clear or strong."""
+    """Draw vibration from outside the catalogue, clear or strong."""
     size, line, slip = log_uniform(rng, 0.7, 2.0), rig.line_hz, rng.uniform(0.01, 0.04)
     turn_hz, carrier = rng.uniform(6, 23), float(rng.choice([2000.0, 4000.0])) + rng.uniform(-3, 3)
     name = str(rng.choice(["pump", "foreign gear", "belt", "cavitation", "motor field", "inverter", "foot", "whirl"]))
@@ -292,17 +292,17 @@ def outside(rig: LumpedRig, rng: Draw) -> tuple[str, LumpedFault]:
 
 
 FIRST_RIG = 300_000
-"""Number of the first machine's first point; the second's is the next."""
+"""Number of the first machine's first point; its second point has the next number."""
 POINTS = (0, 1)
 N_HEALTHY, N_OUTSIDE, N_FOREIGN, N_BY_HAND = 2, 3, 1, 2
 TOUCHED = 1.8
-"""By how much more than usual sensors were touched between healthy recordings."""
+"""Disturbance of the sensors between healthy recordings, relative to the usual one."""
 LIGHT = 4
-"""Every so many machines one that is hardly loaded."""
+"""One machine in this many is hardly loaded."""
 
 
 def lumped_samples(index: int) -> list[PopulationSample]:
-    """Return the samples of one drawn machine, the same faults at both of its points."""
+    """Return the samples of one random machine, with the same faults at both of its points."""
     rng = np.random.default_rng([SEED, 4, index])
     rig = LumpedRig.drawn(rng, light=index % LIGHT == LIGHT - 1)
     levels = record(rig, 0, LumpedDay.drawn(rig, rng), LumpedFault(), rng).samples[:-1].std(axis=1).astype(np.float64)
@@ -315,7 +315,7 @@ def lumped_samples(index: int) -> list[PopulationSample]:
 
 
 def _faults(rig: LumpedRig, rng: Draw) -> Iterator[tuple[str, str, LumpedFault]]:
-    """Yield cause, words, and what is changed."""
+    """Yield cause, description and changes of each fault."""
     for _ in range(N_HEALTHY):
         yield NONE, NONE, LumpedFault()
     for name, effect in EFFECTS.items():
@@ -325,7 +325,7 @@ def _faults(rig: LumpedRig, rng: Draw) -> Iterator[tuple[str, str, LumpedFault]]
 
 
 def _at(rig: LumpedRig, point: int, levels: FloatArray, faults: list[tuple[str, str, LumpedFault]], index: int) -> Made:
-    """Return the reference at a point, the twin there, and what is compared."""
+    """Return the reference at a point, the twin there, and the recordings to compare."""
     number, torque_nm = FIRST_RIG + 2 * index + point, rig.torque_nm(point)
     rng = np.random.default_rng([SEED, 4, index, point])
     reference = record(rig, point, LumpedDay.drawn(rig, rng), LumpedFault(), rng, healthy_levels=levels)

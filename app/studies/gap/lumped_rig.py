@@ -1,14 +1,14 @@
-"""A fifth simulator of a gear pair: eleven degrees of freedom, every tooth a spring of its own.
+"""A fifth simulator of a gear pair: eleven degrees of freedom, each tooth an individual spring.
 
-It was written from the literature by somebody who had seen nothing of the others, so that its effects are what another
-engineer takes them for; one tooth out of its place is its pitch error, for example. Rotations of motor, pinion, gear
-and load; both gears' and the housing's motion in the plane of rotation. Every pair of teeth that may touch is a
-one-sided spring along the path of contact, with the teeth's own compliance (parabolic over their height) and gap
-(relief, profile, pitch); friction turns round at the pitch point; bearings at the drive end are rings of balls under
-Hertz's law, F = K δ^1.5, that turn with the cage, those at the far end linear. Semi-implicit Euler at 8 or 6 times the
-sampling rate; sensors hear bearing forces through drawn modes, and the housing itself.
+It was written from the literature by somebody who had not seen the others, so its effects are another engineer's
+interpretation; its pitch error, for example, is one displaced tooth. It models rotations of motor, pinion, gear and
+load, and the motion of both gears and the housing in the plane of rotation. Each pair of teeth that may touch is a
+one-sided spring along the path of contact, with individual compliance (parabolic over tooth height) and gap (relief,
+profile, pitch); friction reverses at the pitch point; bearings at the drive end are rings of balls with Hertzian
+contact, F = K δ^1.5, that turn with the cage, those at the far end are linear. Integration: semi-implicit Euler at 8 or
+6 times the sampling rate. Sensors measure bearing forces through random modes, and the motion of the housing.
 
-It does not represent: motion along the axes, tilting gears, load sharing along the face, tooth bodies' dynamics.
+It does not represent axial motion, tilting of gears, load sharing along the face, or dynamics of tooth bodies.
 """
 
 from __future__ import annotations
@@ -27,34 +27,34 @@ from gearsig.recording import Channel, Recording
 from gearsig.rig import Bearing, GearPair, OperatingPoint, Rig, Sensor, Shaft, TachometerChannel
 
 N_PATH = 160
-"""Points of a tooth's tables along the path of contact."""
+"""Number of points of a tooth's tables along the path of contact."""
 PRESSURE_ANGLE = radians(20.0)
 TAN = tan(PRESSURE_ANGLE)
 SETTLING_S = 0.7
 SLOW = 32
-"""Steps between two points of what changes slowly."""
+"""Steps between two points of slowly changing quantities."""
 OVERSAMPLING = {25600: 6, 20000: 8}
 
 # --------------------
-# What the kernel reads, and the kernel.
+# Inputs of the kernel, and the kernel.
 # --------------------
 
 
 class LumpedBearings(NamedTuple):
-    """Drive-end bearings of both shafts, and the linear far ends.
+    """Drive-end bearings of both shafts, and the linear far-end bearings.
 
     Parameters
     ----------
     n_balls : tuple of int
     ball_n_per_m15, far_n_per_m : tuple of float
-        Hertz coefficient of one ball; spring of the far end.
+        Hertz coefficient of one ball; stiffness of the far end.
     clearance_m, far_play_m : tuple of float
     damping : tuple of float
-        N s/m, of both ends.
+        Damping of both ends, N s/m.
     cage : tuple of float
-        Turns of the cage per turn of the shaft.
+        Revolutions of the cage per revolution of the shaft.
     defect : tuple of float
-        Kind (0 none, 1 outer, 2 inner), shaft (1, 2), angle, half its width (rad), depth (m).
+        Kind (0 none, 1 outer, 2 inner), shaft (1, 2), angle and half-width (rad), depth (m).
     """
 
     n_balls: tuple[int, int]
@@ -89,7 +89,7 @@ class LumpedMesh(NamedTuple):
 
 
 class LumpedBodies(NamedTuple):
-    """Inertias, masses, shafts, housing, and what turns with the shafts: run-out (m) and unbalance (kg m) by phase."""
+    """Inertias, masses, shafts and housing; run-out (m) and unbalance (kg m) of the shafts with their phases."""
 
     inertia: tuple[float, float, float, float]
     shaft_n_m: tuple[float, float]
@@ -105,7 +105,7 @@ class LumpedBodies(NamedTuple):
 
 
 class LumpedDrive(NamedTuple):
-    """Torques (N m) and forces that the machine's surroundings give; see `LumpedFault` for what they mean."""
+    """External torques (N m) and forces on the machine; see `LumpedFault` for their meaning."""
 
     motor_nm: float
     load_nm: float
@@ -126,7 +126,7 @@ class LumpedDrive(NamedTuple):
 
 @njit(cache=True, nogil=True, fastmath=True)
 def _balls(x, y, cage, n, stiffness, clearance, kind, angle, half_width, depth):  # type: ignore[no-untyped-def]
-    """Force of a ring of balls under (x, y)."""
+    """Return the force of a ring of balls displaced by (x, y)."""
     fx, fy = 0.0, 0.0
     for i in range(n):
         place = cage + 2.0 * np.pi * i / n
@@ -147,7 +147,7 @@ def _balls(x, y, cage, n, stiffness, clearance, kind, angle, half_width, depth):
 
 @njit(cache=True, nogil=True, fastmath=True)
 def _far_end(x, y, stiffness, play):  # type: ignore[no-untyped-def]
-    """Force of a spring with play under (x, y)."""
+    """Return the force of a spring with play displaced by (x, y)."""
     share = stiffness * max(0.0, 1.0 - play / (np.sqrt(x * x + y * y) + 1e-15))
     return -share * x, -share * y
 
@@ -156,7 +156,7 @@ def _far_end(x, y, stiffness, play):  # type: ignore[no-untyped-def]
 def march(  # type: ignore[no-untyped-def]  # noqa: PLR0915  one step after the other: mesh, shafts, bearings, housing
     n, keep, step, mesh, bearings, bodies, drive, q, v, gaps, compliances, set_speed, motor, load, cage, on_housing
 ):  # fmt: skip
-    """Return means of `keep` steps: bearing forces (4), housing accelerations (3), pinion's angle."""
+    """Return means over `keep` steps: bearing forces (4), housing accelerations (3), pinion angle."""
     out = np.zeros((n // keep, 8))
     a = np.zeros(11)
     rb1, rb2 = mesh.base_radii_m
@@ -290,32 +290,32 @@ def march(  # type: ignore[no-untyped-def]  # noqa: PLR0915  one step after the 
 
 
 # --------------------
-# A machine of this kind, drawn.
+# A random machine of this kind.
 # --------------------
 
 
 DIRECTIONS = {"vertical": (0.1, 1.0, 0.3), "horizontal": (1.0, 0.1, 0.3), "axial": (0.25, 0.2, 0.5)}
-"""How much a sensor hears of the housing's motion: x, y, roll."""
+"""Sensitivity of a sensor to the motion of the housing: x, y, roll."""
 PROFILE_UM = np.array([0.9, 0.7, 0.5, 0.35, 0.3, 0.25])
 
 
 @dataclass(frozen=True)
 class LumpedRig:
-    """A drawn machine: what its plate says, and what only its maker knows.
+    """A random machine: its nameplate data, and what only its maker knows.
 
     Parameters
     ----------
     teeth, module_mm, face_mm : of the gears
     speeds_rpm, loads_nm : tuple of float
-        Of the input, and on the output, at two operating points.
+        Input speed and output torque at two operating points.
     rate_hz : int
     line_hz : float
-        Of the supply.
+        Supply frequency.
     balls : tuple of (n, diameter, pitch diameter), mm
     directions : tuple of str
-        Of the sensors.
+        Directions of the sensors.
     numbers : mapping
-        Everything else, by short names that `drawn` explains.
+        All other values, by short names that `drawn` explains.
     """
 
     teeth: tuple[int, int]
@@ -331,11 +331,11 @@ class LumpedRig:
 
     @classmethod
     def drawn(cls, rng: np.random.Generator, *, light: bool = False) -> LumpedRig:
-        """Draw one; `light`: hardly loaded, and by a load that swings once a turn, so that flanks part."""
-        # A seed stands for a machine, in the shipped numbers too: what is drawn here keeps its order.
+        """Draw a machine; `light`: hardly loaded, by a load that oscillates once per revolution, so flanks separate."""
+        # A seed identifies a machine, also in the shipped numbers: the order of the draws must not change.
         u = rng.uniform
-        # What the plate says: teeth, module, face, and two operating points by speed and load per face width. Loads
-        # follow the size of the teeth: drawn on their own, most machines would be idle or break.
+        # Nameplate data: teeth, module, face, and two operating points by speed and load per face width. Loads follow
+        # the size of the teeth: drawn independently, most machines would idle or break.
         z1 = int(rng.integers(17, 41))
         teeth = z1, int(rng.integers(max(20, int(0.8 * z1)), 61))
         module_mm = float(rng.choice([1.5, 2.0, 2.5, 3.0, 4.0]))
@@ -346,17 +346,17 @@ class LumpedRig:
         load = line_load * face_mm * radii[1]
         second_speed = speed * rng.choice([u(0.55, 0.8), u(1.25, 1.5)])
         second_load = load * (u(1.2, 1.5) if light else rng.choice([u(0.5, 0.75), u(1.3, 1.6)]))
-        # One factor for all of a machine's teeth: who cuts good pitches cuts good profiles as well.
+        # One quality factor for all teeth of a machine: accurate pitch comes with accurate profiles.
         quality = u(0.6, 1.3)
 
         def pitches(z: int) -> FloatArray:
-            """Single errors, and a part that adds up from tooth to tooth and closes after a turn."""
+            """Return single errors plus a part that accumulates from tooth to tooth and closes after a revolution."""
             single = rng.standard_normal(z)
             adding = np.cumsum(single - single.mean())
             return np.asarray((0.6 * single + 0.35 * (adding - adding.mean())) * quality * 1.1e-6)
 
-        # Masses of steel discs, the module standing for the shaft's share; motor and load are heavier with the torque,
-        # and shafts as stiff as puts the natural frequencies of either end where those of test rigs are.
+        # Masses of steel discs, the module representing the shaft's share; the inertias of motor and load grow with the
+        # torque, and the shaft stiffness gives either end natural frequencies typical of test rigs.
         mass = 7800.0 * pi * radii**2 * face_mm * 1.2e-3 + u(0.4, 0.8, 2) * module_mm / 2
         inertia = 0.55 * mass * radii**2
         ratio = teeth[0] / teeth[1]
@@ -370,13 +370,13 @@ class LumpedRig:
         shafts = (
             (2.0 * pi * np.array([u(60, 180), u(40, 140)])) ** 2 * ends * coupled_inertia / (ends + coupled_inertia)
         )
-        # Bearings as large as the greater load asks for; their pitch leaves a gap between the balls.
+        # Bearings sized for the greater load; their pitch leaves a gap between the balls.
         size = max(1.0, (max(load, second_load) / radii[1] / 1500.0) ** 0.5)
         balls = []
         for _ in range(2):
             n, d = int(rng.integers(8, 12)), u(7, 10) * min(size, 2.2)
             balls.append((n, round(d, 2), round(d * n / pi * u(1.45, 1.75), 2)))
-        # The housing outweighs its gears; its modes and sensors are as many as a measurement on a small gearbox sees.
+        # The housing outweighs its gears; numbers of modes and sensors are typical of measurements on a small gearbox.
         housing = u(4, 9) * mass.sum() + 3.0
         n_modes, n_sensors = int(rng.integers(6, 13)), int(rng.integers(1, 4))
         numbers = {
@@ -434,7 +434,7 @@ class LumpedRig:
         )
 
     def rig(self, point: int) -> Rig:
-        """Return what the operator knows, at one of the two operating points."""
+        """Return the rig as the operator knows it, at one of the two operating points."""
         names = "input", "output"
         return Rig(
             "lumped rig",
@@ -451,13 +451,13 @@ class LumpedRig:
         )
 
     def torque_nm(self, point: int) -> float:
-        """Return the input's torque."""
+        """Return the input torque in N m."""
         return self.loads_nm[point] * self.teeth[0] / self.teeth[1]
 
 
 @dataclass(frozen=True)
 class LumpedDay:
-    """What is otherwise on another day: speed, load, temperature, sensors that were touched, the tachometer's mark."""
+    """Differences on another day: speed, load, temperature, disturbed sensors, tachometer mark."""
 
     speed: float
     load: float
@@ -474,7 +474,7 @@ class LumpedDay:
 
     @classmethod
     def drawn(cls, rig: LumpedRig, rng: np.random.Generator, touched: float = 1.0) -> LumpedDay:
-        """Draw one; `touched`: by how much more than usual sensors were."""
+        """Draw a day; `touched`: disturbance of the sensors relative to the usual one."""
         shape = rig.numbers["mode_at_sensors"].shape
         normal, u = rng.standard_normal, rng.uniform
         return cls(
@@ -495,19 +495,20 @@ class LumpedDay:
 
 @dataclass
 class LumpedFault:
-    """What an effect changes; by default nothing.
+    """Changes made by an effect; by default none.
 
     Parameters
     ----------
     gaps_m, compliances : list of (gear, tooth or None, array (N_PATH,) or (teeth, N_PATH))
-        Added; compliance in m/N.
+        Added gap (m) and compliance (m/N).
     friction, softened, wobble : float
-        Coefficient (0: the machine's own); part of the mesh stiffness that is left, and its swing over a turn.
+        Coefficient (0: that of the machine); remaining share of the mesh stiffness, and its variation over a
+        revolution.
     backlash : float
-        Times the machine's own.
+        Factor on the backlash of the machine.
     further_backlash_m : float
     runout_m, unbalance_kg_m : dict
-        Gear → complex number, added.
+        Gear → added complex value.
     clearance_m : dict
         Gear → radial clearance of both ends.
     defect : tuple
@@ -520,13 +521,13 @@ class LumpedFault:
         Fields of `LumpedDrive`.
     loose_sensor : tuple of float
         Row, resonance (Hz), damping ratio of its mount.
-    moved_modes, damped_modes : of the housing
+    moved_modes, damped_modes : factors on frequency and damping of the housing modes
     hum : float
         Share of the healthy level.
     clipped : tuple of float
         Row, share of the healthy peak.
     foreign : callable or None
-        (time, slow time, rng) → forces (2, n) on the housing, torque of the motor.
+        (time, slow time, rng) → forces (2, n) on the housing, motor torque.
     """
 
     gaps_m: list[tuple[int, int | None, FloatArray]] = field(default_factory=list)
@@ -554,7 +555,7 @@ class LumpedFault:
 
 @dataclass(frozen=True)
 class LumpedGeometry:
-    """Radii (m), base pitch, path before and after the pitch point, heights and usual compliances along it."""
+    """Radii (m), base pitch, path before and after the pitch point, heights and nominal compliances along it."""
 
     radii: tuple[float, float]
     base_radii: tuple[float, float]
@@ -570,7 +571,7 @@ class LumpedGeometry:
 
     @classmethod
     def of(cls, rig: LumpedRig, stiffer: float = 1.0) -> LumpedGeometry:
-        """Return that of a rig; `stiffer` on the day."""
+        """Return the geometry of a rig; `stiffer` is the day's factor on the stiffness."""
         m = rig.module_mm * 1e-3
         r = tuple(m * z / 2.0 for z in rig.teeth)
         rb = tuple(x * cos(PRESSURE_ANGLE) for x in r)
@@ -579,7 +580,7 @@ class LumpedGeometry:
         pitch = pi * m * cos(PRESSURE_ANGLE)
         beyond = 0.06 * pitch
         path = np.linspace(-before - beyond, after + beyond, N_PATH)
-        # single stiffness c' of about 14 N/(mm µm) at the pitch point, hardly more under more load
+        # single stiffness c' of about 14 N/(mm µm) at the pitch point, which hardly increases with load
         by_teeth = 1.0 + 0.105 * (1.0 - 25.0 / (rig.teeth[0] + 8.0))
         by_load = (max(float(rig.numbers["line_load_n_per_mm"]), 5.0) / 100.0) ** 0.06
         stiffness = 14e9 * float(rig.numbers["stiffer"]) * stiffer * by_teeth * by_load * rig.face_mm * 1e-3
@@ -630,7 +631,7 @@ def tooth_tables(
 
 
 # --------------------
-# A recording of it.
+# A recording of the machine.
 # --------------------
 
 
@@ -654,10 +655,10 @@ def record(
     day : LumpedDay
     fault : LumpedFault
     rng : Generator
-        Of noise and of everything that never repeats.
+        Generator of noise and of everything that never repeats.
     duration_s : float
     healthy_levels : array, (n_sensors,) or None
-        Noise and hum are shares of these, rms in m/s²; None: of this recording's own.
+        Levels, rms in m/s², to which noise and hum are relative; None: those of this recording.
     """
     forces, turned = _motion(rig, point, day, fault, rng, duration_s)
     rate = rig.rate_hz * OVERSAMPLING[rig.rate_hz] / (OVERSAMPLING[rig.rate_hz] // 2)
@@ -684,7 +685,7 @@ def record(
 
 
 def _slow(n: int, rate: float, size: float, corner_hz: float, rng: np.random.Generator) -> FloatArray:
-    """Return noise of that standard deviation below a corner frequency."""
+    """Return noise below a corner frequency, with standard deviation `size`."""
     values = signal.lfilter(*signal.butter(2, 2.0 * corner_hz / rate), rng.standard_normal(n))
     return np.asarray(size * values / values.std())
 
@@ -692,7 +693,7 @@ def _slow(n: int, rate: float, size: float, corner_hz: float, rng: np.random.Gen
 def _motion(
     rig: LumpedRig, point: int, day: LumpedDay, fault: LumpedFault, rng: np.random.Generator, duration_s: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return of each interval bearing forces (4), housing accelerations (3), forces on it (2); the pinion's angle."""
+    """Return bearing forces (4), housing accelerations (3), housing forces (2) and the pinion angle per interval."""
     n, shape = rig.numbers, LumpedGeometry.of(rig, day.stiffness)
     gaps, compliances = tooth_tables(rig, shape, fault)
     fine_hz = rig.rate_hz * OVERSAMPLING[rig.rate_hz]
@@ -707,7 +708,7 @@ def _motion(
     mean_stiffness = 1.4 / shape.pair_m_per_n
     moved = 1.0 / (shape.base_radii[0] ** 2 / inertia[1] + shape.base_radii[1] ** 2 / inertia[2])
 
-    # what changes slowly: the set speed, torques, the cages' slip
+    # slowly changing quantities: set speed, torques, cage slip
     share, wander_hz = fault.wander
     phase = rng.uniform(0, 2 * pi)
     swing = np.sin(2 * pi * wander_hz * time + phase) + 0.25 * np.sin(4.6 * pi * wander_hz * time + 2 * phase)
@@ -715,7 +716,7 @@ def _motion(
     set_speed = set_speed * (1.0 + share * swing)
     turning = inertia[0] + inertia[1] + (inertia[2] + inertia[3]) * ratio**2
     torque = motor * _slow(n_slow, slow_hz, 2e-3, 60.0, rng)
-    if share:  # what the motor needs to make the machine follow
+    if share:  # motor torque that makes the machine follow
         torque = torque + turning * np.gradient(set_speed) * slow_hz
     braking = load * (_slow(n_slow, slow_hz, 6e-3, 1.5, rng) + _slow(n_slow, slow_hz, 4e-3, 20.0, rng))
     on_housing: FloatArray = np.zeros((2, n_steps))
@@ -733,7 +734,7 @@ def _motion(
             for side, turn in enumerate((speed, -speed * ratio))
         ]
     )
-    # the machine as the kernel reads it
+    # the machine in the form for the kernel
     bearings, bodies = _bearings_of(rig, day, fault, cage), _bodies_of(rig, day, fault)
     direction = float(n["centre_line_rad"]) - PRESSURE_ANGLE
     normal = -sin(direction), cos(direction)
@@ -777,7 +778,7 @@ def _motion(
     shares = {"coupling_nm": motor, "whirl_n": max(force, 150.0)}
     drive = usual._replace(**{name: value * shares.get(name, 1.0) for name, value in fault.drive.items()})
 
-    # from rest under load, at any tooth, already turning
+    # start in equilibrium under load, at a random tooth, already turning
     angle = 2 * pi * rng.integers(rig.teeth[1]) + rng.uniform(0, 2 * pi)
     bent = force / (2.0 * bearings.far_n_per_m[0])
     q = np.zeros(11)
@@ -850,7 +851,7 @@ def _polar(value: complex) -> tuple[float, float]:
 def _sensed_motion(
     rig: LumpedRig, day: LumpedDay, fault: LumpedFault, motion: FloatArray, rate: float, rng: np.random.Generator
 ) -> FloatArray:
-    """Return what sensors feel of bearing forces through the modes, and of the housing, (n, n_sensors)."""
+    """Return sensor signals from the bearing forces through the modes and from the housing, (n, n_sensors)."""
     n = rig.numbers
     moved = np.broadcast_to(fault.moved_modes, n["mode_hz"].shape)
     mode_hz, ratio = n["mode_hz"] * day.mode_hz * moved, n["mode_damping_ratio"] * day.mode_damping * fault.damped_modes
@@ -894,7 +895,7 @@ def _noise_and_hum(rig: LumpedRig, fault: LumpedFault, n: int, rng: np.random.Ge
 
 
 def _tachometer(rig: LumpedRig, day: LumpedDay, angle: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """Return the voltage of a pulse a turn, 6 % long, with 3 µs of jitter."""
+    """Return the voltage of one pulse per revolution, 6 % long, with 3 µs jitter."""
     turns = (angle - float(rig.numbers["mark_rad"]) - day.mark_rad) / (2 * pi)
     samples_per_turn = 2 * pi / (np.gradient(angle) + 1e-30)
     number = np.round(turns).astype(int)

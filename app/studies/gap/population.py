@@ -1,12 +1,12 @@
-"""Make the population of the gap diagnosis, and what of it comes with the library.
+"""Make the population of the gap diagnosis, and the part of it that comes with the library.
 
-`python -m app.studies.gap.population make` does all of it, in some hours. Its steps: `… simulate --to RAW` draws
-machines and records them; `… pack RAW…` packs one or several such tables into the population, which is kept where
-`gearsig.gap.population_file` says; `… learn` writes what a diagnosis asks of it into the library's own file.
+`python -m app.studies.gap.population make` runs all steps, in some hours: `… simulate --to RAW` draws and records
+machines; `… pack RAW…` packs one or several such tables into the population, at the path given by
+`gearsig.gap.population_file`; `… learn` writes what a diagnosis needs from it into the library's own file.
 
-Each drawn gearbox is recorded healthy as the reference, healthy again on other days, with each effect, with foreign
-vibration, and with each effect's signature by hand; what differs goes into the table, with its label. Gearboxes are
-those of both models of a pair, of the quasi-static simulator, of the lumped rig, and the independent rig's with
+Each random gearbox is recorded healthy as the reference, healthy again on other days, with each effect, with foreign
+vibration, and with synthetic signatures of the effects; the differences go into the table, with their labels. The
+gearboxes come from both models of a pair, the quasi-static simulator, the lumped rig, and the independent rig with
 development gears.
 """
 
@@ -37,7 +37,7 @@ _SAMPLES_OF: dict[str, Callable[[int], list[PopulationSample]]] = {
     QUASI_STATIC: static_samples,
     LUMPED: lumped_samples,
 }
-"""What a machine's number makes, by simulator."""
+"""Functions that make the samples of a machine from its number, by simulator."""
 
 
 def make(processes: int = 2) -> None:
@@ -58,7 +58,7 @@ def simulate(
     lumped: int = 46,
     processes: int = 2,
 ) -> None:
-    """Record so many machines of each simulator and reduce them to a raw table, which is written now and then."""
+    """Record the given number of machines of each simulator and reduce them to a raw table, written at intervals."""
     numbers = (cracked, reduced_fe, independent, quasi_static, lumped)
     jobs, samples = jobs_of(dict(zip(_SAMPLES_OF, numbers, strict=True))), list[PopulationSample]()
     for n_done, (_, of_machine) in enumerate(answers_of(samples_of_job, jobs, processes), start=1):
@@ -68,13 +68,13 @@ def simulate(
 
 
 def learn(to: Path = LEARNED_FILE) -> None:
-    """Write what a diagnosis asks of the population."""
+    """Write what a diagnosis needs from the population."""
     write_learned(learned_of(load_population()), to)
     typer.echo(f"{to.stat().st_size / 1e6:.2f} MB")
 
 
 def jobs_of(machines: Mapping[str, int]) -> list[tuple[str, int]]:
-    """Return simulator and number of each machine, all simulators at an even pace: a part is a smaller population."""
+    """Return simulator and number of each machine, evenly mixed, so that any part is a smaller population."""
     paced = [((i + 0.5) / n, name, i) for name, n in machines.items() for i in range(n)]
     return [(name, i) for _, name, i in sorted(paced)]
 
@@ -95,7 +95,7 @@ TABLES = {
 
 
 def pack(raw_tables: list[Path], to: Path = population_file()) -> None:  # noqa: B008 - an option's default
-    """Read raw tables, write one packed table."""
+    """Read raw tables and write one packed table."""
     raw = [np.load(path, allow_pickle=False) for path in raw_tables]
     tables = {name: _rounded(np.concatenate([sample[key] for sample in raw])) for name, key in TABLES.items()}
     rigs = np.concatenate([sample["rig"] for sample in raw]).astype(np.int64)
@@ -117,7 +117,7 @@ def pack(raw_tables: list[Path], to: Path = population_file()) -> None:  # noqa:
 
 
 def _rounded(table: NDArray[np.float32]) -> NDArray[np.float16]:
-    """Return a table that packs well: to 1/16 dB, which no feature is known to."""
+    """Return the table rounded to 1/16 dB, which compresses well and is finer than the accuracy of any feature."""
     return (np.round(16.0 * table) / 16.0).astype(np.float16)
 
 

@@ -1,10 +1,10 @@
-"""A gear pair without equations of motion: static contact of all pairs of teeth, heard through a linear structure.
+"""A gear pair without equations of motion: static contact of all tooth pairs, measured through a linear structure.
 
-The transmission error under load is solved at each instant from the tooth pairs' stiffness and separations, then drives
-drawn modes, as do forces of shafts, friction and bearings beside it. It has its own shapes of stiffness, deviations and
-effects, many of them drawn anew for each machine, so that whoever learns from it learns what they have in common.
+The transmission error under load is solved at each instant from the stiffness and separation of the tooth pairs. It
+drives random modes, together with forces of shafts, friction and bearings. The model has its own forms of stiffness,
+deviations and effects, many drawn for each machine, so that learning from it finds what they have in common.
 
-Not represented: what a dynamic mesh force does back to the contact – parametric resonance, teeth that part (backlash).
+Not represented: feedback of the dynamic mesh force on the contact – parametric resonance, tooth separation (backlash).
 
 Source: H. N. Özgüven, D. R. Houser, "Dynamic analysis of high speed gears by using loaded static transmission error",
 J. Sound Vib. 125 (1988); W. D. Mark, "Analysis of the vibratory excitation of gear systems: basic theory", J. Acoust.
@@ -43,33 +43,33 @@ from sims.measure import Tachometer, pulse_voltage
 from sims.simulator import SimulationSetup
 
 # --------------------
-# What lies between forces and sensors: modes of the machine, shared by all channels, and each channel's own part.
+# The path from forces to sensors: modes of the machine, shared by all channels, and the part of each channel.
 # --------------------
 
 
 MESH, SHAFTS, BEARINGS, FRICTION, INSIDE = range(5)
-"""Where a force or motion begins; the last is the machine's own noise."""
+"""Sources of force or motion; the last is the noise of the machine itself."""
 N_WAYS = 5
 
 MODES = (4, 11)
 MODE_HZ, MODE_DAMPING = (120.0, 9000.0), (0.008, 0.1)
 BY_BODY = 0.3
-"""Part of the machine that follows without a mode of its own, beside modes whose parts are of the size of 1."""
+"""Participation of the direct path without a mode, relative to modes with participations of the order of 1."""
 MOVED, LOUDER = 0.02, 0.15
-"""By how much a changed mounting moves and changes a mode: standard deviations of logarithms."""
+"""Effect of remounting on the frequency and strength of a mode: standard deviations of logarithms."""
 MOUNTING_FROM_HZ = 1200.0
-"""Lower modes are the machine's own and do not depend on the mounting of a sensor."""
+"""Modes below this frequency belong to the machine and do not depend on the mounting of a sensor."""
 
 
 @dataclass(frozen=True)
 class Structure:
-    """Modes, with each way's part in what each channel sees.
+    """Modes, with the participation of each source in each channel.
 
     Parameters
     ----------
     frequency_hz, damping_ratio : arrays, (n_modes,)
     parts : array, (n_channels, N_WAYS, n_modes + 1)
-        The last: what follows without a mode.
+        Participations; the last is the direct path without a mode.
     """
 
     frequency_hz: FloatArray
@@ -78,7 +78,7 @@ class Structure:
 
     @classmethod
     def drawn(cls, n_channels: int, rng: np.random.Generator) -> Structure:
-        """Draw one."""
+        """Draw a structure."""
         n = int(rng.integers(*MODES))
         frequency = np.sort([log_uniform(rng, *MODE_HZ) for _ in range(n)])
         damping = np.array([log_uniform(rng, *MODE_DAMPING) for _ in range(n)])
@@ -87,7 +87,7 @@ class Structure:
         return cls(frequency, damping, parts)
 
     def mounted_anew(self, rng: np.random.Generator) -> Structure:
-        """Return it as sensors see it that were taken off and put on again."""
+        """Return the structure as measured by remounted sensors."""
         touched = self.frequency_hz > MOUNTING_FROM_HZ
         moved = np.exp(MOVED * rng.standard_normal(len(touched)) * touched)
         louder = np.exp(LOUDER * rng.standard_normal((len(self.parts), 1, len(touched))) * touched)
@@ -96,12 +96,12 @@ class Structure:
         return replace(self, frequency_hz=self.frequency_hz * moved, parts=parts)
 
     def softer(self, share: float, below_hz: float) -> Structure:
-        """Return it with modes below a frequency at lower ones, by `share` at most."""
+        """Return the structure with modes below a frequency lowered by at most `share`."""
         lower = self.frequency_hz < below_hz
         return replace(self, frequency_hz=self.frequency_hz * np.where(lower, 1.0 - share, 1.0))
 
     def accelerations(self, channel: int, frequency_hz: FloatArray, way: int) -> np.ndarray:
-        """Return what a unit motion becomes, Σ aᵣ ω²/(1 − (f/fᵣ)² + 2iζ f/fᵣ), for each frequency."""
+        """Return the acceleration per unit motion, Σ aᵣ ω²/(1 − (f/fᵣ)² + 2iζ f/fᵣ), at each frequency."""
         total = np.full(len(frequency_hz), self.parts[channel, way, -1], dtype=np.complex128)
         for f, zeta, part in zip(self.frequency_hz, self.damping_ratio, self.parts[channel, way], strict=False):
             ratio = frequency_hz / f
@@ -110,16 +110,16 @@ class Structure:
 
 
 # --------------------
-# Static contact of all tooth pairs at once: transmission error under load, and what each pair carries.
+# Static contact of all tooth pairs at once: transmission error under load, and the load of each pair.
 # --------------------
 
 
 REACH = 0.35
-"""Base pitches off either end of the path of contact at which a loaded pair may still touch."""
+"""Distance beyond either end of the path of contact, in base pitches, at which a loaded pair may still touch."""
 N_PATH = 96
-"""Points of a table over the path."""
+"""Number of points of a table over the path."""
 N_PAIRS = 4
-"""Of teeth that may touch at an instant: contact ratios reach 2."""
+"""Maximum number of tooth pairs in contact at an instant: contact ratios reach 2."""
 
 
 @dataclass(frozen=True)
@@ -140,14 +140,14 @@ class Path:
 
     @classmethod
     def of(cls, teeth: tuple[int, int], module_mm: float, pressure_angle_deg: float) -> Path:
-        """Return that of standard teeth, whose addendum is one module."""
+        """Return the path of standard teeth, whose addendum is one module."""
         alpha, module = radians(pressure_angle_deg), 1e-3 * module_mm
         pitch_m = pi * module * cos(alpha)
         base = [0.5 * z * module * cos(alpha) for z in teeth]
         beyond = [
             sqrt((0.5 * z * module + module) ** 2 - b**2) - b * tan(alpha) for z, b in zip(teeth, base, strict=True)
         ]
-        # An undercut mate ends the path where its involute begins.
+        # With an undercut mate, the path ends where its involute begins.
         beyond = [
             min(reach, base_length * tan(alpha)) for reach, base_length in zip(beyond, reversed(base), strict=True)
         ]
@@ -155,17 +155,17 @@ class Path:
 
     @property
     def places(self) -> FloatArray:
-        """Of a table's points."""
+        """Positions of the points of a table, in base pitches."""
         return np.linspace(-REACH, self.ratio + REACH, N_PATH)
 
 
 def meeting(cycle: FloatArray, path: Path, tables: tuple[FloatArray, FloatArray], first: tuple[int, int]) -> FloatArray:
-    """Return the sum of both gears' tables where each pair meets, (N_PAIRS, n).
+    """Return the sum of both gears' tables at the contact of each pair, (N_PAIRS, n).
 
     Parameters
     ----------
     cycle : array, (n,)
-        Mesh cycles since the teeth `first` began to meet.
+        Mesh cycles since the teeth `first` came into contact.
     path : Path
     tables : (array, array)
         (teeth, N_PATH) of either gear.
@@ -182,13 +182,13 @@ def meeting(cycle: FloatArray, path: Path, tables: tuple[FloatArray, FloatArray]
 
 
 def at_places(cycle: FloatArray, path: Path, table: FloatArray) -> FloatArray:
-    """Return a table over the path where each pair is, (N_PAIRS, n)."""
+    """Return the values of a table at the position of each pair, (N_PAIRS, n)."""
     _, spot = _pairs(cycle, path)
     return np.asarray(np.interp(spot, np.arange(N_PATH), table))
 
 
 def _pairs(cycle: FloatArray, path: Path) -> tuple[np.ndarray, FloatArray]:
-    """Return the numbers of the pairs that may touch and where they are, in points of a table."""
+    """Return the numbers of the pairs that may touch and their positions, in points of a table."""
     newest = np.floor(cycle + REACH).astype(np.intp)
     number = newest[None] - np.arange(N_PAIRS)[:, None]
     spot = (cycle[None] - number + REACH) * ((N_PATH - 1) / (path.ratio + 2.0 * REACH))
@@ -196,16 +196,16 @@ def _pairs(cycle: FloatArray, path: Path) -> tuple[np.ndarray, FloatArray]:
 
 
 def is_in_reach(cycle: FloatArray, path: Path) -> np.ndarray:
-    """Return which pairs are between the table's ends."""
+    """Return which pairs are within the ends of the table."""
     _, spot = _pairs(cycle, path)
     return np.asarray((spot >= 0.0) & (spot <= N_PATH - 1))
 
 
 def static_contact(stiffness: FloatArray, gaps: FloatArray, load: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the transmission error x with Σ kᵢ max(x − gᵢ, 0) = F, and what each pair carries.
+    """Return the transmission error x with Σ kᵢ max(x − gᵢ, 0) = F, and the load of each pair.
 
-    Of the pairs with the m smallest gaps alone, x_m = (F + Σ kᵢ gᵢ)/Σ kᵢ; the left side is convex, so x is the
-    smallest of them.
+    For only the pairs with the m smallest gaps, x_m = (F + Σ kᵢ gᵢ)/Σ kᵢ; the left side is convex, so x is the minimum
+    of all x_m.
 
     Parameters
     ----------
@@ -227,12 +227,12 @@ def static_contact(stiffness: FloatArray, gaps: FloatArray, load: FloatArray) ->
 
 RATES_HZ = (12_800.0, 20_000.0, 20_480.0, 25_600.0)
 STIFFNESS_N_PER_M2 = 14e9
-"""Of a mesh of steel gears, per width."""
+"""Mesh stiffness of steel gears per face width."""
 N_CHANNELS = 2
 DIRECTNESS = (1.0, 10.0)
-"""Of friction: (resonance of the mesh over its frequency)² where the mesh is slower, 1 where it is not."""
+"""Range for friction: (mesh resonance over mesh frequency)² if the mesh frequency is lower, else 1."""
 END_RADII_M = (4e-3, 40e-3)
-"""Of the flank that a corner meets off the path's ends: a gap of d²/2R."""
+"""Radius R of the flank that a corner touches beyond the ends of the path: a gap of d²/2R."""
 
 Wave = tuple[int, float, float, float]
 """Side of the shaft, order, size, phase in radians."""
@@ -240,33 +240,33 @@ Wave = tuple[int, float, float, float]
 
 @dataclass
 class QuasiStaticState:
-    """What a recording is made from; effects change it.
+    """The state from which a recording is made; effects change it.
 
     Parameters
     ----------
     gaps_m, weak : [array, array]
-        (teeth, N_PATH) of either gear: separation; compliance that a pair has beside its own, over its own.
+        (teeth, N_PATH) of either gear: separation; additional compliance of a pair relative to its own.
     runout_m, load, stiffness : list of Wave
         Sums of cosines: separation of all teeth; torque, over the mean; mesh stiffness, over the mean.
     force_n : list of Wave
-        On a shaft, from outside or by a mass that turns with it.
+        Force on a shaft, external or by a mass that turns with it.
     soft_spots : float
-        Share of the mesh stiffness that is lost all round.
+        Share of the mesh stiffness lost over the whole revolution.
     friction, reversal : float
-        Coefficient; width over which it turns round at the pitch point, in base pitches.
+        Coefficient; width over which it reverses at the pitch point, in base pitches.
     restless_m : float
         Standard deviation of a separation that never repeats.
     impacts : list of function
-        Of the driver's angle (revolutions), time (s), and generator: forces (n,) on a bearing.
+        (driver angle in revolutions, time in s, generator) → forces (n,) on a bearing.
     play : float
-        Of the bearings, over what their static load presses out.
+        Play of the bearings, relative to their static deflection.
     passing : float
-        Order at which the play opens and shuts, of the driver.
+        Order of the driver at which the play opens and closes.
     wander : list of (float, float, float)
-        Of the speed: share, Hz, phase.
+        Speed variation: share, Hz, phase.
     structure : Structure
     paths : sequence of PathChange
-        Of each channel, behind all that the machine does; none: they are as ever.
+        Change of the path of each channel, after everything in the machine; empty: unchanged.
     """
 
     gaps_m: list[FloatArray]
@@ -289,22 +289,22 @@ class QuasiStaticState:
 
 @dataclass(frozen=True)
 class StaticMachine:
-    """A machine as it was made.
+    """A machine as manufactured.
 
     Parameters
     ----------
     drawn : DrawnRig
-        Teeth, speed, torque and length.
+        Tooth counts, speed, torque and length of the recording.
     rig : Rig
-        What its maker knows.
+        The rig as its maker knows it.
     nominal : Nominal
-        Of its pair.
+        Nominal values of the gear pair.
     path : Path
     stiffness_n_per_m : array, (N_PATH,)
-        Of one pair over the path.
+        Stiffness of one tooth pair over the path.
     rate_hz : float
     noise_share, inside_share : (float, float)
-        Of the vibration: noise of either sensor, noise of the machine itself.
+        Noise of each sensor, and noise of the machine itself, relative to the vibration.
     seed : int
     """
 
@@ -321,7 +321,7 @@ class StaticMachine:
 
     @classmethod
     def of(cls, rng: np.random.Generator) -> StaticMachine:
-        """Draw one."""
+        """Draw a machine."""
         drawn = draw_machine(rng)
         operation = Operation.steady(drawn.speed_rpm, drawn.torque_nm)
         ready = CrackedPair().prepare(
@@ -347,30 +347,30 @@ class StaticMachine:
 
     @property
     def load_n(self) -> float:
-        """Mesh force."""
+        """Mesh force in N."""
         pitch_radius_m = 0.5e-3 * self.nominal.module_mm * self.drawn.teeth[0]
         return self.drawn.torque_nm / (pitch_radius_m * cos(radians(self.nominal.pressure_angle_deg)))
 
     @property
     def rated_m(self) -> float:
-        """Deflection under a usual load: what errors are measured by, whatever the load is now."""
+        """Deflection (m) under a typical load: the scale of errors, whatever the present load."""
         return 50e6 * 1e-3 * self.nominal.module_mm / STIFFNESS_N_PER_M2
 
     @property
     def directness(self) -> float:
-        """By how much more a force across the teeth is heard than the same deflection along them.
+        """Ratio of the response to friction across the teeth to that of the same deflection along the line of action.
 
-        Below the resonance of the mesh gears turn out of the way of a transmission error; friction they cannot avoid.
+        Below the mesh resonance, the gears can rotate to follow a transmission error, but cannot evade friction.
         """
         return log_uniform(np.random.default_rng([self.seed, 4]), *DIRECTNESS)
 
     @property
     def shaft_orders(self) -> tuple[float, float]:
-        """Revolutions of either shaft per revolution of the driver."""
+        """Revolutions of each shaft per revolution of the driver."""
         return 1.0, self.drawn.teeth[0] / self.drawn.teeth[1]
 
     def healthy(self) -> QuasiStaticState:
-        """Return it with what manufacture left."""
+        """Return the healthy state, with manufacturing deviations."""
         rng = np.random.default_rng([self.seed, 1])
         unit = self.rated_m
         profile = _profile(self, rng)
@@ -409,19 +409,19 @@ class StaticMachine:
 
     @property
     def force_unit_n(self) -> float:
-        """What a force on a shaft is measured by: that of a usual load."""
+        """Scale of a force on a shaft: the force of a typical load, in N."""
         return 50.0 * self.nominal.module_mm * self.nominal.face_width_mm
 
 
 def _shape(path: Path, rng: np.random.Generator) -> FloatArray:
-    """Return the stiffness of a pair over the path, about 1: least at the ends, not quite alike on both."""
+    """Return the relative stiffness of a pair over the path, about 1: minimum at the ends, slightly asymmetric."""
     off = 2.0 * np.clip(path.places / path.ratio, 0.0, 1.0) - 1.0
     fall, lean = rng.uniform(0.15, 0.5), rng.uniform(-0.1, 0.1)
     return np.asarray(1.0 - fall * np.abs(off) ** rng.uniform(1.5, 3.0) + lean * off)
 
 
 def _profile(machine: StaticMachine, rng: np.random.Generator) -> FloatArray:
-    """Return the separation that all pairs have: corners beyond the ends, relief, a shape of the profile."""
+    """Return the separation common to all pairs: corners beyond the ends, relief, profile shape."""
     path, unit = machine.path, machine.rated_m
     beyond = np.maximum(np.maximum(-path.places, path.places - path.ratio), 0.0) * path.base_pitch_m
     at = np.clip(path.places / path.ratio, 0.0, 1.0)
@@ -437,7 +437,7 @@ def _profile(machine: StaticMachine, rng: np.random.Generator) -> FloatArray:
 
 
 def textures(teeth: int, size_m: float, rng: np.random.Generator) -> FloatArray:
-    """Return rough flanks, (teeth, N_PATH): waves from a third of the path down to its points, each as large."""
+    """Return rough flanks, (teeth, N_PATH): waves from a third of the path to its point spacing, of equal amplitude."""
     lines = rng.standard_normal((teeth, N_PATH // 2 + 1)) + 1j * rng.standard_normal((teeth, N_PATH // 2 + 1))
     lines[:, :3] = 0.0
     lines[:, int(rng.integers(8, N_PATH // 2)) :] = 0.0
@@ -446,7 +446,7 @@ def textures(teeth: int, size_m: float, rng: np.random.Generator) -> FloatArray:
 
 
 # --------------------
-# The catalogue's effects on the quasi-static machine, in shapes that are drawn anew for each.
+# The catalogue's effects on the quasi-static machine, with forms drawn for each machine.
 # --------------------
 
 
@@ -456,21 +456,21 @@ def _tooth(machine: StaticMachine, rng: np.random.Generator) -> tuple[int, int]:
 
 
 def _bearing(machine: StaticMachine, rng: np.random.Generator) -> tuple[Bearing, float]:
-    """Draw a bearing; return it with the revolutions of its shaft per revolution of the driver."""
+    """Draw a bearing; return it with the revolutions of its shaft per driver revolution."""
     bearing = machine.rig.bearings[int(rng.integers(len(machine.rig.bearings)))]
     return bearing, machine.shaft_orders[0 if bearing.shaft == machine.rig.pairs[0].driver else 1]
 
 
 def _towards_tip(machine: StaticMachine, side: int) -> FloatArray:
-    """Return 0 where the path begins or ends at a gear's root, 1 at its tip: the driver's path ends there."""
+    """Return 0 at the end of the path near a gear's root, 1 near its tip; the driver's tip is where the path ends."""
     at: FloatArray = np.clip(machine.path.places / machine.path.ratio, 0.0, 1.0)
     return at if side == 0 else 1.0 - at
 
 
 def _curvature_m(machine: StaticMachine) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the radii of curvature of both flanks over the path, and both base radii.
+    """Return the radii of curvature of both flanks over the path, and both base radii, in m.
 
-    Of standard teeth; held at the path's ends.
+    They are those of standard teeth, held constant beyond the ends of the path.
     """
     nominal, path = machine.nominal, machine.path
     alpha = radians(nominal.pressure_angle_deg)
@@ -480,7 +480,7 @@ def _curvature_m(machine: StaticMachine) -> tuple[FloatArray, FloatArray, FloatA
 
 
 def crack_lever(machine: StaticMachine, side: int, hinge_modules: float) -> FloatArray:
-    """Return how far along the tooth the force is from a hinge below the pitch circle, over the path, 1 at the tip."""
+    """Return the lever of the force about a hinge below the pitch circle, over the path, relative to the maximum."""
     *radii, base = _curvature_m(machine)
     hinge = 1e-3 * machine.nominal.module_mm * (0.5 * machine.drawn.teeth[side] - hinge_modules)
     lever = np.maximum(np.hypot(base[side], radii[side]) - hinge, 0.0)
@@ -488,9 +488,9 @@ def crack_lever(machine: StaticMachine, side: int, hinge_modules: float) -> Floa
 
 
 def sinking_m(machine: StaticMachine, side: int, inside: FloatArray) -> FloatArray:
-    """Return how far a mate sinks past an edge on a flank over the path, s²/(2R), base pitches beyond it given.
+    """Return how far a mate sinks beyond an edge on a flank, s²/(2R), for distances beyond it in base pitches.
 
-    s = ρ/r_b times the way along the path: a contact moves slower over the flank.
+    s = ρ/r_b times the distance along the path, because a contact moves more slowly over the flank.
     """
     first, second, base = _curvature_m(machine)
     along = inside * machine.path.base_pitch_m * (first, second)[side] / base[side]
@@ -506,9 +506,9 @@ def _band(machine: StaticMachine, centre: float, width: float, edge: float) -> F
 
 
 def _root_crack(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
-    """A tooth that gives way at a hinge in its root, as the square of the lever; a deep one stays bent, away from load.
+    """A tooth with a hinge in its root, compliant as the lever squared; a deep crack stays bent, away from the load.
 
-    A force that bends with a lever turns the hinge in proportion to it, and is moved by the turn in proportion, too.
+    The force turns the hinge in proportion to the lever, and the displacement by that turn is again proportional to it.
     """
     side, tooth = _tooth(machine, rng)
     lever, softer = crack_lever(machine, side, rng.uniform(0.9, 1.5)), log_uniform(rng, 0.05, 5.0)
@@ -520,13 +520,13 @@ def _root_crack(machine: StaticMachine, state: QuasiStaticState, rng: np.random.
 PIT_M = (30e-6, 500e-6)
 """Depths of pits."""
 ROUNDED = (0.5, 1.5)
-"""Of a chip's edge: what the mate sinks past it, over what it would past a sharp one."""
+"""Roundness of a chip's edge: sinking of the mate beyond it, relative to a sharp edge."""
 
 
 def _tooth_spall(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
-    """A pit near the pitch line: over part of the width less contact, over all of it the mate sinks in, or bridges it.
+    """A pit near the pitch line: over part of the width it reduces contact; over all of it the mate sinks or bridges.
 
-    The contact holds up to some third of a pair's compliance, and grows as the width that is left shrinks.
+    The contact has up to about a third of the compliance of a pair, which grows as the remaining width shrinks.
     """
     side, tooth = _tooth(machine, rng)
     centre, width = machine.path.pitch_point + rng.uniform(-0.3, 0.3), rng.uniform(0.1, 0.7)
@@ -539,9 +539,9 @@ def _tooth_spall(machine: StaticMachine, state: QuasiStaticState, rng: np.random
 
 
 def _chipped_tooth(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
-    """A tip that is gone, over all of the width or part of it: its pair loses hold early, or takes it late.
+    """A missing tip, over all or part of the width: its pair disengages early or engages late.
 
-    Over all of the width, its mate sinks past the edge that is left as past the corner of a whole tooth.
+    Over all of the width, its mate sinks beyond the remaining edge as beyond the corner of a healthy tooth.
     """
     side, tooth = _tooth(machine, rng)
     lost_ratio = rng.uniform(0.08, 0.55)
@@ -556,7 +556,7 @@ def _chipped_tooth(machine: StaticMachine, state: QuasiStaticState, rng: np.rand
 
 
 def _tooth_wear(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
-    """Flanks that lost most where they slide most, not alike on both gears, nor quite on all teeth."""
+    """Flanks worn most where they slide most, differently on the two gears and slightly differently on each tooth."""
     off = machine.path.places - machine.path.pitch_point
     depth, power, uneven = (
         log_uniform(rng, 0.08, 6.0) * machine.rated_m,
@@ -572,7 +572,7 @@ def _tooth_wear(machine: StaticMachine, state: QuasiStaticState, rng: np.random.
 
 
 def _pitch_error(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
-    """Teeth off their places: one alone, or each by itself, adding up, or in a wave."""
+    """Displaced teeth: a single one, or all independently, cumulatively, or in a wave."""
     side = textbook.draw_side(rng)
     teeth = machine.drawn.teeth[side]
     if rng.uniform() < ONE_TOOTH_SHARE:
@@ -592,7 +592,7 @@ def _pitch_error(machine: StaticMachine, state: QuasiStaticState, rng: np.random
 
 
 def _surface_roughness(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
-    """Rough flanks, that the gears repeat, and what they never do."""
+    """Rough flanks: a part that repeats with the gears and a part that never repeats."""
     size = log_uniform(rng, 0.02, 1.5) * machine.rated_m
     for side in (0, 1):
         state.gaps_m[side] = state.gaps_m[side] + textures(machine.drawn.teeth[side], size * rng.uniform(0.3, 1.0), rng)
@@ -601,13 +601,13 @@ def _surface_roughness(machine: StaticMachine, state: QuasiStaticState, rng: np.
 
 
 def _sliding_friction(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:  # noqa: ARG001 - form
-    """Flanks that rub: a force that turns round at the pitch point."""
+    """Friction of the flanks: a force that reverses at the pitch point."""
     state.friction = log_uniform(rng, 0.1, 0.6)
     state.reversal = rng.uniform(0.005, 0.3)
 
 
 def _eccentricity(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
-    """A gear off its axis: separation and depth of the teeth once per turn, and its mass off the axis."""
+    """An eccentric gear: separation and depth of the teeth vary once per revolution, and its mass is off the axis."""
     side, phase, size = textbook.draw_side(rng), rng.uniform(0, 2 * np.pi), log_uniform(rng, 2.0, 60.0)
     state.runout_m.append((side, 1.0, size * machine.rated_m, phase))
     state.stiffness.append((side, 1.0, min(size * rng.uniform(5e-4, 1e-2), 0.5), phase + rng.uniform(-1.5, 1.5)))
@@ -622,7 +622,7 @@ def _unbalance(machine: StaticMachine, state: QuasiStaticState, rng: np.random.G
 
 
 def _misalignment(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
-    """Contact on part of the width, some of it turning with a shaft; a coupling that is forced twice a turn."""
+    """Contact on part of the width, partly turning with a shaft; coupling forces twice per revolution."""
     side, size = textbook.draw_side(rng), log_uniform(rng, 0.1, 0.8)
     state.soft_spots = size * rng.uniform(0.3, 0.8)
     for order, share in ((1.0, rng.uniform(0.0, 0.6)), (2.0, rng.uniform(0.0, 0.4))):
@@ -634,7 +634,7 @@ def _misalignment(machine: StaticMachine, state: QuasiStaticState, rng: np.rando
 
 
 def _torque_ripple(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
-    """A torque that pulls n times per turn, and a little 2n times; the shaft twists, the frame takes it up."""
+    """A torque that varies n times per revolution, and slightly 2n times; it twists the shaft and acts on the frame."""
     pulls = log_uniform(rng, 1.0, 12.0)
     order, side, size = (
         float(round(pulls)) if rng.uniform() < 0.75 else pulls,
@@ -654,7 +654,7 @@ def _speed_fluctuation(machine: StaticMachine, state: QuasiStaticState, rng: np.
 
 
 def _race(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator, name: str) -> None:
-    """Elements that drop into a defect and leave it with a blow; on the inner race the load zone passes it."""
+    """Rolling elements enter a defect and leave it with an impact; an inner-race defect turns through the load zone."""
     bearing, shaft = _bearing(machine, rng)
     order = bearing.orders()[name] * shaft * (1.0 - rng.uniform(0.0, 0.015))
     size = log_uniform(rng, 0.02, 3.0) * (machine.load_n + 0.1 * machine.force_unit_n)
@@ -681,7 +681,7 @@ def _race(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Genera
 
 
 def _bearing_clearance(machine: StaticMachine, state: QuasiStaticState, rng: np.random.Generator) -> None:
-    """A bearing that is loose: forces reach the housing bent, its support is softer."""
+    """A loose bearing: it transmits forces nonlinearly, and its support is softer."""
     bearing, shaft = _bearing(machine, rng)
     play = log_uniform(rng, 0.3, 30.0)
     state.play += play
@@ -711,28 +711,28 @@ EFFECTS: dict[str, Callable[[StaticMachine, QuasiStaticState, np.random.Generato
 
 
 # --------------------
-# From a machine's state on a day to a recording.
+# From the state of a machine on a day to a recording.
 # --------------------
 
 
 FINER = 2
-"""Times the recording's rate at which the contact is solved: its corners reach beyond half of that."""
+"""Oversampling of the contact relative to the recording: its kinks extend beyond the recording's Nyquist frequency."""
 LEAD_S = 0.3
-"""Before and after the recording, in which modes settle."""
+"""Time before and after the recording in which modes settle."""
 SETTLING_S = 0.15
-"""At either end of that, in which motions begin and end."""
+"""Time at either end of it in which motions fade in and out."""
 OUT_OF_REACH_M = 1.0
 TURNS_BEFORE = 40
-"""Whole turns of the driver, at most, by which the teeth that meet differ from day to day."""
+"""Maximum number of whole driver revolutions by which the meeting teeth differ from day to day."""
 MIN_NOISE_HZ = 20.0
 RIPPLE = 0.3
-"""By which play opens and shuts as elements pass."""
+"""Relative variation of the play as rolling elements pass."""
 SPEED_SCATTER, TORQUE_SCATTER, GAIN_SCATTER, NOISE_SCATTER, ANEW_SHARE = 0.005, 0.04, 0.1, 0.12, 0.6
 
 
 @dataclass(frozen=True)
 class QuasiStaticDay:
-    """How a machine runs on a day, and how its sensors sit."""
+    """Operation of a machine on a day, and mounting of its sensors."""
 
     speed_factor: float
     torque_factor: float
@@ -744,7 +744,7 @@ class QuasiStaticDay:
 
     @classmethod
     def drawn(cls, rng: np.random.Generator) -> QuasiStaticDay:
-        """Draw one."""
+        """Draw a day."""
         speed, torque = (1.0 + s * float(rng.standard_normal()) for s in (SPEED_SCATTER, TORQUE_SCATTER))
         anew = bool(rng.uniform() < ANEW_SHARE)
         gains = np.exp(GAIN_SCATTER * rng.standard_normal(N_CHANNELS) * anew)
@@ -756,7 +756,7 @@ class QuasiStaticDay:
 def record(
     machine: StaticMachine, state: QuasiStaticState, day: QuasiStaticDay, levels: FloatArray | None
 ) -> Recording:
-    """Return a recording.
+    """Return a recording of a machine in a given state on a given day.
 
     Parameters
     ----------
@@ -764,7 +764,7 @@ def record(
     state : QuasiStaticState
     day : QuasiStaticDay
     levels : array, (n_channels,), or None
-        Standard deviation of each channel by which noise is measured; None: no noise.
+        Standard deviation of each channel to which noise is relative; None: no noise.
     """
     rng = np.random.default_rng([day.seed, 1])
     rate = FINER * machine.rate_hz
@@ -795,7 +795,7 @@ def record(
 def _turns(
     machine: StaticMachine, state: QuasiStaticState, day: QuasiStaticDay, time: FloatArray, rng: np.random.Generator
 ) -> FloatArray:
-    """Return the driver's angle in revolutions."""
+    """Return the driver angle in revolutions."""
     speed_hz = machine.drawn.speed_rpm * day.speed_factor / 60.0
     wander = np.zeros(len(time))
     for share, hz, phase in state.wander:
@@ -811,7 +811,7 @@ def _motions(
     time: FloatArray,
     rng: np.random.Generator,
 ) -> dict[int, FloatArray]:
-    """Return the motion that enters the structure on each way, m."""
+    """Return the motion that enters the structure from each source, in m."""
     path, cycle = machine.path, turns * machine.drawn.teeth[0]
 
     def waves(waves_of: Sequence[Wave]) -> FloatArray:
@@ -839,7 +839,7 @@ def _motions(
 
 
 def _through_play(pressed: FloatArray, moving: FloatArray, state: QuasiStaticState, turns: FloatArray) -> FloatArray:
-    """Return what a bearing with play hands on of a motion about what its load presses out: √(r² + c²) − c."""
+    """Return the motion that a bearing with play transmits about its static deflection: √(r² + c²) − c."""
     total = pressed + moving
     play = state.play * pressed * (1.0 + RIPPLE * np.cos(2 * np.pi * state.passing * turns))
     return np.asarray(np.sign(total) * (np.hypot(total, play) - play))
@@ -854,7 +854,7 @@ def _sensed_motion(structure: Structure, channel: int, motions: dict[int, FloatA
     frequency = rfftfreq(n, 1.0 / rate)
     kept = frequency < 0.48 * rate / FINER
     lines = np.zeros(len(frequency), dtype=np.complex128)
-    # A step from the last sample to the first would be the loudest blow of the whole recording.
+    # A step from the last sample to the first would be the strongest impact of the whole recording.
     window = tukey(n, 2.0 * SETTLING_S * rate / n)
     for way, motion in motions.items():
         settled = window * (motion - motion.mean())
@@ -864,7 +864,7 @@ def _sensed_motion(structure: Structure, channel: int, motions: dict[int, FloatA
 
 
 def _noise(n: int, machine: StaticMachine, channel: int, rng: np.random.Generator) -> FloatArray:
-    """Return a sensor's noise over its level, falling with frequency as the machine's seed has it."""
+    """Return a sensor's noise relative to its level, falling with frequency as determined by the machine's seed."""
     from scipy.fft import irfft, rfft, rfftfreq
 
     slope = np.random.default_rng([machine.seed, 3, channel]).uniform(0.0, 1.0)
@@ -874,7 +874,7 @@ def _noise(n: int, machine: StaticMachine, channel: int, rng: np.random.Generato
 
 
 def _tachometer(turns: FloatArray, time: FloatArray, at: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """Return the voltage of a pulse per turn."""
+    """Return the voltage of a tachometer with one pulse per revolution."""
     tacho = Tachometer(jitter_s=2e-6, noise_v=0.01)
     whole = np.arange(np.ceil(turns[0]), np.floor(turns[-1]) + 1.0)
     rising = np.interp(whole, turns, time) + tacho.jitter_s * rng.standard_normal(len(whole))
@@ -884,7 +884,7 @@ def _tachometer(turns: FloatArray, time: FloatArray, at: FloatArray, rng: np.ran
 
 
 # --------------------
-# Rows of the population from drawn machines of the quasi-static simulator.
+# Rows of the population from random machines of the quasi-static simulator.
 # --------------------
 
 
@@ -894,7 +894,7 @@ N_HEALTHY, N_FOREIGN, N_BY_HAND, N_PATHS = 2, 2, 3, 2
 
 
 def static_samples(index: int) -> list[PopulationSample]:
-    """Return the samples of one drawn machine."""
+    """Return the samples of one random machine."""
     rig = FIRST_RIG + index
 
     def made() -> Made:
@@ -915,7 +915,7 @@ def static_samples(index: int) -> list[PopulationSample]:
 
 
 def _recordings(machine: StaticMachine, levels: FloatArray, rng: np.random.Generator) -> Iterator[Recorded]:
-    """Yield everything that is recorded of one machine."""
+    """Yield all recordings of one machine."""
     torque_nm = machine.drawn.torque_nm
 
     def recorded(state: QuasiStaticState, rng: np.random.Generator) -> Recording:

@@ -1,8 +1,8 @@
-"""Fits floors and probabilities of the start–stop diagnosis to blind cases kept for that.
+"""Fit floors and probabilities of the start–stop diagnosis to blind cases reserved for this.
 
-`python -m app.studies.gap.start_stop --cases 100 --seed 71` makes cases of the role calibration, whose gears
-no case of the evaluation has, and writes `gearsig/gap/start_stop/floors.json`. 3 s of processor time a case. The
-file's provenance says which cases it was made of: `--numbers` makes some of those planned only.
+`python -m app.studies.gap.start_stop --cases 100 --seed 71` makes cases of the role calibration, which share no gears
+with the evaluation, and writes `gearsig/gap/start_stop/floors.json`. Each case takes 3 s of processor time. The
+provenance in the file states the cases: `--numbers` makes only some of those planned.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ from sims.forging import ForgingManipulator
 ROLE = "calibration"
 NEUTRAL_SHRINK = 0.3
 RIDGE = 0.005
-"""Draws the weights to their start: some hundred cases do not settle five numbers."""
+"""Pulls the weights towards their starting values, as some hundred cases do not determine them."""
 START = (0.6, 1.0, 0.0, 0.0)
-"""Sharpness, weight of the shrink, bias of none and of unknown."""
+"""Starting values: sharpness, weight of the shrink, biases of none and of unknown."""
 FALSE_ALARMS = 0.05
 MIN_NAMED, MAX_NAMED, APART = 0.6, 0.95, 0.7
 MIN_SHARE = 1e-6
@@ -45,7 +45,7 @@ Row = tuple[Mapping[str, Any], DriveEvidence]
 
 
 def collect(job: tuple[int, int, tuple[str, str, float]]) -> list[Row]:
-    """Make a case of seed, number and kind, effect, level; return what is seen of it with its reference and without."""
+    """Make a case from seed, number and (kind, effect, level); return its rows with and without a reference."""
     seed, number, fault = job
     label, recording, healthy = labelled_recordings(ROLE, seed, number, fault)
     simulator = ForgingManipulator()
@@ -60,12 +60,12 @@ def collect(job: tuple[int, int, tuple[str, str, float]]) -> list[Row]:
 
 
 def truth_of(label: Mapping[str, Any]) -> str:
-    """Return the cause that is right."""
+    """Return the correct cause of a label."""
     return str(label["effect"]) if label["kind"] == "single" else str(label["kind"])
 
 
 def fit_part(rows: Sequence[Row]) -> dict[str, Any]:
-    """Return floors and calibration of all cases with a reference, or of all without, as plain values."""
+    """Return floors and calibration for all cases with a reference, or for all without, as plain values."""
     healthy = [evidence for label, evidence in rows if label["kind"] == "none"]
     whole = DriveFloor.of_healthy(
         np.array([evidence.whole for evidence in healthy]), np.array([evidence.scatter for evidence in healthy])
@@ -85,7 +85,7 @@ def fit_part(rows: Sequence[Row]) -> dict[str, Any]:
 
 
 def fit_calibration(attributions: Sequence[tuple[str, Attribution[FittedDriveCause]]]) -> GapCalibration:
-    """Fit sharpness, weight of the shrink and both biases to what was true: least −log p, drawn to the start."""
+    """Fit sharpness, weight of the shrink and both biases to the truth: minimum −log p plus a ridge to the start."""
     from scipy.optimize import minimize
 
     def loss(values: FloatArray) -> float:
@@ -110,9 +110,11 @@ def main(
     cases: int = 100,
     seed: int = 71,
     processes: int = 2,
-    numbers: Annotated[str, typer.Option(help="of the planned cases, e.g. 0-38,140-177; default: all")] = "",
+    numbers: Annotated[
+        str, typer.Option(help="numbers of the planned cases to make, e.g. 0-38,140-177; default: all")
+    ] = "",
 ) -> None:
-    """Make the cases, fit, write."""
+    """Make the cases, fit and write the floors."""
     plan = planned(cases, seed)
     jobs = [(seed, i, plan[i]) for i in numbers_of(numbers, len(plan))]
     rows = [row for _, seen in answers_of(collect, jobs, processes) for row in seen]
@@ -121,7 +123,7 @@ def main(
 
 
 def numbers_of(text: str, n_planned: int) -> list[int]:
-    """Return the numbers that a text such as "0-38,140-177" names; all where it is empty."""
+    """Return the numbers in a text such as "0-38,140-177"; all if it is empty."""
     if not text:
         return list(range(n_planned))
     ends = [part.partition("-") for part in text.split(",")]
@@ -129,7 +131,7 @@ def numbers_of(text: str, n_planned: int) -> list[int]:
 
 
 def floors_of(rows: Sequence[Row], seed: int, drawn: str = "all") -> dict[str, Any]:
-    """Return the content of the floors' file."""
+    """Return the content of the floors file."""
     parts = {
         name: [row for row in rows if bool(row[0]["with_reference"]) is with_reference]
         for name, with_reference in (("with_reference", True), ("without_reference", False))

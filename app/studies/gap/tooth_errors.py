@@ -1,10 +1,10 @@
-"""Learn the changes of transmission errors by which encoders tell tooth faults apart.
+"""Learn the changes of transmission error by which encoders distinguish tooth faults.
 
-`python -m app.studies.gap.tooth_errors` draws static contacts of three simulators that describe teeth and faults
-otherwise than each other – load shared by teeth of a rack's shape, the quasi-static machines, gears of finite elements
-whose slices of the face touch each by itself – and writes the descriptors of what each fault changes. It prints how
-often each simulator's faults are named rightly by what the others have taught. `--blind N` records faults on the
-independent rig, with encoders, and names them by all.
+`python -m app.studies.gap.tooth_errors` draws static contacts of three simulators that model teeth and faults
+differently – load sharing of rack-shaped teeth, the quasi-static machines, finite-element gears whose face slices touch
+independently – and writes the descriptors of the change caused by each fault. It prints how often the faults of each
+simulator are identified after learning from the others. `--blind N` records faults on the independent rig, with
+encoders, and identifies them after learning from all.
 """
 
 from __future__ import annotations
@@ -69,31 +69,31 @@ from sims.reduced_fe import mesh_maps, static_table
 
 SEED = 5501
 STEPS = 32
-"""Of a pitch, as the diagnosis has them."""
+"""Steps per pitch, as in the diagnosis."""
 MIN_CHANGE_UM = 0.3
 LOAD_N_PER_MM2 = (15.0, 120.0)
 """Force per face width and module."""
 MIN_LOAD_N_PER_MM = 15.0
-"""Of quasi-static machines: at less, teeth hardly yield."""
+"""Minimum load of quasi-static machines; below it, teeth hardly deflect."""
 NOISE, TORSION = (0.002, 0.05), (0.002, 0.08)
-"""Over the change's swing: what resolution leaves, and what the drive's torsion does over many pitches."""
+"""Relative to the peak-to-peak change: noise of the resolution, and drift by torsion of the drive over many pitches."""
 FAULTY_TOOTH = 5
 
 Drawn = Callable[[str, np.random.Generator], ToothErrorChange]
 
 
 # --------------------
-# Load shared by teeth of a rack's shape, and by gears of finite elements; both touch by their corners, too.
+# Load sharing of rack-shaped teeth and of finite-element gears, both with corner contact.
 # --------------------
 
 
 def shared_load(fault: str, rng: np.random.Generator) -> ToothErrorChange:
-    """Return what a fault changes where teeth of a rack's shape share the load.
+    """Return the change by a fault if rack-shaped teeth share the load.
 
     Raises
     ------
     InputError
-        If gears or fault were drawn that cannot be.
+        If the random gears or fault are impossible.
     """
     first = int(rng.integers(18, 56))
     teeth = first, int(np.clip(round(first * rng.uniform(0.8, 2.6)), 18, 100))
@@ -112,15 +112,15 @@ def shared_load(fault: str, rng: np.random.Generator) -> ToothErrorChange:
 
 
 def finite_elements(fault: str, rng: np.random.Generator) -> ToothErrorChange:
-    """Return what a fault changes where gears of finite elements share the load, each slice of the face by itself.
+    """Return the change by a fault if finite-element gears share the load, with independent slices of the face.
 
-    A crack gives way as the elements about it do. Where spalls and chips are, slices lie lower; those beside them carry
-    on, and press the more into the tooth.
+    A crack adds the compliance of the finite elements. At spalls and chips, slices are recessed; the neighbouring ones
+    carry more load.
 
     Raises
     ------
     InputError
-        If a fault was drawn that cannot be.
+        If the random fault is impossible.
     RefusalError
         If no contact is found.
     """
@@ -140,7 +140,7 @@ def finite_elements(fault: str, rng: np.random.Generator) -> ToothErrorChange:
     faulty = replace(healthy, **fields)
 
     def error_um(mesh: GearMesh) -> FloatArray:
-        # Only a crack changes what elements yield.
+        # Only a crack changes the compliance of the elements.
         cracked = replace(mesh.healthy, cracks_1=mesh.cracks_1, cracks_2=mesh.cracks_2)
         table = static_table(gears, cracked)
         missing = separations_with_corners(mesh, table.progress)
@@ -167,7 +167,7 @@ def _element_gear(teeth: int) -> ReducedGear:
 
 
 def _loaded(pair: PairGeometry, rng: np.random.Generator) -> tuple[GearMesh, float]:
-    """Draw a load, N/mm, and the tip relief of gears made for it."""
+    """Draw a load, in N/mm, and the tip relief of gears designed for it."""
     module = pair.driver.module_mm
     load = log_uniform(rng, *LOAD_N_PER_MM2) * module
     relief = 0.0 if rng.uniform() < 0.25 else load / 14.0 * rng.uniform(0.2, 1.4)
@@ -180,7 +180,7 @@ def _torque_nm(mesh: GearMesh, load_n_per_mm: float) -> float:
 
 
 def _fault(name: str, mesh: GearMesh, side: int, rng: np.random.Generator) -> dict[str, Any]:
-    """Return the fields of a mesh that change."""
+    """Return the fields of a mesh that a fault changes."""
     number, pair = side + 1, mesh.pair
     gear, flank = mesh.side(number).gear, mesh.side(number).flank
     module, width = gear.module_mm, gear.face_width_mm
@@ -205,14 +205,14 @@ def _fault(name: str, mesh: GearMesh, side: int, rng: np.random.Generator) -> di
 
 
 CORNERS = 0.35
-"""Base pitches before and after the path of contact within which corners may touch."""
+"""Range of corner contact before and after the path of contact, in base pitches."""
 
 
 def table_with_corners(mesh: GearMesh) -> MeshTable:
-    """Return the table of a mesh whose pairs touch by corners before and after their path; cycles begin `CORNERS` late.
+    """Return the table of a mesh with corner contact before and after the path; cycles begin `CORNERS` late.
 
-    `sims.mesh` takes a pair up and gives it up within a twentieth of a pitch. But a tooth that lags by some µm leaves
-    the load to its neighbours' corners: without them a pitch error of one tooth looks like a crack.
+    In `sims.mesh` a pair engages and disengages within a twentieth of a pitch. But a tooth that lags by some µm leaves
+    the load to its neighbours' corners: without corner contact, a pitch error of one tooth looks like a crack.
     """
     table = mesh_table(mesh)
     low, high = -CORNERS - mesh.ramp, mesh.pair.contact_ratio + CORNERS + mesh.ramp
@@ -236,9 +236,9 @@ def table_with_corners(mesh: GearMesh) -> MeshTable:
 
 
 def separations_with_corners(mesh: GearMesh, progress: FloatArray) -> ToothRows:
-    """Return what is missing between the flanks of each tooth and its mate's, their corners' way to each other with it.
+    """Return the separation between the flanks of each tooth and its mate, including that of their corners.
 
-    Of a tooth chipped over the whole face, the corner is where the chip's edge is.
+    On a tooth chipped over the whole face, the corner is at the edge of the chip.
     """
     inside = np.clip(progress, 0.0, mesh.pair.contact_ratio)
     ordinary, _ = separation_table(mesh.healthy, inside)
@@ -257,7 +257,7 @@ def separations_with_corners(mesh: GearMesh, progress: FloatArray) -> ToothRows:
 
 
 def _row_of_teeth(mesh: GearMesh, number: int) -> NDArray[np.int64]:
-    """Return 0 for a whole tooth, and the place of a faulty one among them."""
+    """Return 0 for each healthy tooth, and the index of each faulty tooth among the faulty ones, from 1."""
     side = mesh.side(number)
     of = np.zeros(side.gear.teeth, dtype=np.int64)
     of[list(side.faulty_teeth)] = np.arange(1, 1 + len(side.faulty_teeth))
@@ -265,21 +265,21 @@ def _row_of_teeth(mesh: GearMesh, number: int) -> NDArray[np.int64]:
 
 
 # --------------------
-# The quasi-static machines, and what all have in common.
+# The quasi-static machines, and functions for all simulators.
 # --------------------
 
 
 def quasi_static(fault: str, rng: np.random.Generator) -> ToothErrorChange:
-    """Return what a fault changes on a drawn quasi-static machine, the teeth of the other gear alike.
+    """Return the change by a fault on a random quasi-static machine whose other gear has identical teeth.
 
     Raises
     ------
     InputError
-        If a machine was drawn that cannot be, or next to no load.
+        If the random machine is impossible or carries almost no load.
     """
     machine = StaticMachine.of(rng)
     if machine.load_n < MIN_LOAD_N_PER_MM * machine.nominal.face_width_mm:
-        raise InputError("the teeth carry next to nothing")
+        raise InputError("the teeth carry almost no load")
     healthy, faulty = machine.healthy(), machine.healthy()
     EFFECTS[fault](machine, faulty, rng)
     moved = [
@@ -308,11 +308,11 @@ def _cycles(teeth: int) -> FloatArray:
 
 
 def _change(side: int, faulty_um: FloatArray, healthy_um: FloatArray, rng: np.random.Generator) -> ToothErrorChange:
-    """Return the change as encoders give it: from any angle on, with noise."""
+    """Return the change as measured by encoders: starting at a random angle, with noise."""
     change, start = faulty_um - healthy_um, int(rng.integers(STEPS))
     size = float(np.ptp(change))
     if size < MIN_CHANGE_UM:
-        raise InputError("the fault changes next to nothing")
+        raise InputError("the fault changes almost nothing")
     white = rng.standard_normal((2, len(change)))
     lines = np.fft.rfft(white[1])
     slow = np.fft.irfft(lines / np.maximum(np.arange(len(lines)) * STEPS / len(change), 0.05), len(change))
@@ -330,7 +330,7 @@ SIMULATORS: dict[str, Drawn] = {
 
 
 def known_tooth_errors_of(simulator: str, n_each: int) -> KnownToothErrors:
-    """Return the changes of the transmission error by so many faults of each kind."""
+    """Return the changes of transmission error by `n_each` faults of each kind."""
     rng = np.random.default_rng([SEED, [*SIMULATORS].index(simulator)])
     rows: list[FloatArray] = []
     for fault in TOOTH_FAULTS:
@@ -344,13 +344,13 @@ def known_tooth_errors_of(simulator: str, n_each: int) -> KnownToothErrors:
 
 
 def together(several: Sequence[KnownToothErrors]) -> KnownToothErrors:
-    """Return what several simulators teach."""
+    """Return the combined changes of several simulators."""
     descriptors = np.concatenate([known.descriptors for known in several])
     return KnownToothErrors(descriptors, np.concatenate([known.faults for known in several]))
 
 
 def named(known: KnownToothErrors, rows: FloatArray) -> tuple[NDArray[np.str_], FloatArray]:
-    """Return the likeliest fault of each row, and its probability where all four are as likely beforehand."""
+    """Return the most probable fault of each row and its probability, with equal priors for all four."""
     levels = np.array([[*known.log_likelihoods(row).values()] for row in rows])
     weights = np.exp(levels - levels.max(axis=1, keepdims=True))
     return np.array(TOOTH_FAULTS)[levels.argmax(axis=1)], weights.max(axis=1) / weights.sum(axis=1)
@@ -364,7 +364,7 @@ def _print_accuracy(
     of_each = ", ".join(f"{name} {np.mean(right[truth == name]):.2f}" for name in TOOTH_FAULTS if (truth == name).any())
     typer.echo(
         f"{title}: right {right.mean():.2f} of {len(right)} ({of_each}; of one tooth {right[is_single].mean():.2f}); "
-        f"said with 0.9 {sure.sum()}, right {right[sure].mean() if sure.any() else float('nan'):.2f}"
+        f"probability ≥ 0.9: {sure.sum()}, right {right[sure].mean() if sure.any() else float('nan'):.2f}"
     )
 
 
@@ -372,7 +372,7 @@ ENCODER_COUNTS = 200_000
 
 
 def name_blindly(n_each: int) -> None:
-    """Name faults of the independent rig's development gears by its encoders, and print how often that is right."""
+    """Identify faults of the independent rig's development gears by its encoders; print the share of right answers."""
     rng = np.random.default_rng([SEED, 9])
     rows: list[tuple[str, str, float]] = []
     unlike = 0
@@ -396,7 +396,7 @@ def main(
     blind: Annotated[int, typer.Option(help="faults of each kind on the independent rig")] = 0,
     to: Path = TOOTH_ERRORS_FILE,
 ) -> None:
-    """Draw, print, write."""
+    """Draw faults, print the accuracy and write what was learned."""
     by_simulator = {name: known_tooth_errors_of(name, each) for name in SIMULATORS}
     for name, held_out in by_simulator.items():
         taught = together([known for title, known in by_simulator.items() if title != name])

@@ -1,9 +1,9 @@
-"""How well faults of teeth are told from each other, and how severe they are, where the simulator is a good one.
+"""How well tooth faults are distinguished, and their severities estimated, with a good simulator.
 
 `python -m app.studies.gap.tooth_faults [--source same] [--rigs 6] [--seed 8101] [--role development]` draws rigs,
-records a specimen of each healthy and with every fault of a tooth, and asks the diagnosis with the 16-degree-of-freedom
-pair as twin: that is another specimen with another housing, flanks and tolerances. `--source blind`
-and `--source reduced-fe` record the independent rig and the pair of finite-element gears instead: poor twins, whose
+records a specimen of each, healthy and with every tooth fault, and runs the diagnosis with the 16-degree-of-freedom
+pair as twin, a different specimen with another housing, flanks and tolerances. `--source blind` and `--source
+reduced-fe` record the independent rig and the pair of finite-element gears instead; for these the twin is poor, and its
 trials must do no harm. With `--run-up` a run-up of each healthy specimen measures the path.
 """
 
@@ -41,18 +41,18 @@ from sims.cracked import CrackedPair
 from sims.reduced_fe import ReducedPair
 
 LEVELS = (0.25, 0.6)
-"""Shares of the plausible severities, in logarithms, above which each fault is drawn."""
+"""Minimum severities of each fault, as shares of the logarithmic range of plausible severities."""
 BLIND_LEVELS = (0.5, 0.9)
 MIN_LOAD_N_PER_MM = 30.0
-"""With less, flanks part and no fault of a tooth is what one sees."""
+"""Minimum load; below it, flanks separate and dominate the vibration."""
 LONGEST_S = 4.0
 RUN_UP_S, RUN_UP = 20.0, (0.3, 1.1)
-"""Length of the healthy run-up, and its speeds over those of the recordings."""
+"""Length of the healthy run-up, and its speeds relative to those of the recordings."""
 
 
 @dataclass(frozen=True)
 class RecordedFault:
-    """One recording with its healthy reference, and what is wrong; severity nan where units differ."""
+    """One recording with its healthy reference and its fault; severity is nan if the units differ."""
 
     name: str
     severity: float
@@ -63,7 +63,7 @@ class RecordedFault:
 
 @dataclass(frozen=True)
 class Answered:
-    """What was said of one recording.
+    """Diagnosis of one recording.
 
     Parameters
     ----------
@@ -71,13 +71,13 @@ class Answered:
         The true fault.
     severity : float
     forests, with_waveforms : mapping
-        Fault of a tooth → probability among them, without and with waveforms.
+        Tooth fault → probability among tooth faults, without and with waveforms.
     correlation : float
-        Of the true fault's waveform.
+        Correlation with the waveform of the true fault.
     size : float
-        Of the gap, in structural floors.
+        Size of the gap, in structural floors.
     stated : Interval or None
-        The severity that is stated of the true fault; None where the twin does not show it.
+        Stated severity of the true fault; None if the twin does not show it.
     """
 
     name: str
@@ -90,7 +90,7 @@ class Answered:
 
 
 def drawn_cases(plan: Plan, n_rigs: int) -> Iterator[tuple[int, BlindCase]]:
-    """Yield so many cases with their numbers, each of another rig under load, shortened to `LONGEST_S`."""
+    """Yield `n_rigs` numbered cases, each of another rig under load, shortened to `LONGEST_S`."""
     number = n_drawn = 0
     while n_drawn < n_rigs:
         number += 1
@@ -103,7 +103,7 @@ def drawn_cases(plan: Plan, n_rigs: int) -> Iterator[tuple[int, BlindCase]]:
 
 
 def simulated(case: BlindCase, source: str, seed: int, *, with_run_up: bool = False) -> Iterator[RecordedFault]:
-    """Yield a specimen of a simulator with each fault."""
+    """Yield recordings of a simulator's specimen with each fault."""
     rng = np.random.default_rng(seed)
     first, healthy = case.conditions[0], case.references[0]
     simulator = CrackedPair() if source == "same" else ReducedPair()
@@ -145,7 +145,7 @@ def simulated(case: BlindCase, source: str, seed: int, *, with_run_up: bool = Fa
 
 
 def independent(plan: Plan, number: int) -> Iterator[RecordedFault]:
-    """Yield the independent rig with each fault."""
+    """Yield recordings of the independent rig with each fault."""
     for name in TOOTH_FAULTS:
         for level in BLIND_LEVELS:
             case = plan.draw(PlannedCase(number, "blind", "single", name, level, True, 1))
@@ -156,7 +156,7 @@ def independent(plan: Plan, number: int) -> Iterator[RecordedFault]:
 
 
 def answered(recorded: RecordedFault, rig: Rig, cache: Path) -> Answered:
-    """Diagnose one recording as far as its likeliest causes."""
+    """Diagnose one recording up to its most probable causes."""
     simulator = CrackedPair()
     known, twin = simulator.gap_effects(), simulator.twin_of(rig)
     now, reference = PreparedRecording(recorded.now.with_rig(rig)), PreparedRecording(recorded.reference.with_rig(rig))
@@ -193,7 +193,7 @@ def _among(probabilities: dict[str, float]) -> dict[str, float]:
 
 
 def report_lines(rows: Sequence[Answered]) -> Iterator[str]:
-    """Yield the table: by fault, all, and the strong ones; forests alone and with waveforms."""
+    """Yield the table by fault, for all and for strong ones, with forests alone and with waveforms."""
     groups = {name: [row for row in rows if row.name == name] for name in TOOTH_FAULTS}
     groups |= {"all": [*rows], f"{STRONG:g} floors": [row for row in rows if row.size >= STRONG]}
     for name, of_effect in groups.items():
@@ -216,9 +216,9 @@ def main(
     rigs: int = 6,
     seed: int = 8101,
     role: str = "development",
-    run_up: Annotated[bool, typer.Option("--run-up", help="of simulators; the independent rig has none")] = False,
+    run_up: Annotated[bool, typer.Option("--run-up", help="measure the path by a run-up; simulators only")] = False,
 ) -> None:
-    """Record, ask, print."""
+    """Record the rigs, diagnose them and print the table."""
     plan, rows = Plan(1000, seed, role, reference="with", longest_s=LONGEST_S), []
     for number, case in drawn_cases(plan, rigs):
         first = case.conditions[0]
