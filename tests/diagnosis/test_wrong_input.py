@@ -173,6 +173,17 @@ def test_a_few_samples_that_overflowed_are_noticed(name, n):
         assert ("wrapped" in {p.kind for p in problems}) == is_wrapped
 
 
+@pytest.mark.parametrize("tones_hz", [(6300.0, 7900.0), (6830.0, 7400.0, 8100.0), (6500.0, 7000.0)])
+def test_tones_of_three_samples_per_cycle_are_no_overflow(tones_hz):
+    time_s, rng = np.arange(1 << 16) / 20480, np.random.default_rng(1)
+    tones = sum(
+        np.sin(2 * np.pi * hz * time_s + i) * (1 + 0.3 * np.sin(2 * np.pi * 30 * time_s))
+        for i, hz in enumerate(tones_hz)
+    )
+    x = tones + 0.01 * rng.standard_normal(len(time_s))
+    assert "wrapped" not in {p.kind for p in find_problems(Recording(x[None], 20480.0, (TRUE.channels[0],)))}
+
+
 @pytest.mark.parametrize("ring_hz", [900.0, 3000.0, 5900.0])
 def test_impacts_and_clicks_are_no_overflow(ring_hz):
     rng, time_s = np.random.default_rng(0), np.arange(1 << 15) / 12800
