@@ -161,7 +161,7 @@ def test_a_race_whose_order_is_a_multiple_of_the_shaft_within_slip_is_not_called
     turning = replace(quiet, samples=noise + np.cos(2 * np.pi * 22.0 * t))
     assert "no-bearing-damage" in codes(analyze(turning))
     struck = analyze(with_impacts(turning, 5 * 22.0))
-    assert "5 times a turn" in finding(struck, "bearings-undecided").title
+    assert "5 times per turn" in finding(struck, "bearings-undecided").title
 
 
 def test_a_bearing_that_cannot_be_examined_is_not_called_good() -> None:

@@ -11,6 +11,7 @@ from gearsig import analyze
 from gearsig.diagnosis import Kind, Outcome
 from gearsig.recording import Recording, find_problems, read_recording
 from gearsig.rig import ConstantSpeed, OperatingPoint, Rig, Shaft, read_rig
+from sims.blind import draw_case, record_case
 from tests.diagnosis.machines import GOOD, record
 from tests.kinematic.speed import ConstantProfile
 from tests.measured import BY_NAME, DATA, MOTOR, RECORDINGS, needs_data
@@ -238,6 +239,21 @@ def test_time_runs_forward_in_every_measured_recording(name):
     if name.startswith(("bearing_cwru/OR007", "bearing_cwru/IR021")):
         said = {p.channel for p in turned if p.kind == "reversed"}
         assert {name for name in recording.vibration_names() if "_FE_" not in name} <= said
+
+
+@pytest.mark.slow
+def test_teeth_that_separate_and_strike_again_do_not_run_backwards():
+    """A chip through which teeth separate: more energy comes before the peak of the second strike than after it."""
+    case = draw_case(
+        np.random.default_rng(7014),
+        role="development",
+        kind="single",
+        effect="chipped_tooth",
+        level=1.0,
+        n_conditions=1,
+        with_reference=True,
+    )
+    assert "reversed" not in {p.kind for p in find_problems(record_case(case).conditions[0])}
 
 
 @pytest.mark.parametrize("damping", [0.01, 0.05])
