@@ -236,7 +236,7 @@ def analyse_file(job: _AnalysisJob) -> tuple[Row, list[Row], Origin]:
         result = job.options.analyze(path, _nominal_speed_rpm(job.origin, job.options))
         analysis = result.as_one() if isinstance(result, LongAnalysis) else result
         if (analysis.recording.provenance.sha256 or sha256_of(path)) != job.sha256:  # no hash is computed of parts
-            return _row(job, outcome=FAILED, reason="it was written while it was read", key=""), [], job.origin
+            return _row(job, outcome=FAILED, reason="it was changed while it was read", key=""), [], job.origin
     except GearsigError as error:
         return _row(job, outcome=FAILED, reason=str(error)), [], job.origin
     except Exception as error:  # noqa: BLE001 - one broken file must not stop the rest; the reason is passed on

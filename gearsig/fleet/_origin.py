@@ -167,7 +167,7 @@ def _compile(text: str) -> tuple[re.Pattern[str], str | timedelta]:
             raise InputError(f"{field[0]} is not understood", where=where, remedy=remedy)
         names.add(name)
         if {"date", "number"} <= names:
-            raise InputError("date and number occur both", where=where, remedy="keep the date")
+            raise InputError("date and number both occur", where=where, remedy="keep the date")
         if name == "date":
             form = field["form"]
             parts.append(f"(?P<date>{_of_form(form)})")
@@ -180,7 +180,7 @@ def _compile(text: str) -> tuple[re.Pattern[str], str | timedelta]:
             parts.append(f"(?P<{name}>[^/]+?)" if name else "[^/]*?")
     parts.append(_literal(text[end:]))
     if "{" in text[end:] or "}" in text[end:]:
-        raise InputError(f"{text!r} has a bracket that is not closed", where=where)
+        raise InputError(f"{text!r} has an unmatched bracket", where=where)
     return re.compile("".join(parts) + "$"), form
 
 
@@ -266,7 +266,7 @@ def _check_is_there(path: Path) -> None:
     try:
         without_condition(path)[0].stat()
     except (OSError, ValueError) as error:
-        problem = getattr(error, "strerror", None) or "no such name is possible"
+        problem = getattr(error, "strerror", None) or "the name is not possible"
         names = [sibling.name for sibling in path.parent.iterdir()] if path.parent.is_dir() else []
         remedy = closest_match_hint(path.name, names) or "check the name"
         raise InputError(f"cannot be read ({problem})", where=file_label(path, whole=True), remedy=remedy) from None

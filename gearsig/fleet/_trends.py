@@ -142,7 +142,7 @@ def read_settings(folder: Path) -> TrendSettings:
     path = folder / SETTINGS
     if not path.exists():
         return TrendSettings()
-    data = read_toml(path, remedy="delete it for the usual settings, or mend it")
+    data = read_toml(path, remedy="delete it to use the default settings, or correct it")
     known = [name for name in TrendSettings.__dataclass_fields__ if name != "baselines"]
     unknown = sorted(set(data) - {*known, "baseline"})
     if unknown:
@@ -169,7 +169,7 @@ def _moment(value: object, *, ends: bool = False) -> datetime:
         return value.replace(tzinfo=None)
     if isinstance(value, date):
         return datetime.combine(value, time.max if ends else time.min)
-    raise InputError(f"{value!r} is no date", remedy="write for example 2026-01-31")
+    raise InputError(f"{value!r} is not a date", remedy="write for example 2026-01-31")
 
 
 def write_settings(folder: Path, settings: TrendSettings) -> None:
@@ -608,13 +608,13 @@ class Trend:
         n = int(self.table["in_baseline"].sum())
         if self.basis == NONE:
             n_all = len(self.table)
-            parts = [f"No limits yet: {counted(n_all, 'recording')} {'is' if n_all == 1 else 'are'} no baseline."]
+            parts = [f"No limits yet: {counted(n_all, 'recording')} {'is' if n_all == 1 else 'are'} not a baseline."]
         elif self.basis != STATISTICAL:
             parts = [f"Limits are the zones of {self.basis}."]
         else:
             parts = [f"Limits from the {counted(n, 'recording')} of the baseline.", _false_alarms(self)]
         if self.normalised:
-            parts.append(f"What is expected follows {' and '.join(self.normalised)}.")
+            parts.append(f"The expected value depends on {' and '.join(self.normalised)}.")
         return " ".join(parts)
 
     def __repr__(self) -> str:
@@ -685,7 +685,7 @@ class OperatingTrend:
 
 
 def _false_alarms(trend: Trend, how_often: str = "one") -> str:
-    return f"An unchanged machine leaves them in {how_often} of {readable(1 / trend.false_alarm_rate)} recordings."
+    return f"An unchanged machine is outside them in {how_often} of {readable(1 / trend.false_alarm_rate)} recordings."
 
 
 def last_level(trends: PointTrends, column: int) -> str:

@@ -156,7 +156,7 @@ def check_decoded(decoded_bytes: int, path: Path, *, at_once_bytes: int | None =
             f"decompresses to more than {MAX_RATIO} times its size",
             where=path.name,
             allowed=f"a ratio up to {MAX_RATIO}",
-            remedy="this is no recording; if it is, unpack it first",
+            remedy="this is not a recording; if it is one, unpack it first",
         )
     check_memory(2 * (decoded_bytes if at_once_bytes is None else at_once_bytes), path.name)
 
@@ -220,7 +220,7 @@ def refuse_nul(chunk: bytes, where: str) -> None:
             f"holds {zeros} where text is expected",
             where=where,
             allowed="plain text (UTF-8)",
-            remedy="the file was not written completely, or it is no text file: export it again",
+            remedy="the file was not written completely, or it is not a text file: export it again",
         )
 
 
@@ -268,7 +268,7 @@ def foreign_errors(where: str, file_format: str) -> Iterator[None]:
             f"cannot be opened ({error.strerror or error})",
             where=where,
             allowed="a readable file",
-            remedy="check who may read it",
+            remedy="check the permissions of the file",
         ) from error
     except Exception as error:  # parsers raise anything on damaged bytes, one of them bare Exception
         reason = str(error)[:200] or type(error).__name__

@@ -213,7 +213,7 @@ _TITLES = {
     "wrapped": "Channel {} has overflowed: its values wrap around.",
     "stepped": "The level of channel {} steps: gain, mounting or load changed.",
     "reversed": "Channel {} seems to run backwards in time.",
-    "hum": "Mains hum rules channel {}.",
+    "hum": "Mains hum dominates channel {}.",
 }
 
 
@@ -316,7 +316,7 @@ def _clipped(channel: Channel, x: FloatArray, levels: SampleLevels) -> ChannelPr
         return None
     share = clipping.n_samples / len(x)
     evidence = f"{clipping.n_samples} samples ({100 * share:.2g} %) are held at {clipping.place}"
-    remedy = "measure again with a larger input range; peak, crest factor and kurtosis are not to be trusted"
+    remedy = "measure again with a larger input range; peak, crest factor and kurtosis are not reliable"
     return ChannelProblem(channel.name, "clipped", share, evidence, remedy)
 
 
@@ -347,7 +347,7 @@ def _stuck(channel: Channel, x: FloatArray, levels: SampleLevels) -> ChannelProb
         f"{counted(int(long.sum()), 'run')} of equal samples, the longest {lengths[longest]} samples "
         f"from sample {starts[longest]} at {x[starts[longest]]:g}; 99 % of the runs are no longer than {usual:.0f}"
     )
-    remedy = "check for dropouts of the measurement chain or a machine at rest, and cut these parts out"
+    remedy = "check for dropouts of the measurement chain or a machine at standstill, and cut these parts out"
     return ChannelProblem(channel.name, "stuck", share, evidence, remedy)
 
 
@@ -357,7 +357,7 @@ def _offset(channel: Channel, x: FloatArray, spread: float) -> ChannelProblem | 
         return None
     evidence = f"the mean, {mean:.4g} {channel.unit}".rstrip() + f", is {abs(mean) / spread:.3g} times the rms about it"
     return ChannelProblem(
-        channel.name, "offset", 1.0, evidence, "check bias and coupling; only the part about it counts"
+        channel.name, "offset", 1.0, evidence, "check bias and coupling; only the part about the mean counts"
     )
 
 
@@ -366,7 +366,7 @@ def _quantised(channel: Channel, levels: SampleLevels) -> ChannelProblem | None:
     if levels.step is None or levels.n_spanned >= 64:
         return None
     evidence = f"only {levels.n_spanned} levels of {levels.step:.3g} are in use ({np.log2(levels.n_spanned):.1f} bits)"
-    remedy = "measure again with a smaller input range: weak sidebands drown in the rounding"
+    remedy = "measure again with a smaller input range: weak sidebands are lost in the rounding"
     return ChannelProblem(channel.name, "quantised", 1.0, evidence, remedy)
 
 
@@ -402,7 +402,7 @@ def _wrapped(channel: Channel, x: FloatArray) -> ChannelProblem | None:
     if n:
         evidence = f"{n} steps from one end of the range, {low:.4g} to {high:.4g}, to the other, and the slope goes on"
     elif n := _n_off_by_the_range(x, low, high):
-        evidence = f"{n} samples are off by the range, {low:.4g} to {high:.4g}, from what those beside them say"
+        evidence = f"{n} samples differ by the range, {low:.4g} to {high:.4g}, from what their neighbours predict"
     else:
         return None
     remedy = "export again in a wider number format; nothing can be read from this channel"
@@ -514,7 +514,7 @@ def _stepped(channel: Channel, x: FloatArray) -> ChannelProblem | None:
         return None
     place = 100 * cuts[best] / N_BLOCKS
     evidence = f"the level changes by {signed(step)} dB at {place:.0f} % of the record, and is steady"
-    remedy = "check gain, mounting and load, and analyse the parts before and after by themselves"
+    remedy = "check gain, mounting and load, and analyse the parts before and after separately"
     return ChannelProblem(channel.name, "stepped", 1.0, f"{evidence} before and after ({scatter:.1f} dB)", remedy)
 
 
@@ -544,7 +544,7 @@ def _reversed(channel: Channel, x: FloatArray, rate_hz: float) -> ChannelProblem
         evidence = _sudden_ends(spectrum, frequency, rate_hz, top_hz)
     if not evidence:
         return None
-    remedy = "check the order of the samples: turned round, teeth are counted backwards, and speeds fall that rose"
+    remedy = "check the order of the samples: if it is reversed, teeth are counted backwards and rising speeds fall"
     return ChannelProblem(channel.name, "reversed", 1.0, evidence, remedy)
 
 
@@ -635,7 +635,7 @@ def _hum(channel: Channel, x: FloatArray, rate_hz: float) -> ChannelProblem | No
         multiple = round(line_hz / mains_hz)
         deviation = abs(line_hz / (max(multiple, 1) * mains_hz) - 1)
         if 1 <= multiple <= 6 and deviation < MAINS_WANDER and share > 0.5 and step_hz < 2.0:
-            evidence = f"{percent(share)} of the power stands at {line_hz:.5g} Hz, a multiple of {mains_hz:.0f} Hz"
-            remedy = "check shield and earthing, if no shaft or mesh turns there; what is weaker drowns in it"
+            evidence = f"{percent(share)} of the power is at {line_hz:.5g} Hz, a multiple of {mains_hz:.0f} Hz"
+            remedy = "check shielding and earthing, unless a shaft or mesh is there; the hum masks weaker components"
             return ChannelProblem(channel.name, "hum", share, evidence, remedy, line_hz)
     return None

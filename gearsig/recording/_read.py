@@ -149,7 +149,7 @@ def n_samples_of(path: str | Path) -> int | None:
 def _part_reader(file_format: FileFormat, where: str) -> Callable[[Path, slice], RawTable]:
     if file_format.read_part is None:
         parted = ", ".join(f.name for f in FORMATS if f.read_part is not None)
-        raise InputError(f"{file_format.name} is only read whole", where=where, allowed=parted, remedy="convert it")
+        raise InputError(f"{file_format.name} can only be read whole", where=where, allowed=parted, remedy="convert it")
     return file_format.read_part
 
 
@@ -451,7 +451,7 @@ def _pulse_times_s(file: Path) -> FloatArray:
     layout = find_layout(data, where)
     if layout.n_columns != 1:
         raise InputError(
-            f"has {layout.n_columns} columns", where=where, allowed="one column of times", remedy="keep the times alone"
+            f"has {layout.n_columns} columns", where=where, allowed="one column of times", remedy="keep only the times"
         )
     (times,) = parse_rows(data, layout, ("time",), where)
     bad = np.flatnonzero(~np.isfinite(times))
@@ -496,7 +496,7 @@ def _pulse_times_s(file: Path) -> FloatArray:
 
 
 PULSE_TIMES = (
-    "times of tachometer pulses go with the recording that they belong to: gearsig analyze RECORDING --tach-times FILE "
+    "tachometer pulse times are given along with their recording: gearsig analyze RECORDING --tach-times FILE "
     "(in Python speed=gearsig.recording.read_pulse_times(path))"
 )
 
@@ -648,11 +648,11 @@ def _sampling_rate(
         positive(file_hz, f"{source}: sampling rate in the file", "Hz", remedy="correct it there")
     if file_hz is None and len(table.columns) == 1 and _looks_like_times(table.columns[0]):
         raise InputError(
-            f"the only column, {table.columns[0].name!r}, rises from each value to the next, as times of pulses do and "
-            "no vibration",
+            f"the only column, {table.columns[0].name!r}, rises from each value to the next, as pulse times do and "
+            "vibration does not",
             where=source,
             allowed="a signal over time",
-            remedy=f"{PULSE_TIMES}; if it is a signal, name its unit in a header, as angle [rad], and give --fs",
+            remedy=f"{PULSE_TIMES}; if it is a signal, state its unit in a header, e.g. angle [rad], and give --fs",
         )
     if explicit_hz is not None:
         chosen_hz = positive(explicit_hz, f"{source}: sampling rate given", "Hz", remedy="give --fs above zero")
@@ -740,7 +740,7 @@ def _unused_pulses(table: RawTable, channels: tuple[Channel, ...]) -> Iterator[s
     """Warn of pulses that no rig file names, and say how to use them: the pulses per revolution are not known."""
     for name in (*table.pulse_times_s, *(c.name for c in channels if c.quantity == "tachometer")):
         yield (
-            f'{name!r} holds pulses, as of a tachometer: [speed] with source = "tachometer", channel = "{name}" and '
+            f'{name!r} holds pulses like a tachometer: [speed] with source = "tachometer", channel = "{name}" and '
             "pulses_per_revolution = … in a rig file takes the speed from them"
         )
 
@@ -764,7 +764,7 @@ def _unused_name(source: str) -> Iterator[str]:
     """Suggest the speed that a file name states; it was not measured and may be that of another shaft."""
     speed_rpm = speed_in_name(source)
     if speed_rpm is not None:
-        yield f"the file's name says {speed_rpm:g} rpm, which is not taken: --speed-rpm {speed_rpm:g} states it"
+        yield f"the file name says {speed_rpm:g} rpm, which is not used: give --speed-rpm {speed_rpm:g} to use it"
 
 
 def _contradicted(given: SpeedSource, table: RawTable, rig: Rig | None) -> tuple[str, ...]:

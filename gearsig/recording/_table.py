@@ -161,7 +161,7 @@ def refuse_spectrum(lines: Iterable[str] = (), where: str = "", columns: Sequenc
             axis = f"{column.name} ({column.unit})" if column.unit else column.name
     if axis:
         raise InputError(
-            f"holds a spectrum, no signal over time: its axis is {axis!r}",
+            f"holds a spectrum, not a signal over time: its axis is {axis!r}",
             where=where,
             allowed="the waveform, sample by sample",
             remedy="export the time waveform that the spectrum was computed from",
@@ -193,7 +193,7 @@ def without_clock(
     if len(columns) < 2 or len(columns[0].values) < 3:
         return columns, None, []
     if (time := _clock_of_parts(columns)) is not None:
-        return columns[4:], time, ["columns 1 to 4 are hour, minute, second and its fraction: taken for the time"]
+        return columns[4:], time, ["columns 1 to 4 are hour, minute, second and its fraction: taken as the time"]
     first = columns[0]
     if first.values.dtype.kind not in "fiu" or is_named:
         return columns, None, []
@@ -209,7 +209,7 @@ def without_clock(
                 allowed="the waveform, sample by sample",
                 remedy="export the time waveform; if column 1 is the time, say so in a header: time [s]",
             )
-        note = f"{first.name!r} has no name of its own, increases uniformly and was taken for the time in seconds"
+        note = f"{first.name!r} has no name of its own, increases uniformly and was taken as the time in seconds"
         return columns[1:], RawColumn("time", first.values, "s"), [note]
     return columns, None, []
 
@@ -316,7 +316,7 @@ def one_condition(table: RawTable, number: int, where: str) -> RawTable:
     columns, times = _conditions(table)
     if not 1 <= number <= len(columns):
         raise InputError(
-            f"condition {number} is asked for; beside the time there are {counted(len(columns), 'column')}",
+            f"condition {number} was requested; besides the time there are {counted(len(columns), 'column')}",
             where=where,
             allowed=", ".join(condition_numbers(table)),
             remedy="count the columns from 1, without the time",
@@ -454,7 +454,7 @@ def rate_of_time(
         f"time does not increase at {row_place(i + 1)}: {t[i]:.9g} is followed by {t[i + 1]:.9g}",
         where=where,
         allowed="strictly increasing time",
-        remedy="remove doubled rows, export time with more digits, or drop the column and give --fs",
+        remedy="remove duplicate rows, export time with more digits, or drop the column and give --fs",
     )
     if steps[i] < 0:
         raise stands_still
@@ -609,7 +609,7 @@ def table_from_arrays(arrays: NamedArrays, reader: str, where: str) -> RawTable:
         time = RawColumn("time", signals[clocks[0]].reshape(-1), "s")
     if clocks:
         leaves = list(dict.fromkeys(path.rpartition(".")[2] for path in clocks))
-        warnings.append(f"taken for times and not for channels: {', '.join(leaves[:8])}")
+        warnings.append(f"taken as times, not as channels: {', '.join(leaves[:8])}")
     # A channel is named by the last part of its path if that is unique.
     leaves = [c.name.rpartition(".")[2] for c in columns]
     columns = [replace(c, name=leaf) if leaves.count(leaf) == 1 else c for c, leaf in zip(columns, leaves, strict=True)]
@@ -697,7 +697,7 @@ def _columns(path: str, array: NumberArray, arrays: NamedArrays, where: str) -> 
     over_time = array if array.shape[0] < array.shape[1] else array.T
     if len(over_time) > 0.5 * over_time.shape[1]:
         raise InputError(
-            f"{path!r} has shape {array.shape}: it is not clear which is time",
+            f"{path!r} has shape {array.shape}: it is not clear which dimension is time",
             where=where,
             allowed="a matrix with many more samples than channels",
             remedy="save each channel as a vector",

@@ -410,7 +410,7 @@ class Recording:
             samples = frozen_array(self.samples, "samples (channel, time)", ndim=2)
         except InputError as error:
             is_single = isinstance(self.samples, np.ndarray) and self.samples.ndim == 1
-            hint = error.remedy or ("of one channel, give samples[None]" if is_single else "")
+            hint = error.remedy or ("for one channel, give samples[None]" if is_single else "")
             raise InputError(error.what, where=where, allowed=error.allowed, remedy=hint) from None
         if samples.shape[1] == 0:
             raise InputError("there are no samples", where=where, remedy="check that the file was written completely")
@@ -561,8 +561,8 @@ class Recording:
             here, there = (", ".join(map(short, names[:3])) + ", …" * (len(names) > 3) for names in (unknown, missing))
             are = "is" if len(missing) == 1 else "are"
             yield (
-                f"the rig file describes {counted(len(missing), 'channel')} that {are} not here ({there}) "
-                f"and nothing of {here}: compare the names"
+                f"the rig file describes {counted(len(missing), 'channel')} that {are} not in the recording ({there}) "
+                f"and does not describe {here}: compare the names"
             )
 
     def between(self, start_s: float, end_s: float) -> Recording:
@@ -577,9 +577,9 @@ class Recording:
         first, last = (int(np.clip(round(t * self.sampling_rate_hz), 0, self.n_samples)) for t in times_s)
         if first >= last:
             raise InputError(
-                f"no sample lies from {start_s:.6g} to {end_s:.6g} s",
+                f"there is no sample from {start_s:.6g} to {end_s:.6g} s",
                 where=self.name,
-                allowed=f"a part of 0 to {self.duration_s:.6g} s",
+                allowed=f"a part within 0 to {self.duration_s:.6g} s",
             )
         speed, start = self.speed_source, first / self.sampling_rate_hz
         if isinstance(speed, PulseTimes):

@@ -516,7 +516,7 @@ def _raise_field_count(n_fields: int, number: int, line: str, layout: CsvLayout,
 
 def _raise_no_date_time(field: str, number: int, name: str, layout: CsvLayout, where: str) -> None:
     raise InputError(
-        f"line {number}, column {name!r}: {field.strip()[:60]!r} is no date and time as those above it",
+        f"line {number}, column {name!r}: {field.strip()[:60]!r} is not a date and time like those above it",
         where=where,
         allowed=f"e.g. {DATE_TIME_EXAMPLES}, each {'with' if layout.date_times == 'zoned' else 'without'} a time zone",
         remedy="correct the field, or replace the column by seconds",
@@ -527,7 +527,7 @@ def _raise_no_number(field: str, number: int, name: str, layout: CsvLayout, wher
     text = field.strip()[:60]
     remedy = "correct the field, or remove the column" if text else "cut out the gap knowingly or export again"
     if re.match(r"[+-]?\d{1,3}(?:[.,' \u00a0]\d{3})+(?!\d)", text):
-        remedy = "export the numbers without signs between thousands"
+        remedy = "export the numbers without thousands separators"
     raise InputError(
         f"line {number}, column {name!r}: " + (f"{text!r} is not a number" if text else "the field is empty"),
         where=where,

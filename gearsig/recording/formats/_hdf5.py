@@ -64,7 +64,7 @@ def read_hdf5(path: Path, part: slice | None = None) -> RawTable:
             arrays[dataset_path] = np.atleast_1d(load_dataset(dataset, where, part))
             rates_hz |= _rates_of(dataset.attrs, dataset_path)
         units = _units_of(path, datasets)
-    notes = [f"not followed, because they lead out of the file: {', '.join(skipped[:8])}"] if skipped else []
+    notes = [f"not followed, because they point outside the file: {', '.join(skipped[:8])}"] if skipped else []
     return table_from_arrays(NamedArrays(arrays, {}, units, rates_hz, tuple(notes)), READER, where)
 
 

@@ -80,7 +80,7 @@ def tags(body: memoryview, order: str) -> Iterator[Part]:
         if code not in STORED and code not in TEXT and code != MATRIX:
             raise _damage(f"an element is of the unknown type {code}")
         if start + size > len(body) or (start == at + 4 and size > 4):
-            raise _damage("an element is longer than what holds it")
+            raise _damage("an element is longer than the one that contains it")
         yield code, body[start : start + size]
         at += step
 
@@ -291,9 +291,9 @@ def _load(path: Path) -> tuple[dict[str, Any], list[str]]:
     notes = []
     if doubled:
         names = ", ".join(doubled)
-        notes.append(f"variables stand in the file more than once, the copy that is not all zeros was taken: {names}")
+        notes.append(f"variables occur more than once in the file; the copy that is not all zeros was used: {names}")
     if differ:
-        notes.append(f"the copies of {', '.join(differ)} differ: the last was taken")
+        notes.append(f"the copies of {', '.join(differ)} differ: the last was used")
     return chosen, notes
 
 

@@ -48,7 +48,7 @@ def read_mf4(path: Path) -> RawTable:
         return call_apart(_read, path, longest_s=4.0 + 1e-6 * size, most_bytes=most_bytes)
     except (BrokenProcessPool, MemoryError):
         raise InputError(
-            "is damaged: its reader crashes, finds no end, or asks for far more memory than it can hold",
+            "is damaged: its reader crashes, does not finish, or needs far more memory than the file can hold",
             where=where,
             allowed="a complete MF4 file",
         ) from None

@@ -150,7 +150,7 @@ def read_wav(path: Path, part: slice | None = None) -> RawTable:
         return table_from_metadata(chunks[OWN_CHUNK].decode("utf-8", errors="replace"), rows, READER, where)
     described = parse_lea(chunks.get(b"LEA ", b""))
     columns = [_column(i, row, described if len(described) == len(rows) else []) for i, row in enumerate(rows)]
-    notes = (f"{n_bytes - end} bytes after the audio are no WAV chunk and were left out",) if end < n_bytes else ()
+    notes = (f"{n_bytes - end} bytes after the audio are not a WAV chunk and were left out",) if end < n_bytes else ()
     return RawTable(tuple(columns), READER, sampling_rate_hz=float(rate_hz), warnings=notes)
 
 
