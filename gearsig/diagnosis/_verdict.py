@@ -127,7 +127,7 @@ def _problem_title(problem: ChannelProblem) -> str:
     """Return a problem as a title; for a line at an even multiple of the mains, with magnetism as another cause."""
     pull = magnetic_pull_near(problem.frequency_hz) if problem.kind == "hum" and problem.frequency_hz else None
     if pull is not None:
-        line = f"One line, {pull[1]:g} Hz, rules channel {problem.channel}"
+        line = f"One line, {pull[1]:g} Hz, dominates channel {problem.channel}"
         return f"{line}: the magnetic field of a motor or transformer, or mains hum."
     return problem.title
 
@@ -246,7 +246,7 @@ def _perhaps_the_shafts(hum: Finding, turns_hz: Sequence[tuple[str, float]]) -> 
         for multiple in (1, 2, 3, 4):
             if abs(multiple * turn_hz / line_hz - 1) < SAME_LINE:
                 of = f"{multiple} × {name or 'the shaft'}"
-                title = f"One line, {line_hz:.5g} Hz, rules channel {hum.where.channels[0]}: {of}, or mains hum."
+                title = f"One line, {line_hz:.5g} Hz, dominates channel {hum.where.channels[0]}: {of}, or mains hum."
                 return replace(hum, code=MAINS_OR_SHAFT, kind=Kind.NOTICE, title=title)
     return hum
 

@@ -1,7 +1,7 @@
-"""Recordings of many machines over time: a store of results, trends with limits and alarms, a watch on folders.
+"""Recordings of many machines over time: a store of results, trends with limits and alarms, watched folders.
 
-`open_fleet` opens or makes a store, a `Fleet` with `add`, `indicators`, `status`, `trend` and `export`. `fleet_changes`
-tells what is new since the last report, and `watch` takes new files as they appear.
+`open_fleet` opens or creates a store, a `Fleet` with `add`, `indicators`, `status`, `trend` and `export`.
+`fleet_changes` returns what is new since the last report, and `watch` adds new files as they appear.
 """
 
 from gearsig.fleet._add import FAILED, AddedRecording, AddResult, AnalysisOptions

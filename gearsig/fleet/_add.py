@@ -1,4 +1,4 @@
-"""Recordings into a store: what is new is analysed, what is done is passed over."""
+"""Add recordings to a store: new ones are analysed, known ones are skipped."""
 
 from __future__ import annotations
 
@@ -30,29 +30,29 @@ FAILED = "failed"
 """Outcome of a recording that could not be analysed."""
 
 UNTOLD = "cannot tell"
-"""Outcome of one that does not tell: it neither finds a fault nor clears one."""
+"""Outcome of an inconclusive recording: it neither finds a fault nor clears one."""
 
 
 @dataclass(frozen=True)
 class AnalysisOptions:
-    """What recordings are analysed with, besides what their files say.
+    """Options with which recordings are analysed, in addition to what their files state.
 
     Parameters
     ----------
     rig : Rig or None
-        Of all; None: the rig file of the same name beside each, if there is one.
+        For all recordings; None: the rig file of the same name beside each, if there is one.
     sampling_rate_hz : float or None
         For files that do not state it.
     speed : SpeedSource or None
-        Instead of what file and rig say.
+        Overrides what file and rig state.
     reference : Path or None
-        Recording of the machine when it was healthy.
+        Recording of the healthy machine.
     torque_nm : float or None
-        Instead of the rig's operating point.
+        Overrides the rig's operating point.
     memory_bytes : float
-        What the analysis of one recording may take; of a longer one, see `gearsig.diagnosis.analyze_file`.
+        Memory that the analysis of one recording may take; for longer ones, see `gearsig.diagnosis.analyze_file`.
     reference_rate_hz : float or None
-        Sampling rate of the reference, where it differs.
+        Sampling rate of the reference, if it differs.
     """
 
     rig: Rig | None = None
@@ -64,9 +64,9 @@ class AnalysisOptions:
     reference_rate_hz: float | None = None
 
     def analyze(self, path: Path, nominal_speed_rpm: float | None = None) -> Analysis | LongAnalysis:
-        """Analyse a recording, with the reference unless it is that itself; see `gearsig.diagnosis.analyze_file`.
+        """Analyse a recording, with the reference unless it is the reference; see `gearsig.diagnosis.analyze_file`.
 
-        A nominal speed, as a name states it, stands for the rig's nominal and constant speeds.
+        A nominal speed, e.g. from the file name, replaces the rig's nominal and constant speeds.
         """
         from gearsig.diagnosis import analyze_file, read_reference
 
@@ -87,7 +87,7 @@ class AnalysisOptions:
 
 @dataclass(frozen=True)
 class AddedRecording:
-    """What became of one recording.
+    """Outcome of one recording.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ class AddedRecording:
     outcome : str
         "fault", "suspicion", "cannot tell", "no fault", or "failed".
     verdict : str
-        In one sentence; of a failure the reason.
+        In one sentence; for a failure, the reason.
     """
 
     origin: Origin
@@ -110,16 +110,16 @@ class AddedRecording:
 
 @dataclass(frozen=True)
 class AddResult:
-    """What an addition did.
+    """Result of adding recordings.
 
     Parameters
     ----------
     added : tuple of AddedRecording
-        In the order of completion; failures among them.
+        In the order of completion, including failures.
     n_known : int
-        Recordings that the store held already.
+        Recordings that the store already held.
     n_elsewhere : int
-        Those that another process took meanwhile.
+        Recordings that another process is analysing.
     excluded : tuple of ExcludedFile
         Recordings that the pattern leaves out.
     """
@@ -137,7 +137,7 @@ class AddResult:
 
 @dataclass(frozen=True)
 class _AnalysisJob:
-    """One recording, and everything that a worker needs."""
+    """One recording with everything that a worker needs."""
 
     origin: Origin
     options: AnalysisOptions
@@ -163,7 +163,7 @@ def add_recordings(
     known = _stored_identities(store, recordings, __version__)
     missing = [origin for origin in recordings if _identity(origin, setups(origin)) not in known]
     elsewhere: list[Origin] = []
-    unseen: list[Origin] = []  # of known content under a new name or date of change
+    unseen: list[Origin] = []  # known content under a new name or modification time
     results: list[AddedRecording] = []
     workers = min(max(len(missing), 1), n_processors()) if n_processes is None else n_processes
     claims: dict[str, ExitStack] = {}
@@ -213,7 +213,7 @@ def add_recordings(
 
 
 def _merge_many(store: Store) -> None:
-    """Merge small files where there are many; no addition fails because the disk has no room for the merged ones."""
+    """Merge small files if there are many; an addition does not fail if the disk has no room for the merged ones."""
     if store.n_new() < COMPACT_FROM:
         return
     try:
@@ -223,11 +223,11 @@ def _merge_many(store: Store) -> None:
 
 
 COMPACT_FROM = 128
-"""Small files that are merged: to read them takes a tenth of a second."""
+"""Number of small files from which they are merged: reading them takes a tenth of a second."""
 
 
 def analyse_file(job: _AnalysisJob) -> tuple[Row, list[Row], Origin]:
-    """Analyse one recording; every error becomes a reason. The key is empty where nothing is to be kept."""
+    """Analyse one recording; every error becomes a reason. The key is empty if nothing is to be stored."""
     from gearsig.diagnosis import LongAnalysis
     from gearsig.recording import sha256_of
 
@@ -235,8 +235,8 @@ def analyse_file(job: _AnalysisJob) -> tuple[Row, list[Row], Origin]:
     try:
         result = job.options.analyze(path, _nominal_speed_rpm(job.origin, job.options))
         analysis = result.as_one() if isinstance(result, LongAnalysis) else result
-        if (analysis.recording.provenance.sha256 or sha256_of(path)) != job.sha256:  # of parts no hash is taken
-            return _row(job, outcome=FAILED, reason="it was written while it was read", key=""), [], job.origin
+        if (analysis.recording.provenance.sha256 or sha256_of(path)) != job.sha256:  # no hash is computed of parts
+            return _row(job, outcome=FAILED, reason="it was changed while it was read", key=""), [], job.origin
     except GearsigError as error:
         return _row(job, outcome=FAILED, reason=str(error)), [], job.origin
     except Exception as error:  # noqa: BLE001 - one broken file must not stop the rest; the reason is passed on
@@ -255,7 +255,7 @@ def _facts(analysis: Analysis, options: AnalysisOptions) -> Row:
 
     recording, rig, angle = analysis.recording, analysis.rig, analysis.shaft_angle
     top = analysis.top_claim
-    # Zones are limits of a trend: a machine that has always been in zone C has a baseline nevertheless.
+    # Zones are limits of a trend: a machine that has always been in zone C still has a baseline.
     outcome = outcome_of([f for f in analysis.findings if f.code != VIBRATION_ZONE])
     judged = rig is not None and any(f.code == VIBRATION_ZONE for f in analysis.findings)
     machine = rig.machine if rig is not None and judged else None
@@ -287,7 +287,7 @@ def _facts(analysis: Analysis, options: AnalysisOptions) -> Row:
 
 
 def _measured_load_nm(analysis: Analysis, stated: float | None) -> float | None:
-    """Return the mean of the first torque channel in N m, else what is stated."""
+    """Return the mean of the first torque channel in N m, or else the stated load."""
     factor = {"nm": 1.0, "n*m": 1.0, "n·m": 1.0, "n m": 1.0, "knm": 1e3}
     for channel in analysis.recording.channels:
         unit = channel.unit.strip().casefold()
@@ -301,7 +301,7 @@ def _indicators(analysis: Analysis) -> list[Row]:
 
     from gearsig.recording import names_without_number
 
-    # Series of the next record, whose channels bear its number, go on with these.
+    # The series continue in the next record, whose channel names contain its number.
     names = names_without_number(analysis.recording.channel_names)
     return [
         {
@@ -351,7 +351,7 @@ def _killed(job: _AnalysisJob) -> tuple[Row, list[Row], Origin]:
 
 
 def _stored_identities(store: Store, recordings: Sequence[Origin], version: str) -> set[tuple[Any, ...]]:
-    """Return the identities of files that the store holds results of, as far as size and time of change tell."""
+    """Return the identities of files whose results the store holds, judged by size and modification time."""
     names = {_printable(origin.path) for origin in recordings}
     sql = "SELECT source, n_bytes, mtime_ns, machine, point, date, setup FROM recordings WHERE version = ? " + (
         "AND source IN (SELECT unnest(?))" if len(names) < 100_000 else ""
@@ -366,10 +366,10 @@ def _identity(origin: Origin, setup: str) -> tuple[Any, ...]:
 
 
 def _of_content(store: Store, files: Mapping[Origin, str]) -> dict[Origin, tuple[str, ...]]:
-    """Return key, setup and version of the latest result of a file's content at its place.
+    """Return key, setup and version of the latest result of a file's content for the same machine, point and date.
 
-    Where there is none, the key alone of a result that a new one replaces: that of the same file at another place, or
-    its failure before it was copied completely.
+    If there is none, return only the key of a result that the new one replaces: that of the same file for another
+    machine, point or date, or its failure before it was copied completely.
     """
     sql = (
         "SELECT sha256, machine, point, date, source, key, setup, version, outcome FROM recordings "
@@ -392,17 +392,17 @@ def _of_content(store: Store, files: Mapping[Origin, str]) -> dict[Origin, tuple
 
 
 def _nominal_speed_rpm(origin: Origin, options: AnalysisOptions) -> float | None:
-    """Return the speed that the name states, where none was given."""
+    """Return the nominal speed of a recording in rpm, unless a speed was given."""
     return origin.speed_rpm if options.speed is None else None
 
 
 def _setups(options: AnalysisOptions) -> Callable[[Origin], str]:
-    """Return a function that hashes what decides a file's result besides its content."""
+    """Return a function that hashes everything but its content that determines a file's result."""
     from gearsig.recording import n_samples_of, sha256_of, without_condition
 
     reference = ""
     if options.reference is not None:
-        n_samples_of(options.reference)  # what can be none is refused here
+        n_samples_of(options.reference)  # a file that cannot be a reference is refused here
         file, run = without_condition(options.reference)
         reference = sha256_of(file) + ("" if run is None else f"#{run}")
     shared: list[object] = [reference, options.sampling_rate_hz, options.torque_nm, repr(options.speed)]
@@ -435,5 +435,5 @@ def _digest(parts: object) -> str:
 
 
 def _printable(path: Path) -> str:
-    """Return a path as UTF-8, which Parquet asks for; other bytes of a file's name are escaped."""
+    """Return a path as UTF-8, which Parquet requires; other bytes of a file name are escaped."""
     return str(path).encode("utf-8", "backslashreplace").decode("utf-8")

@@ -1,4 +1,4 @@
-"""Changes of a fleet since a date: new recordings, alarms raised and cleared, other diagnoses, new levels."""
+"""Changes of a fleet since a date: new recordings, alarms raised and cleared, changed diagnoses and levels."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ class AlarmChange:
     level : str
         "warning" or "alarm".
     raised, cleared : datetime
-        Dates of the recordings; `cleared` None where it stands.
+        Dates of the recordings; `cleared` is None while the alarm stands.
     value, expected, upper_limit, change : float
-        Of the last recording; the change in dB where `in_db`.
+        Of the last recording; the change is in dB if `in_db`.
     unit : str
     in_db : bool
     """
@@ -62,19 +62,19 @@ class FleetChanges:
     Parameters
     ----------
     since : datetime or None
-        In UTC, when results came into the store; None: since ever.
+        In UTC, by when results were added to the store; None: since the beginning.
     n_new, n_failed : int
-        Recordings that came in since, and those among them without a result.
+        Recordings added since, and how many of them have no result.
     failures : tuple of (str, str)
-        File and reason of the last hundred of them.
+        File and reason of the last hundred without a result.
     raised, cleared : tuple of AlarmChange
-        Alarms, the highest first.
+        Alarms, the most severe first.
     diagnoses : tuple of DiagnosisChange
         The worst first.
     shifted : DataFrame
-        Series without an alarm that have changed their level: as `Fleet.series`.
+        Series without an alarm whose level has changed; rows as in `Fleet.series`.
     status : DataFrame
-        As `Fleet.status`.
+        See `Fleet.status`.
     """
 
     since: datetime | None
@@ -89,7 +89,7 @@ class FleetChanges:
 
 
 def fleet_changes(fleet: Fleet, since: datetime | None = None) -> FleetChanges:
-    """Return what changed since a date (UTC), by when results came into the store; None: since ever."""
+    """Return what changed since a date (UTC), by when results were added; None: since the beginning."""
     moment = since or datetime(1900, 1, 1)  # noqa: DTZ001 - the store's times are UTC without a zone
     status = fleet.status()
     series = fleet.series()
@@ -108,7 +108,7 @@ def fleet_changes(fleet: Fleet, since: datetime | None = None) -> FleetChanges:
 
 
 def last_report(fleet: Fleet) -> datetime | None:
-    """Return when the last report of a fleet was made (UTC), None if none was."""
+    """Return when the last report of a fleet was made (UTC); None if there was none."""
     try:
         return datetime.fromisoformat(json.loads((fleet.folder / LAST_REPORT).read_text(encoding="utf-8"))["until"])
     except (OSError, ValueError, KeyError, TypeError):
@@ -116,7 +116,7 @@ def last_report(fleet: Fleet) -> datetime | None:
 
 
 def mark_reported(fleet: Fleet, until: datetime | None = None) -> None:
-    """Note that everything up to now has been reported."""
+    """Record that everything up to `until` (UTC; None: now) has been reported."""
     now = until or datetime.now(UTC).replace(tzinfo=None)
     text = json.dumps({"until": now.isoformat()}) + "\n"
     write_whole(fleet.folder / LAST_REPORT, lambda file: file.write(text.encode()))
@@ -134,7 +134,7 @@ def _sorted(changes: list[AlarmChange]) -> tuple[AlarmChange, ...]:
 
 
 def level_counts(status: DataFrame) -> dict[str, str]:
-    """Say how many measuring points stand at each level that any stands at: a table of `Fleet.status`.
+    """Return the number of measuring points at each level that occurs in a table of `Fleet.status`, as text.
 
     Examples
     --------
@@ -153,12 +153,12 @@ def counts_text(status: DataFrame) -> str:
 
 
 def series_level(row: Mapping[Any, Any]) -> str:
-    """Return the level of a row of `Fleet.series` by name, "unknown" where there are no limits to judge it by."""
+    """Return the name of the level of a row of `Fleet.series`; "unknown" if there are no limits."""
     return level_name(int(row["level"]), str(row["basis"]))
 
 
 def trends_text(row: Mapping[Any, Any]) -> str:
-    """Say what the trends of a measuring point show: a row of `Fleet.status`."""
+    """Return a summary of a measuring point's trends, from a row of `Fleet.status`."""
     from pandas import isna
 
     counts = [
@@ -176,7 +176,7 @@ def trends_text(row: Mapping[Any, Any]) -> str:
 
 
 def change_text(change: float, *, in_db: bool) -> str:
-    """Write how far a value is from the expected one; empty where nothing is expected."""
+    """Return the deviation of a value from the expected one as text; empty without an expected value."""
     if change != change:  # noqa: PLR0124 - nan: there is no baseline
         return ""
     return f"{signed(change)} dB" if in_db else f"{'+' if change > 0 else ''}{readable(change, 3)}"

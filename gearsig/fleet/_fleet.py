@@ -68,12 +68,12 @@ _STATE = {
 _TYPED = ", ".join(f"{name}::{kind} AS {name}" for name, kind in _STATE.items())
 """Columns of a series' state: see `state_rows`."""
 LATEST = f"(outcome <> '{UNTOLD}', date)"
-"""What the recording is largest in that a diagnosis is of: the last that tells, else the last."""
+"""Order whose maximum is the recording that gives the diagnosis: the last conclusive one, else the last."""
 
 
 @dataclass(frozen=True)
 class DiagnosisChange:
-    """A measuring point whose last recording that tells is diagnosed otherwise than the last one before."""
+    """A measuring point whose last conclusive recording has another diagnosis than the one before."""
 
     machine: str
     point: str
@@ -99,7 +99,7 @@ class Fleet:
 
     @property
     def folder(self) -> Path:
-        """Where it is kept."""
+        """Folder of the store."""
         return self._store.folder
 
     # ---------------- adding
@@ -123,30 +123,30 @@ class Fleet:
         executor: Executor | None = None,
         on_progress: Progress | None = None,
     ) -> AddResult:
-        """Analyse recordings that are new, and keep their results.
+        """Analyse new recordings and store their results.
 
-        What the store holds already, by content, rig and version of gearsig, is passed over. Any number of processes
-        may add to one store at once; one that is killed loses nothing but what it was analysing.
+        Recordings that the store already holds, by content, rig and version of gearsig, are skipped. Any number of
+        processes may add to one store at the same time; one that is killed loses only what it was analysing.
 
         Parameters
         ----------
         recordings : str, Path, or iterable of these or of Origin
-            Files, folders with sub-folders, "folder/*.csv"; or what `gearsig.fleet.origins` found, for a look first.
+            Files, folders with sub-folders, "folder/*.csv"; or the result of `gearsig.fleet.origins`, checked first.
         pattern, machine, point, date
             See `gearsig.fleet.origins`.
         rig, sampling_rate_hz, speed, reference, torque_nm, reference_rate_hz, memory_bytes
-            As for `gearsig.batch.report_many`; None: what files and rig files say.
+            See `gearsig.batch.report_many`; None: as files and rig files state.
         n_processes : int or None
             Local processes; None: one per processor.
         executor : concurrent.futures.Executor or None
-            Runs the analyses instead, e.g. that of `gearsig.processes.cluster`.
+            Runs the analyses instead, e.g. the executor of `gearsig.processes.cluster`.
         on_progress : callable or None
             Called as ``on_progress(n_done, n_total, added)``.
 
         Raises
         ------
         InputError
-            If nothing is found, the pattern is no pattern, or the store cannot be written.
+            If nothing is found, the pattern is invalid, or the store cannot be written.
         """
         if n_processes is not None:
             count(n_processes, "n_processes")
@@ -173,11 +173,11 @@ class Fleet:
         return read_settings(self.folder)
 
     def set(self, settings: TrendSettings) -> None:
-        """Judge trends by other settings from now on."""
+        """Change the settings by which trends are judged."""
         write_settings(self.folder, settings)
 
     def set_baseline(self, machine: str, start: datetime, end: datetime, *, point: str = "") -> None:
-        """State a period in which a machine was healthy, e.g. after an overhaul; it replaces an earlier one."""
+        """State a period in which a machine was healthy, e.g. after an overhaul; it replaces an earlier statement."""
         self._check_place(machine, point)
         settings = self.settings
         unchanged = tuple(b for b in settings.baselines if (b.machine, b.point) != (machine, point))
@@ -188,7 +188,7 @@ class Fleet:
     def recordings(
         self, machine: str = "", point: str = "", *, start: datetime | None = None, end: datetime | None = None
     ) -> DataFrame:
-        """Return a row per recording, by machine, point and date; failures have the outcome "failed" and a reason.
+        """Return a row per recording, sorted by machine, point and date; failures have outcome "failed" and a reason.
 
         Parameters
         ----------
@@ -225,7 +225,7 @@ class Fleet:
         return self._table("indicators", machine, point, only, start, end, "machine, point, date")
 
     def series(self, machine: str = "", point: str = "") -> DataFrame:
-        """Return a row per indicator of a measuring point: its last value against its limits, the worst first."""
+        """Return a row per indicator and measuring point: last value, limits and alarms, the worst first."""
         self._refreshed()
         where, values = _where(machine, point, {})
         sql = (
@@ -237,11 +237,11 @@ class Fleet:
     def status(self) -> DataFrame:
         """Return a row per measuring point, the worst first.
 
-        Columns: machine, point, n_recordings, n_failed, first, last, outcome and verdict of the last recording that
-        tells – a fault is there until a recording shows that it is not, and "cannot tell" does not –, level
-        (of `STATUS_LEVELS`: the worse of diagnosis and trends, "unknown" where neither says anything), n_alarms,
-        n_warnings, since, worst (indicator), worst_place (its gear, bearing or shaft), change (of that one against what
-        is expected, in dB where change_in_db), changed (since when the level of some indicator is another one).
+        Columns: machine, point, n_recordings, n_failed, first, last, outcome and verdict of the last conclusive
+        recording (a fault remains until a recording shows that it is gone, which "cannot tell" does not), level (of
+        `STATUS_LEVELS`: the worse of diagnosis and trends, "unknown" without either), n_alarms, n_warnings, since,
+        worst (indicator), worst_place (its gear, bearing or shaft), change (its deviation from the expected value, in
+        dB if change_in_db), changed (since when the level of some indicator has changed).
         """
         self._refreshed()
         sql = f"""
@@ -276,7 +276,7 @@ class Fleet:
         return self._frame(sql, [])
 
     def point_trends(self, machine: str, point: str = "") -> PointTrends:
-        """Return all series of a measuring point with their limits, judged anew."""
+        """Return all series of a measuring point with their limits, judged again."""
         self._check_place(machine, point, exactly=True)
         return self._store.read(lambda connection: _judged(connection, machine, point, self.settings))
 
@@ -310,7 +310,7 @@ class Fleet:
         place: str = "",
         computed_on: str = "",
     ) -> tuple[OperatingTrend, ...]:
-        """Return an indicator of a machine over load or speed, for each channel and place that has it, as `trend` does.
+        """Return an indicator of a machine over load or speed, for each channel and place that has it; see `trend`.
 
         Parameters
         ----------
@@ -340,7 +340,7 @@ class Fleet:
         return tuple(result)
 
     def _chosen(self, machine: str, name: str, point: str, only: dict[str, str]) -> list[tuple[str, PointTrends, int]]:
-        """Return measuring point, its trends and the column of each series that is asked for, the worst first."""
+        """Return measuring point, its trends and column for each requested series, the worst first."""
         self._check_place(machine, point)
         points = [point] if point else [p for (p,) in self._rows(_POINTS, [machine])]
         of_points = {chosen: self.point_trends(machine, chosen) for chosen in points}
@@ -371,9 +371,9 @@ class Fleet:
         start: datetime | None = None,
         end: datetime | None = None,
     ) -> int:
-        """Write a table as CSV, Parquet or JSON lines, by the file's ending; return how many rows it has.
+        """Write a table as CSV, Parquet or JSON lines, by the file's ending; return the number of rows.
 
-        The rows of the measurements' tables come in no particular order.
+        The rows of "indicators" and "recordings" are in no particular order.
 
         Parameters
         ----------
@@ -386,8 +386,8 @@ class Fleet:
         """
         one_of(table, "table", TABLES)
         target = Path(path)
-        # Dictionaries of texts that hardly repeat, and filters over them, cost time and save no room: beyond 16
-        # different texts in a group of rows none is begun. Small groups stay in the processor's cache.
+        # Dictionaries of texts that hardly repeat, and filters over them, cost time and save no space: none is used
+        # for more than 16 different texts in a row group. Small groups stay in the processor's cache.
         parquet = "parquet, COMPRESSION snappy, DICTIONARY_SIZE_LIMIT 16, WRITE_BLOOM_FILTER false, "
         forms = {".csv": "csv, HEADER", ".parquet": f"{parquet} ROW_GROUP_SIZE 20480", ".jsonl": "json"}
         form = forms[one_of(target.suffix.lower(), f"ending of {target.name}", forms)]
@@ -405,7 +405,7 @@ class Fleet:
         where, values = _where(machine, point, {"name": name if table == "indicators" else ""}, start, end)
 
         def write(connection: DuckDBPyConnection) -> int:
-            connection.execute("SET preserve_insertion_order = false")  # rows know their date; in half the time
+            connection.execute("SET preserve_insertion_order = false")  # rows have their date; takes half the time
             if dated:
                 return write_query(connection, f"SELECT * FROM {table} {where}", target, form, values)
             connection.register("chosen", frame)
@@ -414,7 +414,7 @@ class Fleet:
         return self._store.read(write)
 
     def news(self, since: datetime) -> tuple[int, int, tuple[tuple[str, str], ...], tuple[DiagnosisChange, ...]]:
-        """Return what came into the store since: how many results, failures, the last of these, other diagnoses."""
+        """Return what was added since a date (UTC): numbers of recordings and failures, failures, diagnoses."""
         n_new, n_failed = self._rows(
             f"SELECT count(*), count(*) FILTER (outcome = '{FAILED}') FROM recordings WHERE added > ?", [since]
         )[0]
@@ -441,13 +441,13 @@ class Fleet:
         return n_new, n_failed, tuple(failures), tuple(DiagnosisChange(*row) for row in rows)
 
     def compact(self) -> None:
-        """Merge all small files; an addition does it by itself when there are many."""
+        """Merge all small files; `add` does so by itself when there are many."""
         self._store.compact(everything=True)
 
     # ---------------- the rest
 
     def _refreshed(self) -> None:
-        """Judge anew the measuring points that have other results, or were judged by other settings, than before."""
+        """Judge measuring points again whose results, settings or version of gearsig have changed."""
         settings = self.settings
         self._store.read(lambda connection: self._refresh(connection, settings))
 
@@ -492,11 +492,11 @@ class Fleet:
         try:
             write_query(connection, query, self.folder / TRENDS, "parquet, COMPRESSION zstd")
             self._trends = None
-        except InputError:  # others' stores may be read only, and disks full
+        except InputError:  # the store may be read-only, or the disk full
             self._trends = connection.execute(query).df()
 
     def _view_of_trends(self, connection: DuckDBPyConnection) -> None:
-        """Make the view `trends`, of the file or of what could not be written; a damaged file is as none."""
+        """Create the view `trends` of the file, or of what could not be written; a damaged file counts as missing."""
         import pyarrow.parquet as pq
 
         if self._trends is not None:
@@ -544,7 +544,7 @@ class Fleet:
         if not machine and not point and not exactly:
             return
         where, values = _where(machine, point, {})
-        if exactly:  # also the point without a name
+        if exactly:  # including the point without a name
             where, values = "WHERE machine = ? AND point = ?", [machine, point]
         if self._rows(f"SELECT 1 FROM recordings {where} LIMIT 1", values):
             return
@@ -569,20 +569,20 @@ _POINTS = "SELECT DISTINCT point FROM recordings WHERE machine = ? ORDER BY poin
 
 
 def open_fleet(folder: str | Path, *, create: bool = False, on_message: Callable[[str], object] | None = None) -> Fleet:
-    """Open the results of many recordings, kept in a folder.
+    """Open a store of results of many recordings, kept in a folder.
 
     Parameters
     ----------
     folder : str or Path
     create : bool
-        Whether to make it where there is none.
+        Whether to create the store if there is none.
     on_message : callable or None
-        Told in one sentence what was noticed, e.g. that a damaged file was set aside; None: a warning of Python.
+        Called with one sentence, e.g. that a damaged file was set aside; None: issue a Python warning.
 
     Raises
     ------
     InputError
-        If there is no fleet, or the packages that it needs are not installed.
+        If there is no fleet, or the packages it needs are not installed.
 
     Examples
     --------

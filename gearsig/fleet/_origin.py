@@ -1,4 +1,4 @@
-"""Which recordings there are, and of which machine, measuring point and date each is."""
+"""Find recordings and the machine, measuring point and date of each."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from gearsig.formatting import counted, file_label
 from gearsig.rig import Rig, read_rig, rig_file_beside
 
 FIELDS = ("machine", "point", "date", "number", "speed")
-"""What a pattern may name, besides `{}` for what does not matter."""
+"""Fields that a pattern may name, besides `{}` for parts to be ignored."""
 
 NUMBERS_BEGIN = datetime(2000, 1, 1)  # noqa: DTZ001 - as all dates here
-"""Where no date is stated, running numbers count from here."""
+"""Date from which running numbers count if none is stated."""
 
 LONGEST_NAME = 200
 
@@ -47,24 +47,24 @@ _DATE_IN_NAME = re.compile(
 
 @dataclass(frozen=True)
 class Origin:
-    """A recording's file, and where it belongs.
+    """File of a recording, and the machine, point and date it belongs to.
 
     Parameters
     ----------
     path : Path
         Absolute.
     machine, point : str
-        The point is empty where nothing names one; the channels then tell the places apart.
+        The point is empty if nothing names one; the channels then distinguish the places.
     date : datetime
-        Without time zone, as a name or a folder states it; of files' times in UTC.
+        Without time zone, as stated by a name or folder; file times are in UTC.
     machine_from, point_from, date_from : str
-        What each rests on: "pattern", "folder", "rig file", "file name", "time of the file", "stated", "none".
+        Source of each: "pattern", "folder", "rig file", "file name", "time of the file", "stated", "none".
     n_bytes, mtime_ns : int
-        Of the file, when it was looked at.
+        Of the file, when it was found.
     speed_rpm : float or None
-        That the name or an argument states: nominal, as in a rig file's operating point.
+        Stated by the name or an argument: nominal, as in a rig file's operating point.
     speed_from : str
-        What it rests on.
+        Source of the speed.
     """
 
     path: Path
@@ -82,14 +82,14 @@ class Origin:
 
 @dataclass(frozen=True)
 class ExcludedFile:
-    """A recording's file that a pattern leaves out.
+    """File of a recording that a pattern leaves out.
 
     Parameters
     ----------
     path : Path
         Absolute.
     reason : str
-        "does not match the pattern", or which part of its name is no date.
+        "does not match the pattern", or which part of its name is not a date.
     """
 
     path: Path
@@ -100,9 +100,9 @@ class ExcludedFile:
 class FilePattern:
     """A pattern of paths such as "{machine}/{point}_{date:%Y%m%d}.csv", matched from a path's end.
 
-    `{machine}` and `{point}` are letters without "/", `{date:…}` has the fields of `strptime`, `{number:10min}` is a
-    running number of recordings that are so far apart, `{speed}` a number of rpm, `{}` is anything but "/", `*`
-    likewise, and `**` also "/".
+    `{machine}` and `{point}` are text without "/", `{date:…}` has the fields of `strptime`, `{number:10min}` is a
+    running number of recordings at this interval, `{speed}` is a speed in rpm, `{}` and `*` match anything but "/",
+    and `**` also matches "/".
     """
 
     text: str
@@ -113,9 +113,9 @@ class FilePattern:
     def match(
         self, path: Path, root: Path | None = None
     ) -> dict[str, str | float | datetime | timedelta] | ExcludedFile:
-        """Return what the pattern names in a path; for a path of another kind what speaks against it.
+        """Return the values of the pattern's fields in a path, or why the path does not match.
 
-        Below `root` it is tried on the whole of the path first.
+        The pattern is tried first on the whole path below `root`.
 
         Examples
         --------
@@ -167,7 +167,7 @@ def _compile(text: str) -> tuple[re.Pattern[str], str | timedelta]:
             raise InputError(f"{field[0]} is not understood", where=where, remedy=remedy)
         names.add(name)
         if {"date", "number"} <= names:
-            raise InputError("date and number occur both", where=where, remedy="keep the date")
+            raise InputError("date and number both occur", where=where, remedy="keep the date")
         if name == "date":
             form = field["form"]
             parts.append(f"(?P<date>{_of_form(form)})")
@@ -180,7 +180,7 @@ def _compile(text: str) -> tuple[re.Pattern[str], str | timedelta]:
             parts.append(f"(?P<{name}>[^/]+?)" if name else "[^/]*?")
     parts.append(_literal(text[end:]))
     if "{" in text[end:] or "}" in text[end:]:
-        raise InputError(f"{text!r} has a bracket that is not closed", where=where)
+        raise InputError(f"{text!r} has an unmatched bracket", where=where)
     return re.compile("".join(parts) + "$"), form
 
 
@@ -198,7 +198,7 @@ def _of_form(form: str) -> str:
 
 
 def _interval(text: str) -> timedelta:
-    """Return the time that "10min" states."""
+    """Return the time that a text such as "10min" states."""
     match = re.fullmatch(r"(\d{1,6}(?:\.\d{1,3})?)\s?(s|min|h|d)", text)
     if match is None or not float(match[1]):
         allowed = "seconds, minutes, hours or days above 0: 10s, 1min, 2h, 1d"
@@ -207,7 +207,7 @@ def _interval(text: str) -> timedelta:
 
 
 def date_in_name(name: str) -> datetime | None:
-    """Return the date, with its time if there is one, that a name states, year first.
+    """Return the date that a name states, year first, with its time if there is one; None without a date.
 
     Examples
     --------
@@ -231,10 +231,10 @@ def date_in_name(name: str) -> datetime | None:
 
 
 def find_recordings(places: Iterable[str | Path]) -> list[tuple[Path, Path]]:
-    """Return the recordings that files, folders and their sub-folders hold, each with the folder it was found from.
+    """Return the recordings in files, folders and their sub-folders, each with the folder where the search began.
 
-    A folder gives what has the ending of a format, hidden files and links out of it left out. A file that is named
-    stands as it is.
+    In a folder, files with the ending of a format count; hidden files and links to folders are left out. A file that
+    is named is always included.
 
     Raises
     ------
@@ -260,20 +260,20 @@ def find_recordings(places: Iterable[str | Path]) -> list[tuple[Path, Path]]:
 
 
 def _check_is_there(path: Path) -> None:
-    """Raise unless a named file is there; "runs.mat#2" names a run in a file."""
+    """Raise unless a named file exists; "runs.mat#2" names a run in a file."""
     from gearsig.recording import without_condition
 
     try:
         without_condition(path)[0].stat()
     except (OSError, ValueError) as error:
-        problem = getattr(error, "strerror", None) or "no such name is possible"
+        problem = getattr(error, "strerror", None) or "the name is not possible"
         names = [sibling.name for sibling in path.parent.iterdir()] if path.parent.is_dir() else []
         remedy = closest_match_hint(path.name, names) or "check the name"
         raise InputError(f"cannot be read ({problem})", where=file_label(path, whole=True), remedy=remedy) from None
 
 
 def no_recordings(places: Iterable[str | Path], *, complaint: str = "") -> InputError:
-    """Return the error that places hold no recordings; the complaint says what else is to be known of them."""
+    """Return the error that places hold no recordings; the complaint is added to its text."""
     from gearsig.recording import FORMAT_OF_EXTENSION
 
     return InputError(
@@ -288,7 +288,7 @@ def _walk(root: Path) -> Iterable[Path]:
     import os
 
     for folder, subfolders, names in os.walk(root):  # links to folders are not followed
-        # Tables of a report and of a sweep, which stand beside pages and recordings.
+        # Tables of a report and of a sweep, which are beside pages and recordings.
         tables = {"batch.csv"} if ".results" in subfolders else {"index.csv"} if "sweep.json" in names else set()
         subfolders[:] = sorted(name for name in subfolders if not name.startswith("."))
         if "store.json" in names and "new" in subfolders:  # a fleet's own store
@@ -300,7 +300,7 @@ def _walk(root: Path) -> Iterable[Path]:
 
 
 def _is_recording(path: Path) -> bool:
-    """Whether a file in a folder has the ending of a format, or none and a name that is a date."""
+    """Whether a file in a folder has the ending of a format, or none and a date in its name."""
     from gearsig.recording import FORMAT_OF_EXTENSION, is_ending
 
     name = path.name.lower()
@@ -321,34 +321,34 @@ def origins(
     on_excluded: Callable[[ExcludedFile], object] | None = None,
     may_be_none: bool = False,
 ) -> list[Origin]:
-    """Find recordings and say of which machine, point and date each is.
+    """Find recordings and the machine, point, date and speed of each.
 
-    The machine is what is stated, else what the pattern names, else the first sub-folder below the place searched,
-    else the name in the rig file, else the folder. The point is stated, in the pattern, or the second sub-folder. The
-    date is stated, in the pattern, in the file's name, or when the file was written; running numbers count from what is
-    stated. The speed is stated, in the pattern, or in the file's name ("1000rpm"), or unknown.
+    The machine is the one stated, or else from the pattern, the first sub-folder below the place searched, the name in
+    the rig file, or the folder. The point is the one stated, or else from the pattern or the second sub-folder. The
+    date is the one stated, or else from the pattern, the file name, or when the file was written; running numbers count
+    from the stated date. The speed is the one stated, or else from the pattern or the file name ("1000rpm").
 
     Parameters
     ----------
     places : iterable of str or Path
         Files, folders with their sub-folders, "folder/*.csv".
     pattern : str
-        See `FilePattern`; files that do not match are passed over.
+        See `FilePattern`; files that do not match are skipped.
     machine, point : str
     date : datetime or None
     rig : Rig or None
-        Of all; None: the rig file of the same name beside each.
+        For all recordings; None: the rig file of the same name beside each.
     speed_rpm : float or None
-        Stated of all.
+        For all recordings.
     on_excluded : callable or None
-        Called with a `ExcludedFile` for each recording that does not match the pattern.
+        Called with an `ExcludedFile` for each recording that does not match the pattern.
     may_be_none : bool
-        Whether nothing may be found, as in a folder that is watched.
+        Whether finding nothing is allowed, as in a watched folder.
 
     Raises
     ------
     InputError
-        If a file is missing, the pattern is no pattern, or nothing is found.
+        If a file is missing, the pattern is invalid, or nothing is found.
     """
     from gearsig.recording import speed_in_name
 
@@ -422,7 +422,7 @@ N_NAMED = 3
 
 
 def excluded_text(files: Sequence[ExcludedFile]) -> str:
-    """Say how many recordings a pattern leaves out, and of the first ones which and why.
+    """Return how many recordings a pattern leaves out, with names and reasons of the first ones, as text.
 
     Examples
     --------
@@ -458,13 +458,13 @@ def _first(*choices: tuple[str, object]) -> tuple[str, object]:
 
 
 def _printable_name(text: object) -> str:
-    """Return a name of one printable line, as tables and files show it."""
+    """Return a name as one printable line, at most `LONGEST_NAME` characters."""
     line = "".join(c if c.isprintable() else " " for c in str(text).encode("utf-8", "replace").decode("utf-8"))
     return " ".join(line.split())[:LONGEST_NAME]
 
 
 def origin_rows(recordings: Sequence[Origin]) -> list[tuple[str, str, str, str, str]]:
-    """Return file, machine, point, date and speed of each, with what it rests on, as a person checks them."""
+    """Return file, machine, point, date and speed of each recording with their sources, as texts to be checked."""
     return [
         (
             o.path.name,

@@ -1,20 +1,20 @@
-r"""Limits, change points and alarms of series of indicators, by closed forms whose false-alarm rates are known.
+r"""Limits, change points and alarms of series of indicators, by closed forms with known false-alarm rates.
 
-All series of a measuring point are taken together: an array of values (recordings × series) with what the machine did
-at each recording. Levels are taken in dB, so that scatter is a ratio.
+All series of a measuring point are processed together: an array of values (recordings × series) with the operating
+conditions of each recording. Levels are in dB, so that scatter is a ratio.
 
-Model of a machine that does not change: :math:`y_i = x_i^T \beta + \sigma \epsilon_i` with independent normal
-:math:`\epsilon_i`; :math:`x_i` holds 1 and, where they vary over the baseline, the logarithms of speed and load. From
-then on everything is exact for any number of baseline recordings, because the parameters are not taken as known:
+Model of an unchanged machine: :math:`y_i = x_i^T \beta + \sigma \epsilon_i` with independent normal
+:math:`\epsilon_i`; :math:`x_i` holds 1 and, if they vary over the baseline, the logarithms of speed and load. What
+follows is exact for any number of baseline recordings, because the parameters are not assumed to be known:
 
 * A new value lies above :math:`x^T b + t_{1-\alpha,\,n-p}\, s \sqrt{1 + x^T (X^T X)^{-1} x}` with probability
   :math:`\alpha` (prediction limit of a linear regression).
 * The studentised recursive residuals of the whole series (R. L. Brown, J. Durbin, J. M. Evans, "Techniques for testing
-  the constancy of regression relationships over time", 1975) are independent; through their t distribution they become
-  standard normal, and a cumulative sum of them has the run length of one with known parameters (self-starting CUSUM:
+  the constancy of regression relationships over time", 1975) are independent; transformed by their t distribution they
+  are standard normal, so their cumulative sum has the run length of one with known parameters (self-starting CUSUM:
   D. M. Hawkins, "Self-starting cusum charts for location and scale", 1987).
 
-Recordings that depend on each other (minutes apart), or scatter with long tails, raise false alarms more often.
+False alarms are more frequent if recordings depend on each other (minutes apart) or their scatter has long tails.
 """
 
 from __future__ import annotations
@@ -31,38 +31,38 @@ BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.integer[Any]]
 
 MIN_FREEDOM = 5
-"""Degrees of freedom that a limit needs: with fewer, t lies so far out that no fault would be seen."""
+"""Degrees of freedom that a limit needs: with fewer, t is so large that no fault would be detected."""
 
 MIN_SPAN = 1.05
-"""Largest over smallest speed or load of a baseline from which a level's dependence on it is fitted."""
+"""Minimum ratio of largest to smallest speed or load in a baseline for a level's dependence on it to be fitted."""
 
 MIN_SCATTER = 0.1
-"""dB; scatter below it is not believed: an accelerometer alone moves by 1 % with temperature."""
+"""Minimum scatter in dB; less is not plausible: an accelerometer alone drifts by 1 % with temperature."""
 
 OUTSIDE = 1.25
-"""A speed or load that lies so far beyond the baseline's range, as a ratio, is not judged by it."""
+"""Ratio beyond the baseline's range of speed or load from which a recording is not judged by the baseline."""
 
 CUSUM_K = 0.5
-"""Allowance of the CUSUM in standard deviations: it is quickest for a shift of one."""
+"""Allowance of the CUSUM in standard deviations: quickest for a shift of one."""
 
 
 def regressors(
     speed_rpm: FloatArray, load_nm: FloatArray, baseline: BoolArray
 ) -> tuple[FloatArray, BoolArray, tuple[str, ...]]:
-    """Return what levels are regressed on, which recordings it reaches, and the names of what varies.
+    """Return the regressors of levels, which recordings they cover, and the names of the quantities that vary.
 
     Parameters
     ----------
     speed_rpm, load_nm : array, (n,)
-        nan where they are not known.
+        nan where unknown.
     baseline : bool array, (n,)
 
     Returns
     -------
     array, (n, p)
-        1, and decades of speed and load about their means over the baseline.
+        1, and log10 of speed and load relative to their means over the baseline.
     bool array, (n,)
-        Whether the recording's speed and load lie within the baseline's range, a quarter more on either side.
+        Whether the recording's speed and load lie within the baseline's range, widened by `OUTSIDE` on either side.
     tuple of str
         "speed", "load".
     """
@@ -92,26 +92,26 @@ def regressors(
 def prediction_limits(
     y: FloatArray, x: FloatArray, baseline: BoolArray, false_alarm_rate: float, *, min_scatter: FloatArray | float = 0.0
 ) -> tuple[FloatArray, FloatArray]:
-    """Return what is expected, and the distance beyond which an unchanged machine lies with the stated probability.
+    """Return the expected values, and the deviation that an unchanged machine exceeds with the stated probability.
 
     Parameters
     ----------
     y : array, (n_recordings, n_series)
-        Values, normally distributed about the regression; nan where a recording has none.
+        Values, normally distributed about the regression; nan if a recording has none.
     x : array, (n_recordings, p)
         See `regressors`.
     baseline : bool array, (n_recordings,)
     false_alarm_rate : float
-        Of one value of one series, half on each side.
+        For one value of one series, half on each side.
     min_scatter : float or array, (n_series,)
-        Less is not believed.
+        Lower bound of the standard deviation.
 
     Returns
     -------
     array, (n_recordings, n_series)
-        Of the baseline's regression at each recording's speed and load; nan where there is none.
+        From the baseline's regression at each recording's speed and load; nan if there is none.
     array, (n_recordings, n_series)
-        Half the width of the interval about it.
+        Half the width of the interval about the expected value.
     """
     from scipy.special import stdtrit
 
@@ -135,7 +135,7 @@ def prediction_limits(
 
 
 def _patterns(known: BoolArray) -> list[tuple[BoolArray, IntArray]]:
-    """Group columns that are known at the same rows."""
+    """Group columns that are known in the same rows."""
     if known.shape[1] == 0:
         return []
     packed = np.packbits(known, axis=0)
@@ -144,9 +144,10 @@ def _patterns(known: BoolArray) -> list[tuple[BoolArray, IntArray]]:
 
 
 def standardised_innovations(y: FloatArray, x: FloatArray) -> FloatArray:
-    """Return what is new in each value as a standard normal number; independent, if the machine does not change.
+    """Return the innovation of each value, standard normal and independent if the machine does not change.
 
-    The studentised recursive residual of value i, from the regression over those before it, through the t distribution.
+    This is the studentised recursive residual of value i, from the regression over the values before it, transformed by
+    the t distribution.
 
     Parameters
     ----------
@@ -156,7 +157,7 @@ def standardised_innovations(y: FloatArray, x: FloatArray) -> FloatArray:
     Returns
     -------
     array, (n_recordings, n_series)
-        nan for the first p + 2 values of a series, and where there is none.
+        nan for at least the first p + 1 values of a series, and where there is no value.
     """
     result = np.full(y.shape, np.nan)
     p = x.shape[1]
@@ -173,7 +174,7 @@ def standardised_innovations(y: FloatArray, x: FloatArray) -> FloatArray:
 
 
 def _recursive(values: FloatArray, facts: FloatArray, start: int) -> FloatArray:
-    """Recursive least squares over complete rows."""
+    """Return standardised innovations by recursive least squares over complete rows."""
     from scipy.special import ndtri, stdtr
 
     p = facts.shape[1]
@@ -194,16 +195,16 @@ def _recursive(values: FloatArray, facts: FloatArray, start: int) -> FloatArray:
         squares += np.square(w[i - start])
     freedom = np.arange(start, len(values))[:, None] - p
     t = w / np.maximum(s, 1e-300)
-    tail = stdtr(freedom, -np.abs(t))  # the small side keeps its digits
+    tail = stdtr(freedom, -np.abs(t))  # the smaller tail keeps its digits
     q: FloatArray = -np.sign(t) * ndtri(np.maximum(tail, 1e-300))
     return q
 
 
 def cusum_threshold(run_length: float) -> float:
-    """Return the threshold at which a two-sided CUSUM raises a false alarm once in so many values on average.
+    """Return the threshold at which a two-sided CUSUM raises one false alarm in `run_length` values on average.
 
-    D. Siegmund's approximation, *Sequential Analysis*, 1985, of one side: (exp(2kb) - 2kb - 1)/(2k²) with
-    b = h + 1.166; the two sides together have half of that.
+    D. Siegmund's approximation, *Sequential Analysis*, 1985, for one side: (exp(2kb) - 2kb - 1)/(2k²) with
+    b = h + 1.166; the two sides together have half that run length.
 
     Examples
     --------
@@ -219,15 +220,15 @@ def cusum_threshold(run_length: float) -> float:
 
 
 def change_points(q: FloatArray, run_length: float) -> tuple[IntArray, IntArray]:
-    """Return where each series first changed, and where that was noticed; -1 where it has not.
+    """Return where each series first changed, and where the change was detected; -1 if it has not changed.
 
-    Two-sided CUSUM S = max(0, S + q - k), and likewise downwards; the change began, since S last left zero, where a
-    step of the mean is likeliest.
+    Two-sided CUSUM S = max(0, S + q - k), and likewise downwards; the estimated start of the change is the most likely
+    step of the mean since S last left zero.
 
     Parameters
     ----------
     q : array, (n_recordings, n_series)
-        Independent standard normal numbers; nan is passed over.
+        Independent standard normal numbers; nan is skipped.
     run_length : float
         Average number of values between false alarms.
     """
@@ -242,7 +243,7 @@ def change_points(q: FloatArray, run_length: float) -> tuple[IntArray, IntArray]
             first = (total > threshold) & ((noticed < 0) | (i < noticed))
             began, noticed = np.where(first, since, began), np.where(first, i, noticed)
     for column in np.flatnonzero(noticed >= 0):
-        # Since it left zero, the place that makes a step of the mean likeliest: the sum may have crept up before it.
+        # The most likely step of the mean since the sum left zero, as the sum may have crept up before.
         steps = np.nan_to_num(q[began[column] : noticed[column] + 1, column])[::-1]
         likelihood = np.square(np.cumsum(steps)) / np.arange(1, len(steps) + 1)
         began[column] = noticed[column] - int(np.argmax(likelihood))
@@ -254,14 +255,14 @@ OK, WARNING, ALARM = 0, 1, 2
 
 
 def alarm_levels(sample: IntArray, calm: BoolArray, n_to_clear: int) -> IntArray:
-    """Return the level that stands after each value: raised at once, cleared after so many calm values on end.
+    """Return the level after each value: raised at once, cleared after `n_to_clear` consecutive calm values.
 
     Parameters
     ----------
     sample : int array, (n_recordings, n_series)
-        Level of each value alone; below zero where there is none.
+        Level of each value alone; negative if there is none.
     calm : bool array, (n_recordings, n_series)
-        Whether it lies below the level of return.
+        Whether the value is below the level for clearing.
     n_to_clear : int
     """
     m = sample.shape[1]
@@ -277,21 +278,21 @@ def alarm_levels(sample: IntArray, calm: BoolArray, n_to_clear: int) -> IntArray
 
 
 def decibels(values: FloatArray, baseline: BoolArray, is_signed: BoolArray) -> tuple[FloatArray, BoolArray]:
-    """Return levels in dB where a series is positive over its baseline, else values as they are.
+    """Return levels in dB if a series is positive over its baseline, else the values unchanged.
 
     Parameters
     ----------
     values : array, (n_recordings, n_series)
     baseline : bool array, (n_recordings,)
     is_signed : bool array, (n_series,)
-        Which series may be negative, as those in dB already, and stay as they are.
+        Series that may be negative, e.g. those already in dB, and stay unchanged.
 
     Returns
     -------
     array, (n_recordings, n_series)
-        20 lg of values; a later zero counts as a thousandth of the baseline's smallest.
+        20 lg of the values; a later zero counts as a thousandth of the baseline's minimum.
     bool array, (n_series,)
-        Whether the series was brought to dB.
+        Whether the series was converted to dB.
     """
     known = np.where(baseline[:, None], values, np.nan)
     filled = np.where(np.isfinite(known), known, np.inf)

@@ -1,15 +1,15 @@
-"""Results of recordings in Parquet files, which are only ever added, read through DuckDB.
+"""Results of recordings in append-only Parquet files, read through DuckDB.
 
-A result appears as one small file, named by what it is of, whole or not at all; so any number of processes may add to
-one store without waiting for each other, and one that is killed leaves nothing half there. Now and then small files
-are merged into segments that are sorted by machine and indicator.
+A result is written as one small file, named by a hash of its origin, completely or not at all. So any number of
+processes may add to one store without waiting for each other, and one that is killed leaves nothing half written. From
+time to time small files are merged into segments sorted by machine and indicator.
 
     store.json              which segments count, and which results in them were replaced
     new/KEY.parquet         one result, with its indicators as a list
     segments/NAME/          recordings.parquet, indicators.parquet
-    claims/                 locks of files that some process analyses right now
-    damaged/                what could not be read, set aside
-    trends.parquet          limits and alarms of all series, computed again where it is missing
+    claims/                 locks of files that a process is analysing
+    damaged/                unreadable files, set aside
+    trends.parquet          limits and alarms of all series, recomputed if missing
 """
 
 from __future__ import annotations
@@ -79,14 +79,14 @@ INDICATOR = {
     "computed_on": "string",
     "band": "string",
 }
-"""Of an indicator, besides key, machine, point and date of its recording."""
+"""Columns of an indicator, besides key, machine, point and date of its recording."""
 
 SERIES = ("name", "channel", "place", "computed_on", "band", "unit")
-"""What tells one indicator of a measuring point from another."""
+"""Columns that distinguish the indicators of a measuring point."""
 
 _SQL = {"string": "VARCHAR", "double": "DOUBLE", "int64": "BIGINT", "timestamp": "TIMESTAMP"}
 TIER = 8
-"""So many segments of like size are merged into one: each result is written again once for each power of it."""
+"""Number of segments of similar size that are merged into one: a result is rewritten once for each power of it."""
 
 Row = dict[str, Any]
 
@@ -98,9 +98,9 @@ class Store:
     ----------
     folder : Path
     on_message : callable
-        Told what was noticed and set aside.
+        Called with a message about what was set aside.
     create : bool
-        Whether to make the folder where there is none.
+        Whether to create the folder if there is none.
 
     Raises
     ------
@@ -121,7 +121,7 @@ class Store:
             self._make()
 
     def _make(self) -> None:
-        """Make what is not there; two processes may make the same store at once, and neither undoes the other's."""
+        """Create what is missing; two processes may do so at the same time without harm."""
         from filelock import FileLock
 
         try:
@@ -129,7 +129,7 @@ class Store:
             present = {path.name for path in self.folder.iterdir()}
             if present and not present & {MANIFEST, SEGMENTS}:
                 raise InputError("holds other files", where=str(self.folder), remedy="choose another with --store")
-            for name in (SEGMENTS, NEW, CLAIMS):  # the first tells the others that this is a store
+            for name in (SEGMENTS, NEW, CLAIMS):  # the first one marks the folder as a store
                 (self.folder / name).mkdir(exist_ok=True)
             if MANIFEST not in present:
                 with FileLock(self.folder / LOCK):
@@ -143,7 +143,7 @@ class Store:
     # ---------------- what there is
 
     def _manifest(self) -> tuple[list[str], list[str]]:
-        """Return segments and replaced keys; where the list itself is damaged, every segment that there is."""
+        """Return segments and replaced keys; if the list itself is damaged, all segments present."""
         try:
             data = json.loads((self.folder / MANIFEST).read_text(encoding="utf-8"))
             if data["schema"] == SCHEMA and data["schema_version"] > SCHEMA_VERSION:
@@ -161,7 +161,7 @@ class Store:
         return [name for name in segments if Path(name).name == name and self._segment(name).is_dir()], replaced
 
     def _present_segments(self) -> list[str]:
-        """Return the segments without those that another one holds already."""
+        """Return the segments present, except those that have been merged into another."""
         names = {path.name for path in (self.folder / SEGMENTS).glob("[0-9]*") if path.is_dir()}
         for name in sorted(names):
             with suppress(OSError, ValueError, TypeError):
@@ -182,7 +182,7 @@ class Store:
         return self.folder / SEGMENTS / name
 
     def _parquets(self, segments: Sequence[str]) -> tuple[list[str], list[str]]:
-        """Files of recordings and files of indicators, one each a segment."""
+        """Return the files of recordings and the files of indicators, one of each per segment."""
         tables = ("recordings", "indicators")
         recordings, indicators = ([str(self._segment(s) / f"{table}.parquet") for s in segments] for table in tables)
         return recordings, indicators
@@ -193,24 +193,24 @@ class Store:
     # ---------------- reading
 
     def read(self, work: Callable[[DuckDBPyConnection], Value]) -> Value:
-        """Return what `work` makes of the views `recordings` and `indicators`; damaged files are set aside first.
+        """Return the result of `work` on the views `recordings` and `indicators`; damaged files are set aside.
 
         Raises
         ------
         InputError
-            If the query fails though all files can be read.
+            If the query fails although all files can be read.
         """
         import duckdb
 
         problem = ""
-        for _ in range(4):  # a segment that is merged while it is read is another one a moment later
+        for _ in range(4):  # a segment merged while it is read is replaced by another
             try:
                 with self._connection() as connection:
                     return work(connection)
             except (RuntimeError, duckdb.InterruptException) as error:
                 if "interrupted" not in str(error).lower():
                     raise
-                raise KeyboardInterrupt from error  # Ctrl-C during a query, which DuckDB turns into an error of its own
+                raise KeyboardInterrupt from error  # Ctrl-C during a query, for which DuckDB raises its own error
             except duckdb.Error as error:
                 problem = str(error)
                 self._check_files()
@@ -248,9 +248,9 @@ class Store:
             connection.close()
 
     def _drop_doubled(self, connection: DuckDBPyConnection, loose: Sequence[Path], segments: Sequence[str]) -> None:
-        """Delete small files whose result is in a segment: two processes added it, or a merge was cut short.
+        """Delete small files whose result is in a segment: two processes added it, or a merge was interrupted.
 
-        Where a store may be read only, they stay, and do not count.
+        In a read-only store they remain, but do not count.
         """
         names = frozenset(path.stem for path in loose)
         state = tuple(segments)
@@ -272,7 +272,7 @@ class Store:
         return [key for (key,) in connection.execute(sql).fetchall()]
 
     def _check_files(self) -> None:
-        """Read every file through and set aside those that are damaged."""
+        """Read every file completely and set aside those that are damaged."""
         import pyarrow.parquet as pq
 
         loose_schema, columns = _arrow_schema(), [*RECORDING]
@@ -310,12 +310,12 @@ class Store:
     # ---------------- adding
 
     def add(self, row: Row, indicators: Sequence[Row]) -> bool:
-        """Write one result; False where the store holds it already.
+        """Write one result; return False if the store already holds it.
 
         Raises
         ------
         InputError
-            If it cannot be written: the disk is full.
+            If it cannot be written, e.g. on a full disk.
         """
         import pyarrow as pa
         import pyarrow.parquet as pq
@@ -329,7 +329,7 @@ class Store:
 
     @contextmanager
     def claim(self, name: str) -> Iterator[bool]:
-        """Hold the right to analyse a file while the process lives; yields False where another one has it.
+        """Hold the exclusive right to analyse a file within the block; yield False if another process has it.
 
         Raises
         ------
@@ -348,7 +348,7 @@ class Store:
             lock.release()
 
     def _locked(self, name: Path) -> FileLock | None:
-        """Return a lock that is held; None where another process holds it."""
+        """Return an acquired lock; None if another process holds it."""
         from filelock import FileLock, Timeout
 
         lock = FileLock(self.folder / name)
@@ -363,14 +363,14 @@ class Store:
         return lock
 
     def n_new(self) -> int:
-        """Return how many small files there are."""
+        """Return the number of small files."""
         return len(self._new())
 
     def compact(self, *, everything: bool = False) -> bool:
-        """Merge small files into a segment, and small segments into one; False where another process is at it.
+        """Merge small files into a segment, and small segments into one; return False if another process is doing so.
 
-        Nothing is lost whenever it is killed: a segment counts from when the list names it, and a small file is
-        deleted after that.
+        Nothing is lost if the process is killed: a segment counts once the list names it, and small files are deleted
+        only after that.
 
         Raises
         ------
@@ -435,7 +435,7 @@ class Store:
             path.unlink(missing_ok=True)
 
     def _remove_stale(self) -> None:
-        """Delete segments that do not count any more; they outlive one merge, for those who still read them."""
+        """Delete segments that no longer count; they are kept until the next merge for processes still reading them."""
         counting, _ = self._manifest()
         for path in (self.folder / SEGMENTS).iterdir():
             if path.name not in counting:
@@ -446,9 +446,9 @@ class Store:
 
 @cache
 def _database() -> DuckDBPyConnection:
-    """Return an empty database in memory, the same for all of a process: to open one takes 20 ms, a cursor of it one.
+    """Return an empty in-memory database, one per process: opening one takes 20 ms, a cursor of it 1 ms.
 
-    What a cursor makes for the time being, no other one sees. Files are not kept in memory.
+    Temporary objects of a cursor are invisible to others. Files are not cached in memory.
     """
     import duckdb
 
@@ -462,7 +462,7 @@ def _database() -> DuckDBPyConnection:
 def write_query(
     connection: DuckDBPyConnection, query: str, path: Path, form: str, values: Sequence[object] = ()
 ) -> int:
-    """Write the result of a query to a file, whole or not at all; return how many rows it has.
+    """Write the result of a query to a file, completely or not at all; return the number of rows.
 
     Parameters
     ----------
@@ -470,7 +470,7 @@ def write_query(
     query : str
     path : Path
     form : str
-        Format and its options, as COPY takes them.
+        Format and options of COPY.
     values : sequence
         Parameters of the query.
 
@@ -490,7 +490,7 @@ def write_query(
             n = connection.execute(sql, list(values)).fetchall()[0][0]
         except duckdb.IOException as error:
             _, is_of_this, reason = str(error).partition(Path(file.name).name)
-            if not is_of_this:  # but of one that is read
+            if not is_of_this:  # the error is about a file that is read
                 raise
             raise OSError(reason.lstrip(':\\" ').split('"')[0]) from None
 
@@ -499,24 +499,24 @@ def write_query(
 
 
 def _segments_to_merge(sizes: dict[str, int]) -> list[str]:
-    """Return the segments of the lowest tier that is full, with all that are smaller; nothing where none is full."""
+    """Return the segments of the lowest full tier and all smaller ones; none if no tier is full."""
     tiers = {name: int(log(max(size, 1), TIER)) for name, size in sizes.items()}
     full = [tier for tier in set(tiers.values()) if list(tiers.values()).count(tier) >= TIER]
     return [name for name, tier in tiers.items() if full and tier <= min(full)]
 
 
 def _text(value: str) -> str:
-    """Return a text as SQL writes it."""
+    """Return a text as an SQL literal."""
     return "'" + value.replace("'", "''") + "'"
 
 
 def _list(paths: Iterable[str]) -> str:
-    """Return paths as SQL writes them; marks of patterns in a folder's name stand for themselves."""
+    """Return paths as an SQL list, with wildcards in them escaped."""
     return "[" + ", ".join(_text("".join(f"[{c}]" if c in "*?[" else c for c in path)) for path in paths) + "]"
 
 
 def _nested_indicators(files: Sequence[str], kept: str) -> str:
-    """Select the indicators that loose files hold as lists."""
+    """Return the query for the indicators that small files hold as lists."""
     columns = ", ".join(f"i.{name} AS {name}" for name in INDICATOR)
     nested = f"SELECT key, machine, point, date, unnest(indicators) AS i FROM read_parquet({_list(files)}){kept}"
     return f"SELECT key, machine, point, date, {columns} FROM ({nested})"

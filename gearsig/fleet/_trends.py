@@ -1,4 +1,4 @@
-"""Trends: from the stored results of a measuring point to limits, alarms and change points of its indicators."""
+"""Trends: limits, alarms and change points of a measuring point's indicators, from its stored results."""
 
 from __future__ import annotations
 
@@ -40,28 +40,28 @@ if TYPE_CHECKING:
 
 SETTINGS = "settings.toml"
 HEALTHY = ("no fault", UNTOLD)
-"""Outcomes of a recording that may belong to a baseline that nobody stated."""
+"""Outcomes of recordings that may belong to a baseline if none is stated."""
 
 SERIOUS_DB = 20.0
-"""A rise that is serious: R. B. Randall, *Vibration-based Condition Monitoring*, 2nd ed., 2021, ch. 5."""
+"""A serious rise: R. B. Randall, *Vibration-based Condition Monitoring*, 2nd ed., 2021, ch. 5."""
 
 RETURN = 0.75
-"""An alarm is cleared below this share of the way from the expected value to the limit."""
+"""An alarm is cleared below this part of the distance from the expected value to the limit."""
 
 CLEARED_ZONE = 0.9
-"""Share of the boundary of zone C below which an alarm by zones is cleared."""
+"""Part of the boundary of zone C below which an alarm by zones is cleared."""
 
 ISO, STATISTICAL, NONE = "ISO 20816-3", "statistical", "none"
-"""What limits rest on."""
+"""Basis of limits."""
 
 LEVEL_NAMES = {OK: "ok", WARNING: "warning", ALARM: "alarm"}
 STATUS_LEVELS = ("alarm", "warning", "unknown", "ok")
-"""The worst first. Unknown is a measuring point without a baseline whose last recording allowed no answer, and an
+"""The worst first. "unknown": a measuring point without a baseline whose last recording was inconclusive, or an
 indicator without limits."""
 
 
 def level_name(level: int, basis: str) -> str:
-    """Return what a level is called, by what its limits rest on."""
+    """Return the name of a level; "unknown" if there are no limits."""
     return "unknown" if basis == NONE else LEVEL_NAMES[level]
 
 
@@ -72,7 +72,7 @@ class Baseline:
     Parameters
     ----------
     machine, point : str
-        An empty point stands for all of the machine's.
+        An empty point means all points of the machine.
     start, end : datetime
     """
 
@@ -96,15 +96,15 @@ class TrendSettings:
     Parameters
     ----------
     n_baseline : int
-        First healthy recordings that are the baseline where no period is stated.
+        Number of first healthy recordings that form the baseline if no period is stated.
     false_alarm_rate : float
         Probability that an unchanged measuring point raises a statistical alarm at one recording, over all its
-        indicators (Bonferroni); the same for change points, as one over the mean number of recordings between them.
+        indicators (Bonferroni); for change points, one over the mean number of recordings between false ones.
     minimum_change_db : float
-        Smaller changes raise no alarm, however regular they are: two recordings of one machine in one state differ by
-        less than 6 dB (Randall).
+        Smaller changes raise no alarm, however consistent they are: two recordings of a machine in the same state
+        differ by less than 6 dB (Randall).
     n_to_clear : int
-        Recordings on end that must lie below the level of return before an alarm is cleared.
+        Consecutive recordings that must be below the level for clearing before an alarm is cleared.
     baselines : tuple of Baseline
     """
 
@@ -121,18 +121,18 @@ class TrendSettings:
         count(self.n_to_clear, "n_to_clear")
 
     def baseline_of(self, machine: str, point: str) -> Baseline | None:
-        """Return the latest stated period of a measuring point, None where none is stated."""
+        """Return the latest stated baseline of a measuring point; None if there is none."""
         of_point = [b for b in self.baselines if b.machine == machine and b.point in ("", point)]
         return max(of_point, key=lambda b: (b.point != "", b.end), default=None)
 
     @property
     def digest(self) -> str:
-        """Short hash, by which it shows that trends were judged by other settings."""
+        """Short hash that shows whether trends were judged by other settings."""
         return hashlib.sha256(repr(self).encode()).hexdigest()[:12]
 
 
 def read_settings(folder: Path) -> TrendSettings:
-    """Read a store's settings; the defaults where it has none.
+    """Read a store's settings, or the defaults if it has none.
 
     Raises
     ------
@@ -142,7 +142,7 @@ def read_settings(folder: Path) -> TrendSettings:
     path = folder / SETTINGS
     if not path.exists():
         return TrendSettings()
-    data = read_toml(path, remedy="delete it for the usual settings, or mend it")
+    data = read_toml(path, remedy="delete it to use the default settings, or correct it")
     known = [name for name in TrendSettings.__dataclass_fields__ if name != "baselines"]
     unknown = sorted(set(data) - {*known, "baseline"})
     if unknown:
@@ -169,7 +169,7 @@ def _moment(value: object, *, ends: bool = False) -> datetime:
         return value.replace(tzinfo=None)
     if isinstance(value, date):
         return datetime.combine(value, time.max if ends else time.min)
-    raise InputError(f"{value!r} is no date", remedy="write for example 2026-01-31")
+    raise InputError(f"{value!r} is not a date", remedy="write for example 2026-01-31")
 
 
 def write_settings(folder: Path, settings: TrendSettings) -> None:
@@ -188,13 +188,13 @@ class AlarmEvent:
     Parameters
     ----------
     level : int
-        The highest it had: `WARNING` or `ALARM`.
+        The highest reached: `WARNING` or `ALARM`.
     raised : datetime
         Date of the recording.
     added : datetime
-        When that recording came into the store.
+        When that recording was added to the store.
     cleared, cleared_added : datetime or None
-        Likewise of the recording with which it was cleared.
+        The same for the recording that cleared it.
     """
 
     level: int
@@ -211,24 +211,24 @@ class PointTrends:
     Parameters
     ----------
     recordings : DataFrame
-        Of the point, by date: key, date, added, speed_rpm, load_nm, outcome.
+        Recordings of the point, by date: key, date, added, speed_rpm, load_nm, outcome.
     series : DataFrame
         Name, channel, place, … of each column of the arrays.
     values, expected, low, high, alarm : array, (n_recordings, n_series)
-        In the indicators' units; limits nan where there are none. Beyond `low` and `high` is a warning.
+        In the indicators' units; limits are nan if there are none. Values beyond `low` and `high` are warnings.
     in_db : bool array, (n_series,)
-        Whether changes are counted in dB.
+        Whether changes are in dB.
     baseline : bool array, (n_recordings,)
     levels : int array, (n_recordings, n_series)
-        Level that stands after each recording.
+        Level after each recording.
     basis : tuple of str
         Of each series: `ISO`, `STATISTICAL` or `NONE`.
     began, noticed : int array, (n_series,)
-        Recordings at which each series first changed, and at which that was noticed; -1: it has not.
+        Recordings at which each series first changed, and at which this was detected; -1 if it has not.
     normalised : tuple of str
-        What the expected values depend on: "speed", "load".
+        Quantities on which the expected values depend: "speed", "load".
     false_alarm_rate : float
-        Of one value of one series.
+        For one value of one series.
     """
 
     recordings: DataFrame
@@ -248,7 +248,7 @@ class PointTrends:
     false_alarm_rate: float
 
     def change(self) -> FloatArray:
-        """How far each value is from the expected one: in dB, or in the indicator's unit."""
+        """Return the deviation of each value from the expected one, in dB or in the indicator's unit."""
         with np.errstate(invalid="ignore", divide="ignore"):
             in_db = 20.0 * np.log10(self.values / self.expected)
         is_level = self.in_db & ~_is_ratio(self.series)
@@ -282,7 +282,7 @@ def judge(
     recordings : DataFrame
         Of the point, without failures: key, date, added, speed_rpm, load_nm, outcome, iso_group, iso_mounting.
     indicators : DataFrame
-        key, value and what tells series apart.
+        key, value and the columns of `SERIES`.
     settings : TrendSettings
     stated : Baseline or None
     """
@@ -336,7 +336,7 @@ def judge(
 
 
 def _conditions(recordings: DataFrame) -> tuple[FloatArray, FloatArray]:
-    """Return speed and load of each recording, nan where they are not known."""
+    """Return speed and load of each recording; nan where unknown."""
     speed, load = (recordings[name].to_numpy(np.float64) for name in ("speed_rpm", "load_nm"))
     return speed, load
 
@@ -344,7 +344,7 @@ def _conditions(recordings: DataFrame) -> tuple[FloatArray, FloatArray]:
 def _limits(
     y: FloatArray, x: FloatArray, baseline: BoolArray, in_db: BoolArray, rate: float, settings: TrendSettings
 ) -> tuple[FloatArray, FloatArray]:
-    """Return what is expected, and how far a value may be from it: never less than a change."""
+    """Return the expected values, and the allowed deviation, which is at least the minimum change."""
     expected, width = prediction_limits(y, x, baseline, rate, min_scatter=np.where(in_db, MIN_SCATTER, 1e-9))
     min_rise = np.where(in_db, settings.minimum_change_db, 0.0)
     return expected, np.maximum(width, min_rise)
@@ -353,13 +353,13 @@ def _limits(
 def _natural_limits(
     expected: FloatArray, reach: FloatArray, in_db: BoolArray, is_level: BoolArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return what is expected, low, high and alarm in the indicators' units."""
+    """Return expected values and the limits low, high and alarm in the indicators' units."""
     middle, low, high = (_natural(expected + part, is_level) for part in (0.0 * reach, -reach, reach))
     return middle, low, high, np.where(in_db, _natural(expected + np.maximum(reach, SERIOUS_DB), is_level), np.nan)
 
 
 CONDITIONS = {"load": "load_nm", "speed": "speed_rpm"}
-"""What an indicator is shown over besides time, and its column."""
+"""Quantity over which an indicator can be shown besides time → its column."""
 
 N_STEPS = 41
 """Points of a curve over load or speed."""
@@ -368,11 +368,11 @@ N_STEPS = 41
 def over_condition(
     trends: PointTrends, column: int, over: str, settings: TrendSettings
 ) -> tuple[DataFrame, DataFrame, float]:
-    """Return a series over load or speed: its values, the curve of its limits, and the other one's value there.
+    """Return a series over load or speed: its values, the curve of its limits, and the other quantity's held value.
 
-    The regression of the baseline is evaluated along one of the two, the other one being held at its mean of the
-    baseline. A value that was taken at another is moved there along the regression, and its limits with it: it lies
-    beyond them there if, and only if, it does over time.
+    The regression of the baseline is evaluated along one of the two, with the other held at its geometric mean over the
+    baseline. A value measured elsewhere is moved there along the regression together with its limits: it exceeds them
+    there if and only if it does so over time.
 
     Parameters
     ----------
@@ -380,18 +380,18 @@ def over_condition(
     column : int
         Of the series.
     over : str
-        Of `CONDITIONS`.
+        One of `CONDITIONS`.
     settings : TrendSettings
 
     Returns
     -------
     DataFrame
-        By load or speed: that, date, value, adjusted, expected, low, high, alarm, level.
+        Sorted by load or speed: load_nm or speed_rpm, date, value, adjusted, expected, low, high, alarm, level.
     DataFrame
-        Load or speed from a quarter below to a quarter above the baseline's, expected, low, high, alarm there; empty
-        where there are no limits.
+        Load or speed over the baseline's range, widened by `OUTSIDE` at both ends, with expected, low, high and alarm;
+        empty if there are no limits.
     float
-        What the other one is held at; nan where nothing depends on it.
+        Value at which the other quantity is held; nan if nothing depends on it.
     """
     import pandas as pd
 
@@ -413,10 +413,10 @@ def over_condition(
     y, is_level, in_db = _scaled(value[:, None], baseline, trends.series.iloc[[column]])
     y = np.concatenate([y, np.full((n_added, 1), np.nan)])
     expected, reach = _limits(y, x, is_baseline, in_db, trends.false_alarm_rate, settings)
-    reach[n : 2 * n] = reach[:n]  # each value keeps the limits of its own place
+    reach[n : 2 * n] = reach[:n]  # each value keeps its own allowed deviation
     natural = np.hstack(_natural_limits(expected, reach, in_db, is_level))
     moved = np.nan_to_num(expected[n : 2 * n, 0] - expected[:n, 0])
-    if is_iso:  # boundaries of zones are the same at any load
+    if is_iso:  # zone boundaries are the same at any load
         moved[:] = 0.0
         natural[:, 1], natural[:, 2:] = np.nan, [trends.high[0, column], trends.alarm[0, column]]
     adjusted = value * 10.0 ** (moved / 20.0) if is_level[0] else value + moved
@@ -438,7 +438,7 @@ def over_condition(
 
 
 def _matrix(recordings: DataFrame, indicators: DataFrame) -> tuple[FloatArray, DataFrame]:
-    """Return values by recording and series, and what tells series apart."""
+    """Return values (recordings × series), and the columns of `SERIES` for each series."""
     columns: list[str] = [*SERIES]
     groups = indicators.groupby(columns, sort=True, dropna=False)
     series = groups.size().reset_index()[columns]
@@ -452,7 +452,7 @@ def _matrix(recordings: DataFrame, indicators: DataFrame) -> tuple[FloatArray, D
 
 
 def _baseline(recordings: DataFrame, settings: TrendSettings, stated: Baseline | None) -> BoolArray:
-    """Return which recordings are the baseline: all of the stated period, or the first healthy ones, once complete."""
+    """Return which recordings form the baseline: those of the stated period, or the first healthy ones if complete."""
     if stated is not None:
         dates = recordings["date"]
         result: BoolArray = ((dates >= stated.start) & (dates <= stated.end)).to_numpy(np.bool_)
@@ -463,20 +463,20 @@ def _baseline(recordings: DataFrame, settings: TrendSettings, stated: Baseline |
 
 
 def _scaled(values: FloatArray, baseline: BoolArray, series: DataFrame) -> tuple[FloatArray, BoolArray, BoolArray]:
-    """Return the values as they are judged, which series were brought to dB for it, and which are in dB then."""
+    """Return the values to be judged, which series were converted to dB for this, and which are in dB as a result."""
     is_ratio = _is_ratio(series)
     y, is_level = decibels(values, baseline, is_ratio | _is_signed(series))
     return y, is_level, is_level | is_ratio
 
 
 def _is_ratio(series: DataFrame) -> BoolArray:
-    """Which series are ratios in dB already: they may be negative, and their changes are in dB all the same."""
+    """Return which series are ratios already in dB: they may be negative, and their changes are in dB too."""
     result: BoolArray = (series["unit"] == "dB").to_numpy(np.bool_)
     return result
 
 
 def _is_signed(series: DataFrame) -> BoolArray:
-    """Which other series may be negative, be they positive over a whole baseline by chance."""
+    """Return which other series may be negative, even if they are positive over a whole baseline by chance."""
     result: BoolArray = (series["name"] == "skewness").to_numpy(np.bool_)
     return result
 
@@ -487,7 +487,7 @@ def _natural(levels: FloatArray, is_level: BoolArray) -> FloatArray:
 
 
 def _zone_limits(recordings: DataFrame) -> tuple[float, float, float] | None:
-    """Return the boundaries of the zones of ISO 20816-3, where the latest recording was judged by them."""
+    """Return the ISO 20816-3 zone boundaries of the last recording with a machine group in mm/s; None without one."""
     from gearsig.indicators import ZONE_LIMITS_MM_PER_S
 
     known = recordings[recordings["iso_group"].notna()]
@@ -498,7 +498,7 @@ def _zone_limits(recordings: DataFrame) -> tuple[float, float, float] | None:
 
 
 def state_rows(trends: PointTrends, machine: str, point: str, fingerprint: str) -> list[dict[str, Any]]:
-    """Return what status and reports need of each series: its last value against its limits, alarms, change."""
+    """Return a row per series for status and reports: last value, limits, alarms and change."""
     change, dates = trends.change(), trends.recordings["date"]
     reached = trends.recordings["date"][trends.baseline]
     rows: list[dict[str, Any]] = []
@@ -537,7 +537,7 @@ def state_rows(trends: PointTrends, machine: str, point: str, fingerprint: str) 
 
 
 def _mean(values: FloatArray) -> float:
-    """Return the mean of what is known, nan where nothing is."""
+    """Return the mean of the finite values; nan if there are none."""
     known = values[np.isfinite(values)]
     return float(known.mean()) if len(known) else float("nan")
 
@@ -578,13 +578,13 @@ class Trend:
     basis : str
         "ISO 20816-3", "statistical" or "none".
     level : str
-        Of `STATUS_LEVELS`, after the last recording.
+        One of `STATUS_LEVELS`, after the last recording.
     changed : datetime or None
-        Since when it is another level than before.
+        When the indicator first changed; None if it has not.
     normalised : tuple of str
-        What the expected value depends on: "speed", "load".
+        Quantities on which the expected value depends: "speed", "load".
     false_alarm_rate : float
-        Of one value of this series; of an unchanged machine.
+        For one value of this series, for an unchanged machine.
     """
 
     machine: str
@@ -604,17 +604,17 @@ class Trend:
 
     @property
     def text(self) -> str:
-        """What the limits rest on, and how often they are wrong, in a few sentences."""
+        """Basis of the limits and rate of false alarms, in a few sentences."""
         n = int(self.table["in_baseline"].sum())
         if self.basis == NONE:
             n_all = len(self.table)
-            parts = [f"No limits yet: {counted(n_all, 'recording')} {'is' if n_all == 1 else 'are'} no baseline."]
+            parts = [f"No limits yet: {counted(n_all, 'recording')} {'is' if n_all == 1 else 'are'} not a baseline."]
         elif self.basis != STATISTICAL:
             parts = [f"Limits are the zones of {self.basis}."]
         else:
             parts = [f"Limits from the {counted(n, 'recording')} of the baseline.", _false_alarms(self)]
         if self.normalised:
-            parts.append(f"What is expected follows {' and '.join(self.normalised)}.")
+            parts.append(f"The expected value depends on {' and '.join(self.normalised)}.")
         return " ".join(parts)
 
     def __repr__(self) -> str:
@@ -635,13 +635,13 @@ class OperatingTrend:
     over : str
         "load" or "speed".
     table : DataFrame
-        By load_nm or speed_rpm: date, value, adjusted, expected, low, high, alarm (limits), level.
-        `adjusted` is the value as it would be at the other quantity's `held` value. `level` is that of the value by
-        itself: "baseline", "ok", "warning", "alarm", or "not judged" beyond the baseline's range.
+        Sorted by load_nm or speed_rpm: date, value, adjusted, expected, low, high, alarm (limits), level.
+        `adjusted` is the value as it would be at the other quantity's `held` value. `level` is that of the single
+        value: "baseline", "ok", "warning", "alarm", or "not judged" beyond the baseline's range.
     curve : DataFrame
         load_nm or speed_rpm, expected, low, high, alarm along it; empty without a baseline.
     held : float
-        Speed or load for which both are; nan where the indicator does not follow it.
+        Speed or load for which both hold; nan if the indicator does not depend on it.
     """
 
     trend: Trend
@@ -652,12 +652,12 @@ class OperatingTrend:
 
     @property
     def follows(self) -> bool:
-        """Whether what is expected depends on it: the baseline covers enough of it to tell."""
+        """Whether the expected value depends on load or speed: the baseline must cover a sufficient range of it."""
         return self.over in self.trend.normalised
 
     @property
     def text(self) -> str:
-        """What is shown, and how often its limits are wrong, in a few sentences."""
+        """Basis of the limits, adjustment of values and rate of false alarms, in a few sentences."""
         other = "speed" if self.over == "load" else "load"
         unit = "rpm" if other == "speed" else "N m"
         parts = []
@@ -685,11 +685,11 @@ class OperatingTrend:
 
 
 def _false_alarms(trend: Trend, how_often: str = "one") -> str:
-    return f"An unchanged machine leaves them in {how_often} of {readable(1 / trend.false_alarm_rate)} recordings."
+    return f"An unchanged machine is outside them in {how_often} of {readable(1 / trend.false_alarm_rate)} recordings."
 
 
 def last_level(trends: PointTrends, column: int) -> str:
-    """Return the level of an indicator after the last recording, of `STATUS_LEVELS`."""
+    """Return the level of an indicator after the last recording, one of `STATUS_LEVELS`."""
     return level_name(int(trends.levels[-1, column]), trends.basis[column])
 
 

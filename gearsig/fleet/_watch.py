@@ -1,4 +1,4 @@
-"""Takes recordings into a fleet as they appear in a folder."""
+"""Add recordings to a fleet as they appear in a folder."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ class WatchEvent:
     Parameters
     ----------
     kind : str
-        "added", "failed", "passed over" (files that the pattern leaves out, each said once) or "problem" (of folder or
-        store; it is tried again).
+        "added", "failed", "passed over" (files that the pattern leaves out, each reported once) or "problem" (with
+        folder or store, which is tried again).
     time : datetime
         In UTC.
     text : str
@@ -43,7 +43,7 @@ class WatchEvent:
     excluded: tuple[ExcludedFile, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
-        """Return what a line of JSON holds."""
+        """Return the content of the event's line of JSON."""
         result: dict[str, Any] = {"event": self.kind, "time": f"{self.time:%Y-%m-%dT%H:%M:%SZ}", "text": self.text}
         if self.added is not None:
             origin = self.added.origin
@@ -61,7 +61,7 @@ class WatchEvent:
 
 @dataclass
 class _WatchedFile:
-    """A file's size and time of change, and since when it has them (monotonic, s)."""
+    """A file's size and modification time, and since when they are unchanged (monotonic clock, s)."""
 
     signature: tuple[int, int]
     since_s: float
@@ -81,11 +81,11 @@ def watch(
     stop: Callable[[], bool] = lambda: False,
     **how: Any,
 ) -> int:
-    """Take new recordings as they appear, until `stop` says so; return how many failed.
+    """Add new recordings as they appear, until `stop` returns true; return how many failed.
 
-    The folders are looked through at each interval: unlike notices of the operating system this works on network
-    drives too, and after a restart. A file is taken when its size and time of change have stood still for a while; one
-    that was taken too early, or changes later, is taken again, and its failure is replaced.
+    The folders are searched at each interval: unlike notifications of the operating system, this also works on network
+    drives and after a restart. A file is added once its size and modification time have not changed for a while. If it
+    was added too early, or changes later, it is added again, and a failure is replaced.
 
     Parameters
     ----------
@@ -95,21 +95,21 @@ def watch(
     on_event : callable
         Called with a `WatchEvent` for each recording and each problem.
     interval_s : float
-        Between two looks.
+        Time between two searches.
     settle_s : float
-        For which a file must stand still.
+        Time for which a file must not change.
     once : bool
-        Whether to end when all that is there has been taken; a file that still grows is waited for.
+        Whether to end when all present files have been added, after waiting for those that still change.
     n_processes, executor
         See `Fleet.add`.
     stop : callable
-        Called before each look.
+        Called before each search.
     **how
-        What `Fleet.add` takes: pattern, rig, sampling_rate_hz, …
+        Other arguments of `Fleet.add`: pattern, rig, sampling_rate_hz, …
     """
     positive(interval_s, "interval_s", "s")
     not_negative(settle_s, "settle_s", "s")
-    FilePattern(how.get("pattern", ""))  # one that is no pattern is refused at once
+    FilePattern(how.get("pattern", ""))  # an invalid pattern is refused at once
     roots = [Path(place) for place in places]
     seen: dict[Path, _WatchedFile] = {}
     reported: set[Path] = set()
@@ -171,7 +171,7 @@ def _ready(
     how: dict[str, Any],
     on_excluded: Callable[[ExcludedFile], object],
 ) -> tuple[list[Origin], int]:
-    """Return the recordings that stand still and were not taken yet, and how many do not stand still."""
+    """Return the unchanging recordings that were not added yet, and the number of those that still change."""
     present_roots = [root for root in roots if root.exists()]
     of_origin = {name: how[name] for name in (*_OF_ORIGIN, "rig") if name in how}
     now_s, wall_s = time.monotonic(), time.time()

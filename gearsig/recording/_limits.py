@@ -1,4 +1,4 @@
-"""Bounds on memory: a file that would not fit is refused before it is decoded."""
+"""Memory limits: a file that would not fit is refused before it is decoded."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ from pathlib import Path
 from gearsig.errors import GearsigError, InputError
 
 CGROUPS = Path("/sys/fs/cgroup")
-"""Where Linux shows the limits of containers."""
+"""Where Linux exposes the memory limits of containers."""
 
 
 def free_memory_bytes() -> float | None:
-    """Memory that programs can still take, of the system and of a container; None where neither tells."""
+    """Return the memory still available, in the system and in its container; None if neither is known."""
     limits = [free for free in (_system_free_bytes(), container_free_bytes()) if free is not None]
     smallest = min(limits, default=inf)
     return smallest if isfinite(smallest) else None
 
 
 def container_free_bytes(cgroup_file: Path = Path("/proc/self/cgroup"), mount: Path = CGROUPS) -> float | None:
-    """What the control groups of this program, from its own up to the outermost, still allow; None without a limit.
+    """Return the memory that this program's control groups, up to the outermost, still allow; None without a limit.
 
-    What is taken counts without cached files, which make way.
+    Cached files do not count as used, because they can be dropped.
 
     Parameters
     ----------
     cgroup_file : Path
-        Lines "id:controllers:path": version 2 has none between its colons, version 1 has "memory".
+        Lines "id:controllers:path": no controllers in version 2, "memory" among them in version 1.
     mount : Path
-        Where the groups are shown; those of version 1 in a folder "memory".
+        Where the groups are mounted; those of version 1 in a folder "memory".
     """
     limits: list[float | None] = []
     try:
@@ -75,7 +75,7 @@ def _system_free_bytes() -> float | None:
                     return float(line.split()[1]) * 1024.0
     except (OSError, ValueError, IndexError):
         pass
-    try:  # where there is no such file, half of what is built in
+    try:  # without such a file: half of the installed memory
         return 0.5 * os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (OSError, ValueError, AttributeError):
         return None
@@ -84,15 +84,15 @@ def _system_free_bytes() -> float | None:
 CHUNK_BYTES = 1 << 22
 HEAD_BYTES = 1 << 16
 MAX_RATIO = 200
-"""Numbers shrink by 2 to 20 in any format; anything far beyond carries no information."""
+"""Numbers compress by 2 to 20 in any format; anything far beyond carries no information."""
 FREE_BYTES = 1 << 26
-"""Below this decoded size the ratio is not looked at: short files may be very regular."""
+"""Below this decoded size the ratio is not checked: short files may be very regular."""
 UNTOLD_BYTES = 4 << 30
-"""Taken as free where the system does not tell."""
+"""Assumed to be free if the system does not say."""
 
 
 def available_memory_bytes() -> int:
-    """Return the memory that can be had without swapping, a guess of 4 GB where the system does not tell."""
+    """Return the memory available without swapping, assumed to be 4 GB if the system does not say."""
     free = free_memory_bytes()
     return UNTOLD_BYTES if free is None else int(free)
 
@@ -105,7 +105,7 @@ def check_memory(
     part: float = 0.5,
     remedy: str = "split the file or export fewer channels",
 ) -> None:
-    """Raise if something needs more than a part of the available memory.
+    """Raise if something needs more than a given part of the available memory.
 
     Parameters
     ----------
@@ -113,15 +113,15 @@ def check_memory(
     where : str
         File, or what is computed.
     free_bytes : float or None
-        None: what can be had without swapping.
+        None: what is available without swapping.
     part : float
-        Of the free memory. Default: half for decoding, the other half is for the analysis.
+        Of the free memory. Default: half for decoding; the other half is for the analysis.
     remedy : str
 
     Raises
     ------
     InputError
-        With what is needed and what is allowed.
+        Stating what is needed and what is allowed.
     """
     allowed = part * (available_memory_bytes() if free_bytes is None else free_bytes)
     if needed_bytes > allowed:
@@ -134,9 +134,9 @@ def check_memory(
 
 
 def check_decoded(decoded_bytes: int, path: Path, *, at_once_bytes: int | None = None) -> None:
-    """Raise if what a file unpacks to is a decompression bomb, or does not fit into memory twice.
+    """Raise if a file is a decompression bomb, or if its decoded content does not fit into memory twice.
 
-    Formats that state their sizes are checked before anything is decoded, streams as they grow.
+    Formats that state their sizes are checked before decoding, streams as they grow.
 
     Parameters
     ----------
@@ -144,30 +144,30 @@ def check_decoded(decoded_bytes: int, path: Path, *, at_once_bytes: int | None =
         Of the whole file.
     path : Path
     at_once_bytes : int or None
-        What is unpacked at once where the file is read in parts; None: all of it.
+        What is decoded at once if the file is read in parts; None: all of it.
 
     Raises
     ------
     InputError
-        Above `FREE_BYTES`, if it is more than `MAX_RATIO` times the file's own size.
+        If it exceeds `FREE_BYTES` and `MAX_RATIO` times the file's size, or does not fit into memory.
     """
     if decoded_bytes > max(FREE_BYTES, MAX_RATIO * path.stat().st_size):
         raise InputError(
             f"decompresses to more than {MAX_RATIO} times its size",
             where=path.name,
             allowed=f"a ratio up to {MAX_RATIO}",
-            remedy="this is no recording; if it is, unpack it first",
+            remedy="check that it is a recording; if so, unpack it first",
         )
     check_memory(2 * (decoded_bytes if at_once_bytes is None else at_once_bytes), path.name)
 
 
 def read_gzip(path: Path) -> bytes:
-    """Return the decompressed bytes.
+    """Return the decompressed bytes of a text file.
 
     Raises
     ------
     InputError
-        If the stream is damaged, cut off or empty; see also `check_decoded`.
+        If the stream is damaged, truncated or empty; see also `check_decoded`.
     """
     chunks: list[bytes] = []
     size = 0
@@ -191,7 +191,7 @@ def read_gzip(path: Path) -> bytes:
 
 
 def read_text_bytes(path: Path) -> bytes:
-    """Return the bytes of a text file, plain or gzip; refuse one that holds NUL bytes or would not fit."""
+    """Return the bytes of a text file, plain or gzip; refuse one that holds NUL bytes or does not fit into memory."""
     with path.open("rb") as file:
         head = file.read(4)
         if head[:2] == b"\x1f\x8b":
@@ -200,7 +200,7 @@ def read_text_bytes(path: Path) -> bytes:
             check_memory(4 * path.stat().st_size, path.name)
             return _from_utf16(path)
         file.seek(0)
-        # The numbers on the first lines tell how many there will be: 8 bytes each as read and again as samples.
+        # The first lines show how many numbers to expect: 8 bytes each as read, and again as samples.
         first = file.read(HEAD_BYTES)
         numbers_per_byte = len(re.findall(rb"[^\s,;]+", first)) / len(first)
         check_memory(int((2 + 16 * numbers_per_byte) * path.stat().st_size), path.name)
@@ -213,14 +213,14 @@ def read_text_bytes(path: Path) -> bytes:
 
 
 def refuse_nul(chunk: bytes, where: str) -> None:
-    """Raise if text holds NUL bytes, as a file that was allocated but never written does."""
+    """Raise if text holds NUL bytes, like a file that was allocated but never written."""
     if b"\0" in chunk:
         zeros = "only zero bytes" if not chunk.strip(b"\0") else "zero bytes"
         raise InputError(
             f"holds {zeros} where text is expected",
             where=where,
             allowed="plain text (UTF-8)",
-            remedy="the file was not written completely, or it is no text file: export it again",
+            remedy="the file was not written completely, or it is not a text file: export it again",
         )
 
 
@@ -238,9 +238,9 @@ def _from_utf16(path: Path) -> bytes:
 
 @contextmanager
 def foreign_errors(where: str, file_format: str) -> Iterator[None]:
-    """Raise `InputError` where reading fails inside the block; gearsig's own errors pass, with the file's name.
+    """Raise `InputError` if reading fails inside the block; gearsig's own errors pass, with the file's name added.
 
-    What the caller gave beside the file is checked before: else the file would be blamed for it.
+    Check the caller's other arguments before the block, or the file is blamed for them.
     """
     try:
         yield
@@ -268,7 +268,7 @@ def foreign_errors(where: str, file_format: str) -> Iterator[None]:
             f"cannot be opened ({error.strerror or error})",
             where=where,
             allowed="a readable file",
-            remedy="check who may read it",
+            remedy="check the permissions of the file",
         ) from error
     except Exception as error:  # parsers raise anything on damaged bytes, one of them bare Exception
         reason = str(error)[:200] or type(error).__name__

@@ -1,4 +1,4 @@
-"""Finds what is wrong with the samples themselves: dead, clipped, stuck, offset or coarsely quantised channels."""
+"""Find defects of the samples themselves: dead, clipped, stuck, offset or coarsely quantised channels."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ class SampleLevels:
     n_used : int
         Distinct values.
     step : float or None
-        Distance of the converter's levels; None if the values lie on no grid.
+        Spacing of the converter's levels; None if the values lie on no grid.
     n_spanned : int
-        Levels from lowest to highest, both counted; `n_used` if they lie on no grid.
+        Levels from lowest to highest, inclusive; `n_used` if they lie on no grid.
     """
 
     n_used: int
@@ -37,23 +37,23 @@ class SampleLevels:
 
 
 def find_levels(x: FloatArray) -> SampleLevels:
-    """Return the levels of a channel, (n_samples,).
+    """Return the distinct levels of a channel, (n_samples,).
 
-    The step is the smallest distance between two distinct values if all values are whole multiples of it apart. A
-    signal that never takes neighbouring levels has no step here, and a long float signal has none either.
+    The step is the smallest distance between two distinct values, if all values are whole multiples of it apart. A
+    signal that never takes neighbouring levels has no step here, nor has a long float signal.
     """
     values = np.unique(x).astype(np.float64)
     if len(values) < 2:
         return SampleLevels(1, None, 1)
     step = float(np.diff(values).min())
     span = float(values[-1] - values[0])
-    if step < 1e-7 * span:  # finer than 23 bits: rounding of floats, no converter
+    if step < 1e-7 * span:  # finer than 23 bits: rounding of floats, not a converter
         return SampleLevels(len(values), None, len(values))
     numbers = (values - values[0]) / step
-    # The smallest distance is one of many and a little wrong; the span divided by its number of steps is not.
+    # The smallest of many distances is slightly wrong; the span divided by its number of steps is not.
     step = span / round(span / step)
     numbers = (values - values[0]) / step
-    # Scaling in float32 moves levels a little off their grid.
+    # Scaling in float32 moves levels slightly off their grid.
     if np.abs(numbers - np.round(numbers)).max() > 0.02:
         return SampleLevels(len(values), None, len(values))
     return SampleLevels(len(values), step, round(span / step) + 1)
@@ -61,12 +61,12 @@ def find_levels(x: FloatArray) -> SampleLevels:
 
 MIN_RUN = 3
 CORNER_DROP = 8.0
-"""Twice the drop of a parabola, see below."""
+"""Twice the drop of a parabola, see `find_clipping`."""
 
 
 @dataclass(frozen=True)
 class Clipping:
-    """Samples held at a limit, and at which."""
+    """Number of samples held at a limit, and the limit."""
 
     n_samples: int
     place: str
@@ -75,20 +75,20 @@ class Clipping:
 def find_clipping(x: FloatArray, levels: SampleLevels, *, rest: float | None = None) -> Clipping | None:
     r"""Return where a channel is clipped, or None.
 
-    A smooth peak is a parabola: what stays within a width w of the top for ±h samples has fallen by about 4 w after
-    ±2 h. A run of at least three samples has a *corner* where the signal has fallen by more than 8 w there, on both
-    sides: it was cut, not rounded. Two tests per end of the range look for such runs; either is enough.
+    A smooth peak is a parabola: a signal that stays within a width w of the top for ±h samples has fallen by about
+    4 w after ±2 h. A run of at least three samples has *corners* if the signal has fallen by more than 8 w there, on
+    both sides: it was cut, not rounded. Two tests at each end of the range look for such runs; either is sufficient.
 
-    - *Held samples.* Runs of samples equal to the extreme, w being one step of the converter. They must hold three
-      times as many samples as the next step below, as no noise does. Or the extreme holds a thousandth of the samples
-      and ten times as many as any value between both, where a fast signal meets it in single ones.
-    - *Pile-up.* Runs in the last 0.5 % of the range, w. That band must hold 6 times as many samples as the 0.5 %
-      before. Near a parabolic maximum, time goes with the square root of the distance from it, so that this ratio
-      is at most
+    - *Held samples.* Runs of samples equal to the extreme; w is one step of the converter. They must hold three times
+      as many samples as the next step below, which noise never does. Alternatively, the extreme holds a thousandth of
+      the samples and ten times as many as any value between the extremes: a fast signal reaches it in single samples.
+    - *Pile-up.* Runs in the last 0.5 % of the range, w. This band must hold 6 times as many samples as the 0.5 %
+      before it. Near a parabolic maximum, time goes with the square root of the distance from it, so this ratio is at
+      most
 
       .. math:: 1 / (\sqrt{2} - 1) = 2.41,
 
-      which a sine reaches; noise stays below 1. It finds limits with a little noise on them, as an amplifier's.
+      which a sine reaches; noise stays below 1. This test finds limits with a little noise, e.g. those of an amplifier.
 
     Parameters
     ----------
@@ -96,8 +96,8 @@ def find_clipping(x: FloatArray, levels: SampleLevels, *, rest: float | None = N
     levels : SampleLevels
         Those of `x`.
     rest : float or None
-        Level at which the quantity itself stays for a time, e.g. 0 of a force between parts that come apart: an end of
-        the range there is no limit of the measurement.
+        Level at which the quantity itself rests at times, e.g. 0 for a force between parts that separate: an end of the
+        range there is not a limit of the measurement.
     """
     low, high = float(x.min()), float(x.max())
     ends = {}
@@ -106,8 +106,8 @@ def find_clipping(x: FloatArray, levels: SampleLevels, *, rest: float | None = N
             continue
         distance = sign * (extreme - x)  # 0 at the extreme, positive elsewhere
         n = max(_n_held(distance, levels), _n_piled(distance, high - low, levels.step))
-        # A level that holds half of the samples is where the signal rests (a pulse train's base, a square wave's
-        # level), not a limit that it runs into.
+        # A level that holds half of the samples is where the signal rests (the base of a pulse train, a level of a
+        # square wave), not a limit.
         if n and n < 0.48 * len(x):
             ends[extreme] = n
     if not ends:
@@ -117,11 +117,11 @@ def find_clipping(x: FloatArray, levels: SampleLevels, *, rest: float | None = N
 
 
 def _n_held(distance: FloatArray, levels: SampleLevels) -> int:
-    """Count the samples held exactly at the extreme, 0 if they are not more than noise would put there."""
+    """Count the samples held exactly at the extreme; 0 if there are no more than noise would put there."""
     q = levels.step if levels.step is not None else float(np.finfo(distance.dtype).eps) * float(distance.max())
     held = distance == 0
     usual = len(held) / levels.n_used
-    # Pairs count as runs where the extreme is twenty times as frequent as the average value: a tone whose period is a
+    # Pairs count as runs if the extreme is twenty times as frequent as the average value: a tone whose period is a
     # whole number of samples has equal pairs too, but of all its values.
     min_run = MIN_RUN if np.count_nonzero(held) < 20.0 * usual else 2
     n = _n_in_cornered_runs(held, distance, q, min_run)
@@ -129,16 +129,16 @@ def _n_held(distance: FloatArray, levels: SampleLevels) -> int:
     n_held = int(np.count_nonzero(held))
     if n > 3.0 * n_next:
         return n_held
-    # A fast signal meets a limit in single samples, but no other value comes anywhere near as often.
+    # A fast signal reaches a limit in single samples, but no other value is nearly as frequent.
     if n_held < max(20.0, 1e-3 * len(held), 20.0 * usual):
         return 0
-    places = np.rint(distance * (1e6 / float(distance.max())))  # values of a tone differ by their rounding
+    places = np.rint(distance * (1e6 / float(distance.max())))  # values of a tone differ by rounding
     _, counts = np.unique(places[(places > 0) & (places < 1e6)], return_counts=True)
     return n_held if n_held > 10.0 * counts.max(initial=0) else 0
 
 
 def _n_piled(distance: FloatArray, span: float, step: float | None) -> int:
-    """Count the samples in the last band, 0 if it holds not far more than the one before."""
+    """Count the samples in the last band; 0 unless it holds far more than the one before."""
     width = 0.005 * span
     if step is not None and width < 2 * step:
         return 0  # the bands would hold one level or none
@@ -149,7 +149,7 @@ def _n_piled(distance: FloatArray, span: float, step: float | None) -> int:
 
 
 def _n_in_cornered_runs(at_limit: NDArray[np.bool_], distance: FloatArray, width: float, min_run: int) -> int:
-    """Count the samples in runs of a length that end in corners."""
+    """Count the samples in runs of at least `min_run` samples with corners at both ends."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], at_limit, [False]))))
     starts, stops = edges[::2], edges[1::2]
     long = stops - starts >= min_run
@@ -170,7 +170,7 @@ _OFFSET_QUANTITIES = frozenset(("acceleration", "velocity", "sound_pressure", "u
 
 @dataclass(frozen=True)
 class ChannelProblem:
-    """Something that makes a channel worth less.
+    """A defect that makes a channel less useful.
 
     Parameters
     ----------
@@ -178,12 +178,12 @@ class ChannelProblem:
     kind : str
         One of `ProblemKind`.
     share : float
-        Share of the samples that are touched, 0 to 1.
+        Share of the samples affected, 0 to 1.
     evidence : str
         What was seen, with numbers.
     remedy : str
     frequency_hz : float or None
-        Of hum: the line.
+        For hum: frequency of the line.
     """
 
     channel: str
@@ -195,17 +195,17 @@ class ChannelProblem:
 
     @property
     def title(self) -> str:
-        """What is the matter, in a sentence."""
+        """The problem in one sentence."""
         return _TITLES.get(self.kind, "Channel {} is {}.").format(self.channel, self.kind)
 
     @property
     def text(self) -> str:
-        """The title with its evidence, as the beginning of a sentence."""
+        """The title with its evidence, as the start of a sentence."""
         return f"{self.title.rstrip('.')} ({self.evidence})"
 
     @property
     def is_grave(self) -> bool:
-        """Whether levels and lines may be wrong for it, which an offset or few levels hardly touch."""
+        """Whether levels and lines may be wrong, which an offset or few levels hardly affect."""
         return self.kind not in ("offset", "quantised")
 
 
@@ -213,28 +213,27 @@ _TITLES = {
     "wrapped": "Channel {} has overflowed: its values wrap around.",
     "stepped": "The level of channel {} steps: gain, mounting or load changed.",
     "reversed": "Channel {} seems to run backwards in time.",
-    "hum": "Mains hum rules channel {}.",
+    "hum": "Mains hum dominates channel {}.",
 }
 
 
 def find_problems(recording: Recording) -> tuple[ChannelProblem, ...]:
-    """Return the problems of the vibration channels; speed, tachometer and other channels are not looked at.
+    """Return the problems of the vibration channels; speed, tachometer and other channels are not checked.
 
     - *dead*: constant, or so small that the standard deviation vanishes in double precision; or at most four
-      neighbouring levels and a standard deviation below 1/1000 of the median of the other vibration channels in the
-      same unit.
-    - *clipped*: see `gearsig.recording`.
+      neighbouring levels and a standard deviation below 1/1000 of the median of the other channels with the same
+      quantity and unit.
+    - *clipped*: samples held at an end of the range, or piled up there, with corners that no smooth peak has.
     - *stuck*: runs of equal samples away from the extremes, at least 16 long, ten times longer than 99 % of the
-      runs in the channel, and with a corner at both ends (eight samples further the signal is more than eight of the
-      converter's steps away, which it is not at a smooth turning point): a dropout of the measurement chain.
+      channel's runs, and with a corner at both ends (eight samples further the signal is more than eight converter
+      steps away, unlike at a smooth turning point): a dropout of the measurement chain.
     - *wrapped*: five or more steps from one end of the range to the other that vanish when the range is added, or
-      three or more samples that are off by the range from what those beside them say: an integer that overflowed.
-    - *stepped*: the level changes by 4 dB or more from one moment to the next, and is steady before and after: gain,
-      mounting or load.
-    - *reversed*: impacts swell and end suddenly, where those of a machine begin suddenly and ring down.
-    - *hum*: more than half of the power stands in one line within 0.1 % of a multiple of 50 or 60 Hz.
+      three or more samples that differ by the range from what their neighbours predict: an integer overflow.
+    - *stepped*: the level changes suddenly by 4 dB or more and is steady before and after: gain, mounting or load.
+    - *reversed*: impacts swell and end suddenly, whereas those of a machine begin suddenly and ring down.
+    - *hum*: more than half of the power lies in one line within 0.1 % of a multiple of 50 or 60 Hz.
     - *offset*: the mean is more than three times the standard deviation, for quantities without a static part.
-    - *quantised*: fewer than 64 equidistant levels in use, less than 6 bits.
+    - *quantised*: fewer than 64 equidistant levels from lowest to highest, i.e. less than 6 bits.
 
     Parameters
     ----------
@@ -243,7 +242,7 @@ def find_problems(recording: Recording) -> tuple[ChannelProblem, ...]:
     Returns
     -------
     tuple of ChannelProblem
-        In the order of the channels; empty if nothing was found. Fewer than 64 samples are judged for "dead" only.
+        In the order of the channels; empty if nothing was found. Fewer than 64 samples are only checked for "dead".
     """
     problems: list[ChannelProblem] = []
     spreads = {c.name: float(_standard_deviation(read_only(recording.values(c.name)))) for c in recording.channels}
@@ -259,7 +258,7 @@ def find_problems(recording: Recording) -> tuple[ChannelProblem, ...]:
 
 @njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz"})  # type: ignore[untyped-decorator,unused-ignore]
 def _standard_deviation(x):  # type: ignore[no-untyped-def]
-    """Divisor N, in double precision."""
+    """Return the standard deviation with divisor N, in double precision."""
     total, squares = 0.0, 0.0
     for i in range(x.shape[0]):
         total += x[i]
@@ -297,10 +296,10 @@ def _dead(
     remedy = "check sensor, cable and input of this channel, and leave it out"
     if levels.n_used == 1:
         return ChannelProblem(channel.name, "dead", 1.0, f"all {len(x)} samples are {x[0]:g}", remedy)
-    if spread == 0:  # values so small that their squares vanish
+    if spread == 0:  # values so small that their squares underflow
         evidence = f"the samples differ, by {np.ptp(x):.2g} at most, too little for a standard deviation"
         return ChannelProblem(channel.name, "dead", 1.0, evidence, remedy)
-    # An open input flickers by a step or two of the converter, far below the channels beside it.
+    # An open input flickers by a step or two of the converter, far below the other channels.
     if not other_spreads or levels.n_spanned > 4 or spread > 1e-3 * float(np.median(other_spreads)):
         return None
     evidence = (
@@ -311,18 +310,18 @@ def _dead(
 
 
 def _clipped(channel: Channel, x: FloatArray, levels: SampleLevels) -> ChannelProblem | None:
-    # Parts that come apart carry no force, tooth flanks in their play among them.
+    # Parts that separate carry no force, e.g. tooth flanks in their backlash.
     clipping = find_clipping(x, levels, rest=0.0 if channel.quantity == "force" else None)
     if clipping is None:
         return None
     share = clipping.n_samples / len(x)
     evidence = f"{clipping.n_samples} samples ({100 * share:.2g} %) are held at {clipping.place}"
-    remedy = "measure again with a larger input range; peak, crest factor and kurtosis are not to be trusted"
+    remedy = "measure again with a larger input range; peak, crest factor and kurtosis are not reliable"
     return ChannelProblem(channel.name, "clipped", share, evidence, remedy)
 
 
 SHORTEST_STUCK = 16
-"""Equal samples in a row."""
+"""Minimum number of equal samples in a row."""
 
 
 def _stuck(channel: Channel, x: FloatArray, levels: SampleLevels) -> ChannelProblem | None:
@@ -348,7 +347,7 @@ def _stuck(channel: Channel, x: FloatArray, levels: SampleLevels) -> ChannelProb
         f"{counted(int(long.sum()), 'run')} of equal samples, the longest {lengths[longest]} samples "
         f"from sample {starts[longest]} at {x[starts[longest]]:g}; 99 % of the runs are no longer than {usual:.0f}"
     )
-    remedy = "check for dropouts of the measurement chain or a machine at rest, and cut these parts out"
+    remedy = "check for dropouts of the measurement chain or a machine at standstill, and cut these parts out"
     return ChannelProblem(channel.name, "stuck", share, evidence, remedy)
 
 
@@ -358,21 +357,23 @@ def _offset(channel: Channel, x: FloatArray, spread: float) -> ChannelProblem | 
         return None
     evidence = f"the mean, {mean:.4g} {channel.unit}".rstrip() + f", is {abs(mean) / spread:.3g} times the rms about it"
     return ChannelProblem(
-        channel.name, "offset", 1.0, evidence, "check bias and coupling; only the part about it counts"
+        channel.name, "offset", 1.0, evidence, "check bias and coupling; only the part about the mean counts"
     )
 
 
 def _quantised(channel: Channel, levels: SampleLevels) -> ChannelProblem | None:
-    # 6 bits: the noise of the rounding is then 37 dB below a full-scale sine, above many a sideband.
+    # 6 bits: rounding noise is then 37 dB below a full-scale sine, but above many sidebands.
     if levels.step is None or levels.n_spanned >= 64:
         return None
-    evidence = f"only {levels.n_spanned} levels of {levels.step:.3g} are in use ({np.log2(levels.n_spanned):.1f} bits)"
-    remedy = "measure again with a smaller input range: weak sidebands drown in the rounding"
+    evidence = (
+        f"the values span only {levels.n_spanned} levels of {levels.step:.3g} ({np.log2(levels.n_spanned):.1f} bits)"
+    )
+    remedy = "measure again with a smaller input range: weak sidebands are lost in the rounding"
     return ChannelProblem(channel.name, "quantised", 1.0, evidence, remedy)
 
 
 # --------------------
-# What a record looks like that was scaled, cut, turned or disturbed on its way.
+# Signs that a record was scaled, cut, reversed or disturbed.
 # --------------------
 
 
@@ -380,14 +381,14 @@ N_BLOCKS = 64
 STEP_DB = 4.0
 MIN_SAMPLES_OF_TEST = 4096
 MAINS_HZ = (50.0, 60.0)
-"""Frequencies of electric supplies."""
+"""Mains frequencies."""
 MAINS_WANDER = 1e-3
-"""How far a line that is called hum may be from a supply's multiple: half of `gearsig.prepared.MAINS_TOLERANCE`.
+"""Largest relative distance of hum from a multiple of the mains: half of `gearsig.prepared.MAINS_TOLERANCE`.
 
-This one accuses a channel or names a line, and a motor of little slip turns close by; that one only leaves lines out of
-a search, where one that is missed does harm."""
+This tolerance is used to report a channel or name a line, and a motor with little slip turns close by; the other only
+excludes lines from a search, where a missed one does harm."""
 LONGEST_TURNED = 1 << 18
-"""Samples in which the direction of time is looked for."""
+"""Maximum number of samples in which the direction of time is examined."""
 
 
 def _further_problems(channel: Channel, x: FloatArray, rate_hz: float) -> Iterator[ChannelProblem]:
@@ -403,7 +404,7 @@ def _wrapped(channel: Channel, x: FloatArray) -> ChannelProblem | None:
     if n:
         evidence = f"{n} steps from one end of the range, {low:.4g} to {high:.4g}, to the other, and the slope goes on"
     elif n := _n_off_by_the_range(x, low, high):
-        evidence = f"{n} samples are off by the range, {low:.4g} to {high:.4g}, from what those beside them say"
+        evidence = f"{n} samples differ by the range, {low:.4g} to {high:.4g}, from what their neighbours predict"
     else:
         return None
     remedy = "export again in a wider number format; nothing can be read from this channel"
@@ -411,11 +412,11 @@ def _wrapped(channel: Channel, x: FloatArray) -> ChannelProblem | None:
 
 
 def _n_steps_that_go_on(x: FloatArray, low: float, high: float) -> int:
-    """Count steps from end to end of the range where many samples overflowed; 0 where they may be the signal's own."""
+    """Count steps from end to end of the range if many samples overflowed; 0 if they may be the signal's own."""
     span = high - low
     jumps = np.abs(np.diff(x)) > 0.75 * span
     n = int(np.count_nonzero(jumps))
-    # A square wave jumps as well, but rests in between; noise hardly ever goes from end to end.
+    # A square wave jumps too, but rests in between; noise hardly ever goes from end to end.
     if n < 5 or n > 0.2 * len(x):
         return 0
     starts = np.flatnonzero(jumps)[1:-1]
@@ -426,14 +427,14 @@ def _n_steps_that_go_on(x: FloatArray, low: float, high: float) -> int:
     turned = np.sign(x[starts + 1] - x[starts])
     goes_on = (np.sign(before) == -turned) & (np.sign(after) == -turned)
     neighbour_steps = np.maximum(np.abs(before), np.abs(after)) / span
-    # Values that wrap around fill the range up to both ends; those of a natural signal thin out towards them.
+    # Wrapped values fill the range up to both ends; those of a natural signal thin out towards them.
     place = (x - low) / span
     outer, next_to = (np.count_nonzero(np.abs(place - 0.5) > 0.5 - edge) for edge in (0.01, 0.05))
     held = np.count_nonzero((x == low) | (x == high))
-    # More of them at the ends, or at one value there, were cut.
+    # With more of them at the ends, or at one value there, the signal was clipped.
     if not 0.08 * next_to <= outer <= 0.5 * next_to or outer < 20 or held > 0.5 * outer:
         return 0
-    # Uniform noise fills it evenly, and goes from end to end as well.
+    # Uniform noise fills the range evenly, and goes from end to end too.
     is_even = np.median(neighbour_steps) > 0.6 and np.count_nonzero(np.abs(place - 0.5) < 0.05) < 3 * next_to
     if np.mean(goes_on) < 0.6 or np.median(neighbour_steps) < 0.02 or is_even:
         return 0
@@ -446,7 +447,7 @@ def _n_steps_that_go_on(x: FloatArray, low: float, high: float) -> int:
 
 
 ORDER, LONGEST_RUN, MIN_OFF, MOST_OFF, MOST_NEAR_ENDS = 24, 4, 3, 1000, 50_000
-"""Of linear prediction; samples that overflow in a row; runs that are off; samples that may be."""
+"""Of linear prediction; overflowed samples in a row; overflowed samples; candidates; samples near the ends."""
 
 EXPECTED_STEP = 0.07
 """Median prediction error of steps from end to end, over the range, below which they are the signal's own: 0.001 to
@@ -455,14 +456,14 @@ measured and simulated channels."""
 
 
 def _n_off_by_the_range(x: FloatArray, low: float, high: float) -> int:
-    r"""Count samples that overflowed where they are few; 0 where they may be the signal's own.
+    r"""Count overflowed samples if they are few; 0 if they may be the signal's own.
 
-    Linear prediction from both sides tells how far a run of L samples is off: :math:`g = \sum e t / \sum t^2` with the
-    error :math:`e = a * x` of one-sided prediction and that of such a run, :math:`t = a * 1_L`. One that overflowed is
-    off by the range, others of 43 measured and simulated channels by a third at most.
+    Linear prediction from both sides estimates how far a run of L samples is off: :math:`g = \sum e t / \sum t^2` with
+    the error :math:`e = a * x` of one-sided prediction and that of such a run, :math:`t = a * 1_L`. An overflowed run
+    is off by the range, other runs of 43 measured and simulated channels by at most a third of it.
     """
     span = high - low
-    # An integer's range lies about zero; clicks to one side, of a bad contact, make one that does not.
+    # An integer's range is centred on zero; one-sided clicks of a bad contact give a range that is not.
     if abs(low + high) > 0.1 * span or np.count_nonzero(np.abs(np.diff(x)) > 0.5 * span) < MIN_OFF:
         return 0
     starts = np.flatnonzero(np.abs(x) > 0.35 * span)
@@ -485,7 +486,7 @@ def _n_off_by_the_range(x: FloatArray, low: float, high: float) -> int:
             break
         if len(found) > MOST_OFF:
             return 0
-        # One that is off shows also where its neighbours are looked at: the clearest within reach goes first.
+        # A run that is off also affects the estimates of its neighbours: the clearest within reach is corrected first.
         best = clear[found].max(axis=1)
         near = np.abs(starts[found, None] - starts[found]) <= ORDER
         for i in found[best == np.where(near, best, 0.0).max(axis=1)]:
@@ -502,7 +503,7 @@ def _prediction_error_filter(x: FloatArray) -> FloatArray:
 
     size = next_fast_len(len(x) + ORDER, real=True)
     correlation = irfft(np.abs(rfft(x - x.mean(), size)) ** 2, size)[: ORDER + 1]
-    correlation[0] *= 1.0 + 1e-6  # noise of -60 dB: tones alone could be predicted for ever
+    correlation[0] *= 1.0 + 1e-6  # noise of -60 dB: pure tones could be predicted without error
     return np.concatenate(([1.0], -solve_toeplitz(correlation[:-1], correlation[1:])))
 
 
@@ -516,7 +517,7 @@ def _stepped(channel: Channel, x: FloatArray) -> ChannelProblem | None:
         return None
     level_db = 10.0 * np.log10(power)
     cuts = range(8, N_BLOCKS - 7)
-    # One block may hold the step itself; what is left on both sides is steady.
+    # A block may hold the step itself; what remains on both sides is steady.
     sides = [(level_db[: k - 1], level_db[k + 1 :]) for k in cuts]
     steps = np.array([after.mean() - before.mean() for before, after in sides])
     best = int(np.argmax(np.abs(steps)))
@@ -527,18 +528,18 @@ def _stepped(channel: Channel, x: FloatArray) -> ChannelProblem | None:
         return None
     place = 100 * cuts[best] / N_BLOCKS
     evidence = f"the level changes by {signed(step)} dB at {place:.0f} % of the record, and is steady"
-    remedy = "check gain, mounting and load, and analyse the parts before and after by themselves"
+    remedy = "check gain, mounting and load, and analyse the parts before and after separately"
     return ChannelProblem(channel.name, "stepped", 1.0, f"{evidence} before and after ({scatter:.1f} dB)", remedy)
 
 
 LASTS_S, CLEAR_LOG_RATIO, CLEAR_ERRORS, MIN_IMPACTS = 4e-3, 0.25, 8.0, 30
-"""Of impacts: time in which they ring down; ln of the energies after and before, and its standard errors, from which
-they show the direction of time; how many of them. Of 26 measured channels the lowest is -0.03 (1 standard error), of
-290 of drawn motors and gearboxes -0.17 (3); six measured beside damaged races lie above 0.3 (8 or more)."""
+"""For impacts: time in which they ring down; minimum ln(energy after / energy before), also in standard errors, that
+shows the direction of time; minimum number of impacts. The lowest ratio of 26 measured channels is -0.03 (1 standard
+error), of 290 random motors and gearboxes -0.17 (3); six measured beside damaged races exceed 0.3 (8 or more)."""
 
 
 def _reversed(channel: Channel, x: FloatArray, rate_hz: float) -> ChannelProblem | None:
-    """Look for impacts that swell and end suddenly: by the energy beside their peaks, then by the envelope's steps."""
+    """Look for impacts that swell and end suddenly, by the energy beside their peaks, then by the envelope's steps."""
     from scipy.fft import rfft
 
     top_hz = 0.45 * rate_hz
@@ -550,10 +551,10 @@ def _reversed(channel: Channel, x: FloatArray, rate_hz: float) -> ChannelProblem
     if ratio > CLEAR_LOG_RATIO and errors > CLEAR_ERRORS:
         return None
     bands, skews, scores = _skewness_of_steps(spectrum, frequency, rate_hz, top_hz)
-    # Time runs one way in all bands: one that rings down speaks against another. Strikes that overlap beat and may rise
-    # faster than they fall in one band: of some 25 measured channels the lowest skewness is -0.5 (11 standard errors),
-    # beside 0.5 in the next band; of those turned round whose energies show it, the highest is 0.6 (12). Where teeth
-    # separate and strike again, the first strike comes before the peak, but either rings down: 3 (19).
+    # Time runs the same way in all bands: one that rings down is evidence against reversal. Overlapping impacts beat
+    # and may fall faster than they rise in one band: the lowest skewness of some 25 measured channels is -0.5 (11
+    # standard errors), beside 0.5 in the next band; the highest of reversed ones whose energies show it is 0.6 (12).
+    # Where teeth separate and strike again, the first strike comes before the peak, but both ring down: 3 (19).
     turned = np.flatnonzero((skews < -1.0) & (scores < -4.0))
     if ratio < -CLEAR_LOG_RATIO and errors < -CLEAR_ERRORS and not np.any((skews > 1.0) & (scores > 8.0)):
         evidence = (
@@ -568,17 +569,18 @@ def _reversed(channel: Channel, x: FloatArray, rate_hz: float) -> ChannelProblem
         )
     else:
         return None
-    remedy = "check the order of the samples: turned round, teeth are counted backwards, and speeds fall that rose"
+    remedy = "check the order of the samples: if it is reversed, teeth are counted backwards and rising speeds fall"
     return ChannelProblem(channel.name, "reversed", 1.0, evidence, remedy)
 
 
 def _energy_after_peaks(
     spectrum: NDArray[np.complexfloating], frequency: FloatArray, top_hz: float, n_ring: int
 ) -> tuple[float, float]:
-    """Return the mean of ln(energy after / energy before) the impacts' peaks, and over its standard error; 0 without.
+    """Return the mean ln(energy after / energy before) of the impacts' peaks, and its ratio to its standard error.
 
-    Peaks are the highest within four times the time of ringing, and eight times the mean power. A mode that is struck
-    rises within a part of that time and falls through all of it; two that beat may rise more slowly at first.
+    A peak is the highest value within four times the ring-down time, and eight times the mean power; with too few, both
+    are 0. A mode that is struck rises within a part of that time and decays through all of it; two beating modes may
+    rise more slowly at first.
     """
     from scipy.ndimage import maximum_filter1d
 
@@ -600,8 +602,8 @@ def _skewness_of_steps(
 ) -> tuple[list[tuple[float, float]], FloatArray, FloatArray]:
     r"""Return four bands above 300 Hz, the skewness of the envelope's steps in each, and over its standard error.
 
-    :math:`E[d^3] / E[d^2]^{3/2}` changes its sign with the direction of time; of resonances that are struck it is
-    positive. Its standard error is that of 32 parts.
+    :math:`E[d^3] / E[d^2]^{3/2}` changes sign with the direction of time; it is positive for struck resonances. Its
+    standard error follows from 32 parts.
     """
     edges = [300.0 * (top_hz / 300.0) ** (i / 4) for i in range(5)]
     bands = list(pairwise(edges))
@@ -610,7 +612,7 @@ def _skewness_of_steps(
     for i, (low, high) in enumerate(bands):
         power = _power_within(spectrum, frequency, low, high)
         steps = np.diff(np.sqrt(power[:: max(1, int(rate_hz / (high - low)))]))
-        # Too few, or rounding errors of a tone elsewhere, as a simulation has them.
+        # Too few steps, or rounding errors of a tone elsewhere, as in a simulation.
         if len(steps) < 32 or float(power.mean()) <= 1e-10 * total:
             continue
         parts = steps[: len(steps) // 32 * 32].reshape(32, -1)
@@ -651,7 +653,7 @@ def _hum(channel: Channel, x: FloatArray, rate_hz: float) -> ChannelProblem | No
         multiple = round(line_hz / mains_hz)
         deviation = abs(line_hz / (max(multiple, 1) * mains_hz) - 1)
         if 1 <= multiple <= 6 and deviation < MAINS_WANDER and share > 0.5 and step_hz < 2.0:
-            evidence = f"{percent(share)} of the power stands at {line_hz:.5g} Hz, a multiple of {mains_hz:.0f} Hz"
-            remedy = "check shield and earthing, if no shaft or mesh turns there; what is weaker drowns in it"
+            evidence = f"{percent(share)} of the power is at {line_hz:.5g} Hz, a multiple of {mains_hz:.0f} Hz"
+            remedy = "check shielding and earthing, unless a shaft or mesh is there; the hum masks weaker components"
             return ChannelProblem(channel.name, "hum", share, evidence, remedy, line_hz)
     return None

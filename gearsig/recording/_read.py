@@ -1,4 +1,4 @@
-"""Reads and writes recordings in any known format, and reads pulse times."""
+"""Read and write recordings in any known format, and read pulse times."""
 
 from __future__ import annotations
 
@@ -74,31 +74,31 @@ def read_recording(
     Parameters
     ----------
     path : str or Path
-        "runs.mat#2" is the second of several runs that stand side by side in one file: column 2 beside the time, as a
-        recording of one channel, "vibration". So one run can be the reference of another. Where names say by number
-        which measurement a channel is of ("X098_DE_time", "X099_DE_time"), "#98" is that one.
+        "runs.mat#2" is the second of several runs stored side by side in one file: column 2, not counting the time, as
+        a recording with one channel, "vibration". Thus one run can be the reference of another. Where channel names
+        contain the number of their measurement ("X098_DE_time", "X099_DE_time"), "#98" selects that measurement.
     rig : Rig, optional
-        Its sensors give the channels quantity, unit, scale and position; its speed and sampling rate are used where
-        the file has none.
+        Its sensors give the channels quantity, unit, scale and position; its speed and sampling rate are used if the
+        file has none.
     sampling_rate_hz : float, optional
-        Overrides the file's. A contradiction of more than 0.1 % is told in `Recording.warnings`.
+        Overrides the file's. A difference of more than 0.1 % is reported in `Recording.warnings`.
     speed : SpeedSource, optional
         Overrides the file's and the rig's.
     part : slice, optional
-        These samples of each channel alone, of HDF5, Parquet, TDMS or WAV: nothing else is decoded, and no hash is
-        taken. Pulse times that the file states are those within it, from its beginning.
+        Only these samples of each channel, for HDF5, Parquet, TDMS or WAV: nothing else is decoded, and no hash is
+        computed. Pulse times in the file are limited to this part and counted from its beginning.
 
     Returns
     -------
     Recording
-        Samples in float32 where the file's numbers fit it exactly, else in float64; what the reader noticed in
-        `warnings`; file name (without its folder) and SHA-256 in `provenance`.
+        Samples in float32 if it holds the file's numbers exactly, else in float64; what the reader noticed in
+        `warnings`; file name (without folder) and SHA-256 in `provenance`.
 
     Raises
     ------
     InputError
         If the file is missing, empty, damaged, too large for the memory, of another kind than its extension says, or
-        holds columns that make no recording; if no sampling rate is known.
+        holds columns that do not form a recording; or if no sampling rate is known.
     """
     check_rig(rig)
     check_speed_source(speed)
@@ -112,19 +112,19 @@ def read_recording(
         else:
             table = one_measurement(table, None, file.name)
         sha256 = sha256_of(file) if part is None else ""
-        if part is None:  # of a part, pulses may not show
+        if part is None:  # a part may hold no pulses
             table = with_pulse_channels(table)
         recording = assemble(table, name, sha256, rig=rig, sampling_rate_hz=sampling_rate_hz, speed=speed)
         return recording if part is None else _with_pulses_within(recording, part.start or 0)
 
 
 def _as_path(path: str | Path) -> Path:
-    """Return a path given as such or as text."""
+    """Return as a path what was given as a path or as text."""
     return Path(instance_of(path, str | PathLike, "path", remedy="name one file"))
 
 
 def n_samples_of(path: str | Path) -> int | None:
-    """Return how many samples per channel a file holds, without decoding them; None where it is only read whole.
+    """Return the number of samples per channel of a file without decoding them; None if it can only be read whole.
 
     Parameters
     ----------
@@ -142,19 +142,19 @@ def n_samples_of(path: str | Path) -> int | None:
     with foreign_errors(file_label(file), file_format.name):
         try:
             return file_format.length(file)
-        except ValueError:  # samples of 24 bits cannot be mapped
+        except ValueError:  # 24-bit samples cannot be memory-mapped
             return None
 
 
 def _part_reader(file_format: FileFormat, where: str) -> Callable[[Path, slice], RawTable]:
     if file_format.read_part is None:
         parted = ", ".join(f.name for f in FORMATS if f.read_part is not None)
-        raise InputError(f"{file_format.name} is only read whole", where=where, allowed=parted, remedy="convert it")
+        raise InputError(f"{file_format.name} can only be read whole", where=where, allowed=parted, remedy="convert it")
     return file_format.read_part
 
 
 def _with_pulses_within(recording: Recording, first: int) -> Recording:
-    """Shift pulse times of the whole record to a part of it."""
+    """Limit the pulse times of the whole record to a part of it, and shift them."""
     speed, start_s = recording.speed, first / recording.sampling_rate_hz
     if not isinstance(speed, PulseTimes):
         return recording
@@ -163,7 +163,7 @@ def _with_pulses_within(recording: Recording, first: int) -> Recording:
 
 
 def without_condition(path: Path) -> tuple[Path, int | None]:
-    """Return the file and the run in it that "runs.mat#2" names; a file that is really called so is that file."""
+    """Return the file and run that "runs.mat#2" names; if a file has exactly that name, return it and None."""
     name, sign, number = path.name.rpartition("#")
     if not (sign and name and number.isascii() and number.isdigit()):
         return path, None
@@ -174,7 +174,7 @@ def without_condition(path: Path) -> tuple[Path, int | None]:
 
 
 def sha256_of(path: Path) -> str:
-    """Return the hash of a file's bytes, read in chunks."""
+    """Return the SHA-256 of a file's bytes in hexadecimal digits, read in chunks."""
     digest = hashlib.sha256()
     with path.open("rb") as file:
         while chunk := file.read(CHUNK_BYTES):
@@ -183,15 +183,15 @@ def sha256_of(path: Path) -> str:
 
 
 FORMAT_OF_EXTENSION = {ending: file_format for file_format in FORMATS for ending in file_format.endings}
-"""What the extension promises."""
+"""Extension → format that it promises."""
 
 FORMAT_NAMES = f"{', '.join(f.name for f in FORMATS[:-1])} or {FORMATS[-1].name}"
-"""What users are told, in one phrase."""
+"""All formats in one phrase, for messages."""
 
 ALLOWED_EXTENSIONS = " ".join(FORMAT_OF_EXTENSION) + ", text also with .gz"
 
 
-# What is no recording, so that the error can name it.
+# Content that is not a recording, so that the error can name it.
 _FOREIGN = (
     (b"TDSh", "a TDMS index without its data"),
     (b"\x93NUMPY", "a NumPy array file"),
@@ -215,7 +215,7 @@ _MARKUP = re.compile(rb"\A\s*<(?:!doctype|html|\?xml|svg|script)", re.IGNORECASE
 _EXPORTS = dict.fromkeys(
     (".dxd", ".dxz", ".d7d", ".d7z"), "only Dewesoft reads its own files: export as MAT, MF4, HDF5, UFF58 or text"
 )
-"""Endings of programs' own files → what to do."""
+"""Extensions of proprietary files → what to do."""
 
 
 def identify(path: Path) -> FileFormat:
@@ -224,7 +224,7 @@ def identify(path: Path) -> FileFormat:
     Raises
     ------
     InputError
-        If there is no such file, it is empty or no regular file, its extension is unknown, or its content is of
+        If there is no such file, it is empty or not a regular file, its extension is unknown, or its content is of
         another kind than the extension says.
     """
     try:
@@ -282,7 +282,7 @@ def identify(path: Path) -> FileFormat:
 
 
 def is_ending(suffix: str) -> bool:
-    """Whether a suffix says of what format a file is: digits, as of a name that is a date, say nothing.
+    """Whether a suffix indicates the format of a file: digits, as at the end of a date, do not.
 
     Examples
     --------
@@ -293,7 +293,7 @@ def is_ending(suffix: str) -> bool:
 
 
 def _columns_hint(file: Path) -> str:
-    """Say which runs a file holds, where its name was given with "#" and no number of one."""
+    """Return a remedy that lists the runs of a file, for a name with "#" but no valid run number."""
     try:
         file_format = identify(file)
         with foreign_errors(file.name, file_format.name):
@@ -314,7 +314,7 @@ def content_kind(head: bytes) -> str:
     if _MARKUP.match(head):
         return "HTML or XML"
     text, *binary = FORMATS
-    foreign = (kind for start, kind in _FOREIGN if head.startswith(start))  # after formats that are kept in archives
+    foreign = (kind for start, kind in _FOREIGN if head.startswith(start))  # after known formats, which may be archives
     kind = next(filter(None, (*(f.sniff(head) for f in reversed(binary)), *foreign, text.sniff(head))), "")
     if not kind and b"\0" in head and b"\0" not in head.rstrip(b"\0"):
         return "text followed by zero bytes"
@@ -322,17 +322,17 @@ def content_kind(head: bytes) -> str:
 
 
 WRITERS = {ending: f.write for f in FORMATS if f.write is not None for ending in f.written_endings}
-"""Ending → function that writes a recording."""
+"""Extension → function that writes a recording."""
 
 
 def write_recording(recording: Recording, path: str | Path) -> Path:
-    """Write a recording in the format of the extension, so that `read_recording` returns the same.
+    """Write a recording in the format of the extension, so that `read_recording` returns it again.
 
     Every format keeps sampling rate, names, quantities, units, positions, the recording's own speed source, truth,
     warnings and history. What is lost:
 
-    - all: the rig, which is a file of its own, and with it a speed source that only the rig has; the hash and reader
-      of the file that the recording came from. Sensor scales that were applied stay applied.
+    - All formats: the rig, which is a separate file, and with it a speed source that only the rig has; the hash and
+      reader of the file that the recording came from. Sensor scales that were applied stay applied.
     - WAV: float64 becomes float32, and other software sees the rate rounded to whole hertz.
     - Other software sees samples, names and rate, but quantities, positions, speed source and truth only as JSON.
 
@@ -351,7 +351,7 @@ def write_recording(recording: Recording, path: str | Path) -> Path:
     ------
     InputError
         If the extension is not known, the folder is missing, or the format cannot hold the recording. Nothing is
-        written then: the file is written beside its place and moved there when complete.
+        written then: the file is written under a temporary name and renamed when complete.
     """
     check_recording(recording)
     target = recording_target(path)
@@ -366,12 +366,12 @@ def write_recording(recording: Recording, path: str | Path) -> Path:
     unfinished = Path(name)
     try:
         writer(recording, unfinished)
-        mask = os.umask(0)  # of the process, which temporary files do not follow
+        mask = os.umask(0)  # the process's mask, which temporary files ignore
         os.umask(mask)
         unfinished.chmod(0o666 & ~mask)
         unfinished.replace(target)
     except OSError as error:
-        # What libraries say goes on with addresses in memory.
+        # Messages of libraries also contain memory addresses.
         reason = os.strerror(error.errno) if error.errno else error
         raise InputError(
             f"cannot be written ({reason})",
@@ -384,7 +384,7 @@ def write_recording(recording: Recording, path: str | Path) -> Path:
 
 
 def recording_target(path: str | Path) -> Path:
-    """Return the path of a recording that is to be written, after checking that `write_recording` takes it.
+    """Return the path of a recording to be written, after checking that `write_recording` accepts it.
 
     Raises
     ------
@@ -420,13 +420,13 @@ def read_pulse_times(path: str | Path, pulses_per_revolution: int = 1, shaft: st
     Returns
     -------
     PulseTimes
-        On the time axis of the recording that it belongs to.
+        On the time axis of the recording that they belong to.
 
     Raises
     ------
     InputError
-        If there are fewer than two pulses, more than one column, or a time is not after the one before it; the line
-        is named.
+        If there are fewer than two pulses or more than one column, or if a time is not later than the one before; the
+        error names the line.
     """
     count(pulses_per_revolution, "pulses_per_revolution")
     file = _as_path(path)
@@ -451,7 +451,7 @@ def _pulse_times_s(file: Path) -> FloatArray:
     layout = find_layout(data, where)
     if layout.n_columns != 1:
         raise InputError(
-            f"has {layout.n_columns} columns", where=where, allowed="one column of times", remedy="keep the times alone"
+            f"has {layout.n_columns} columns", where=where, allowed="one column of times", remedy="keep only the times"
         )
     (times,) = parse_rows(data, layout, ("time",), where)
     bad = np.flatnonzero(~np.isfinite(times))
@@ -496,7 +496,7 @@ def _pulse_times_s(file: Path) -> FloatArray:
 
 
 PULSE_TIMES = (
-    "times of tachometer pulses go with the recording that they belong to: gearsig analyze RECORDING --tach-times FILE "
+    "tachometer pulse times are given along with their recording: gearsig analyze RECORDING --tach-times FILE "
     "(in Python speed=gearsig.recording.read_pulse_times(path))"
 )
 
@@ -510,7 +510,7 @@ def assemble(
     sampling_rate_hz: float | None = None,
     speed: SpeedSource | None = None,
 ) -> Recording:
-    """Return the recording that a file's table stands for.
+    """Return the recording that a file's table describes.
 
     Parameters
     ----------
@@ -524,8 +524,8 @@ def assemble(
     Raises
     ------
     InputError
-        On columns of unequal length, names that occur twice, text, complex numbers, NaN, a time column that is not
-        uniform, or if no sampling rate is known.
+        If columns differ in length, names occur twice, values are text, complex, NaN or infinite, the time column is
+        not uniform, or no sampling rate is known.
     """
     table = _checked(table, source)
     rate_hz, rate_warnings = _sampling_rate(table, source, rig, sampling_rate_hz)
@@ -551,7 +551,7 @@ def assemble(
 
 
 def _with_quantity_of_speed(recording: Recording) -> Recording:
-    """Return the recording with the quantity of the channel that tells the speed, where nothing else tells it."""
+    """Return the recording with the quantity of the speed source's channel set, if it was unknown."""
     quantities = {TachometerChannel: "tachometer", EncoderChannel: "encoder", SpeedChannel: "rotational_speed"}
     source = recording.speed_source
     quantity, name = quantities.get(type(source), ""), getattr(source, "channel", "")
@@ -562,7 +562,7 @@ def _with_quantity_of_speed(recording: Recording) -> Recording:
 
 
 def _checked(table: RawTable, source: str) -> RawTable:
-    """Return the table with a column that is named like a time moved out of the channels; refuse what is no signal."""
+    """Return the table with a time column moved out of the channels; refuse columns that are not signals."""
     counts = Counter(c.name for c in (*table.columns, *([table.time] if table.time else [])))
     doubled = [name for name, n in counts.items() if n > 1]
     if doubled:
@@ -619,7 +619,7 @@ def _checked(table: RawTable, source: str) -> RawTable:
 
 
 def _time_of_rate(table: RawTable) -> RawColumn | None:
-    """Return a first column, whatever it is called, that rises by the sampling interval that is stated."""
+    """Return the first column, whatever its name, if it rises by the stated sampling interval."""
     first, rate_hz = table.columns[0], table.sampling_rate_hz
     if len(table.columns) < 2 or rate_hz is None or first.unit or not rises(first.values):
         return None
@@ -631,7 +631,7 @@ def _time_of_rate(table: RawTable) -> RawColumn | None:
 def _sampling_rate(
     table: RawTable, source: str, rig: Rig | None, explicit_hz: float | None
 ) -> tuple[float, tuple[str, ...]]:
-    """Return the rate by precedence (argument, file, rig) and what contradicts it."""
+    """Return the rate in Hz by precedence (argument, file, rig), and warnings."""
 
     def differ(a: float, b: float) -> bool:
         return abs(a - b) > 1e-3 * abs(b)
@@ -648,11 +648,11 @@ def _sampling_rate(
         positive(file_hz, f"{source}: sampling rate in the file", "Hz", remedy="correct it there")
     if file_hz is None and len(table.columns) == 1 and _looks_like_times(table.columns[0]):
         raise InputError(
-            f"the only column, {table.columns[0].name!r}, rises from each value to the next, as times of pulses do and "
-            "no vibration",
+            f"the only column, {table.columns[0].name!r}, rises from each value to the next, as pulse times do and "
+            "vibration does not",
             where=source,
             allowed="a signal over time",
-            remedy=f"{PULSE_TIMES}; if it is a signal, name its unit in a header, as angle [rad], and give --fs",
+            remedy=f"{PULSE_TIMES}; if it is a signal, state its unit in a header, e.g. angle [rad], and give --fs",
         )
     if explicit_hz is not None:
         chosen_hz = positive(explicit_hz, f"{source}: sampling rate given", "Hz", remedy="give --fs above zero")
@@ -676,9 +676,10 @@ def _sampling_rate(
 
 
 def _looks_like_times(column: RawColumn) -> bool:
-    """Whether numbers of no known quantity increase from each to the next, from zero or later on.
+    """Whether values of no known quantity start at zero or above and always increase.
 
-    As times of pulses do and no vibration: of n noise values one order in n! increases, of ten one in 3.6 million.
+    Pulse times do so, vibration does not: of the orders of n noise values one in n! increases, one in 3.6 million for
+    ten values.
     """
     values = column.values.astype(np.float64)
     unknown = (column.quantity or quantity_of(column.name, column.unit)) == "unknown"
@@ -686,14 +687,14 @@ def _looks_like_times(column: RawColumn) -> bool:
 
 
 def _stack(table: RawTable, source: str) -> FloatArray:
-    """Return (channel, time) in float32 where that loses nothing, else in float64."""
+    """Return the samples (channel, time) in float32 if that loses nothing, else in float64."""
     kinds = {c.values.dtype for c in table.columns}
     dtype = np.float32 if all(np.can_cast(kind, np.float32, "safe") for kind in kinds) else np.float64
     n_samples = len(table.columns[0].values)
     check_memory(n_samples * len(table.columns) * np.dtype(dtype).itemsize, source)
     samples = np.empty((len(table.columns), n_samples), dtype)
     for row, column in zip(samples, table.columns, strict=True):
-        with np.errstate(invalid="ignore"):  # a signalling NaN, which is found in the next line
+        with np.errstate(invalid="ignore"):  # a signalling NaN, which the next line finds
             row[:] = column.values
         bad = np.flatnonzero(~np.isfinite(row))
         if len(bad):
@@ -710,7 +711,7 @@ def _stack(table: RawTable, source: str) -> FloatArray:
 def _speed(
     table: RawTable, channels: tuple[Channel, ...], rig: Rig | None, speed: SpeedSource | None
 ) -> tuple[SpeedSource | None, tuple[str, ...]]:
-    """Return the speed source: the argument's, what measures it, what the file states, what the rig states."""
+    """Return the speed source by precedence (argument, measured, stated in the file or the rig), and warnings."""
     if speed is not None or table.is_own_layout:
         return (table.speed, ()) if speed is None else (speed, _contradicted(speed, table, rig))
     known = None if rig is None else rig.speed
@@ -736,10 +737,10 @@ def _speed(
 
 
 def _unused_pulses(table: RawTable, channels: tuple[Channel, ...]) -> Iterator[str]:
-    """Say how the speed is taken from pulses that no rig file names: how many make a revolution is not known."""
+    """Warn of pulses that no rig file names, and say how to use them: the pulses per revolution are not known."""
     for name in (*table.pulse_times_s, *(c.name for c in channels if c.quantity == "tachometer")):
         yield (
-            f'{name!r} holds pulses, as of a tachometer: [speed] with source = "tachometer", channel = "{name}" and '
+            f'{name!r} holds pulses like a tachometer: [speed] with source = "tachometer", channel = "{name}" and '
             "pulses_per_revolution = … in a rig file takes the speed from them"
         )
 
@@ -748,7 +749,7 @@ _SPEED_IN_NAME = re.compile(r"(?<![A-Za-z0-9.,])(\d{2,6}(?:[.,]\d{1,2})?)[ _-]?r
 
 
 def speed_in_name(name: str) -> float | None:
-    """Return the speed in rpm that a file's name states, None where it states none or several.
+    """Return the speed in rpm that a file name states; None if it states none or several.
 
     Examples
     --------
@@ -760,14 +761,14 @@ def speed_in_name(name: str) -> float | None:
 
 
 def _unused_name(source: str) -> Iterator[str]:
-    """Offer the speed that a name states, which nobody measured and which may be of another shaft."""
+    """Suggest the speed that a file name states; it was not measured and may be that of another shaft."""
     speed_rpm = speed_in_name(source)
     if speed_rpm is not None:
-        yield f"the file's name says {speed_rpm:g} rpm, which is not taken: --speed-rpm {speed_rpm:g} states it"
+        yield f"the file name says {speed_rpm:g} rpm, which is not used: give --speed-rpm {speed_rpm:g} to use it"
 
 
 def _contradicted(given: SpeedSource, table: RawTable, rig: Rig | None) -> tuple[str, ...]:
-    """Say what else states a constant speed, where it differs from the one that was given and taken."""
+    """Return a warning if the file or rig states another constant speed than the one given and used."""
     if not isinstance(given, ConstantSpeed):
         return ()
     stated = {"file": table.speed, "rig": None if rig is None else rig.speed}

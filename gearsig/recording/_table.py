@@ -1,4 +1,4 @@
-"""Columns as a file reader hands them over, nothing judged yet."""
+"""Columns as a file reader delivers them, and the rules that find time, rate, speed and runs among them."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class RawColumn:
     values : array, (n_samples,)
         Numbers in the file's own type.
     unit, quantity, position : str
-        Empty where the file does not say.
+        Empty if the file does not say.
     """
 
     name: str
@@ -65,20 +65,20 @@ class RawTable:
     sampling_rate_hz : float or None
         As the file states it.
     time : RawColumn or None
-        The time column where the reader already knows it.
+        The time column, if the reader already knows it.
     is_own_layout : bool
-        Whether gearsig wrote the file: then nothing is guessed from names.
+        Whether gearsig wrote the file: if so, nothing is guessed from names.
     warnings : tuple of str
     speed : SpeedSource or None
     speeds_rpm : mapping
-        Speeds that the file states, by name; more than one where it holds several measurements.
+        Speeds that the file states, by name; more than one if it holds several measurements.
     pulse_times_s : mapping
-        Times of pulses that stand beside the signals, by name.
+        Pulse times stored beside the signals, by name.
     truth : mapping or None
     history : tuple of str
-        Processing steps that were done before the file was written.
+        Processing steps done before the file was written.
     row_place : callable
-        Turns a row number into words that find it in the file, e.g. "line 17".
+        Turns a row number into its place in the file, e.g. "line 17".
     """
 
     columns: tuple[RawColumn, ...]
@@ -112,14 +112,14 @@ def seconds_per_unit(name: str, unit: str) -> float | None:
     (0.001, None, None)
     """
     plain = re.sub(r"[\s\-]+", "_", name.strip().casefold())
-    if plain not in TIME_NAMES or (name.strip() == "T" and not unit):  # a bare capital T is rather a temperature
+    if plain not in TIME_NAMES or (name.strip() == "T" and not unit):  # a bare capital T is more likely a temperature
         return None
     suffix = plain.rpartition("_")[2] if "_" in plain else ""
     return SECONDS_PER_UNIT.get(unit.strip().casefold() or (suffix if suffix in SECONDS_PER_UNIT else ""))
 
 
 def time_among(columns: Sequence[RawColumn]) -> RawColumn | None:
-    """Return the column that its name makes the time, or the first one if it rises and its unit is one of time."""
+    """Return the column named like a time, or the first one if it rises and has a unit of time; else None."""
     named = next((c for c in columns if seconds_per_unit(c.name, c.unit) is not None), None)
     if named is not None or len(columns) < 2:
         return named
@@ -128,12 +128,12 @@ def time_among(columns: Sequence[RawColumn]) -> RawColumn | None:
 
 
 def seconds_per_value(time: RawColumn) -> float:
-    """Return the factor to seconds of a column that is the time."""
+    """Return the factor from the unit of a time column to seconds."""
     return seconds_per_unit(time.name, time.unit) or SECONDS_PER_UNIT.get(time.unit.strip().casefold(), 1.0)
 
 
 def rises(values: NumberArray) -> bool:
-    """Whether numbers never fall and end above their beginning."""
+    """Whether three or more numbers never fall and end above the first."""
     is_long = values.dtype.kind in "fiu" and values.ndim == 1 and len(values) > 2
     return is_long and bool(values[-1] > values[0]) and bool(np.all(values[1:] >= values[:-1]))
 
@@ -143,7 +143,7 @@ _FREQUENCY_UNITS = ("hz", "khz", "cpm", "kcpm", "order", "orders", "ord")
 
 
 def refuse_spectrum(lines: Iterable[str] = (), where: str = "", columns: Sequence[RawColumn] = ()) -> None:
-    """Raise where an axis is one of frequency or order: by the lines above a table, or by a column that rises.
+    """Raise if an axis is frequency or order, by the lines above a table or by a first column that rises.
 
     Raises
     ------
@@ -155,13 +155,13 @@ def refuse_spectrum(lines: Iterable[str] = (), where: str = "", columns: Sequenc
         is_frequency = any(word in _FREQUENCY_UNITS or _FREQUENCY_NAME.match(word) for word in words)
         if plain_name(label) in ("xunit", "xaxisunit", "xdimension", "xunitlabel") and is_frequency:
             axis = " ".join(line.split())[:60]
-    for column in columns[:1]:  # a frequency that stands later is rather that of a drive
+    for column in columns[:1]:  # a later frequency column is more likely that of a drive
         named = _FREQUENCY_NAME.match(column.name) or column.unit.strip().casefold() in _FREQUENCY_UNITS
         if named and rises(column.values) and bool(np.all(np.diff(column.values) > 0)):
             axis = f"{column.name} ({column.unit})" if column.unit else column.name
     if axis:
         raise InputError(
-            f"holds a spectrum, no signal over time: its axis is {axis!r}",
+            f"holds a spectrum, not a signal over time: its axis is {axis!r}",
             where=where,
             allowed="the waveform, sample by sample",
             remedy="export the time waveform that the spectrum was computed from",
@@ -169,31 +169,31 @@ def refuse_spectrum(lines: Iterable[str] = (), where: str = "", columns: Sequenc
 
 
 def counts_rows(name: str) -> bool:
-    """Whether the header of a column is one of those that count the rows, or none."""
+    """Whether a column has no header, or one that is usual for a row count."""
     return plain_name(name) in ("", "index", "sample", "samples", "no", "nr", "#")
 
 
 def without_clock(
     columns: list[RawColumn], *, is_named: bool = False
 ) -> tuple[list[RawColumn], RawColumn | None, list[str]]:
-    """Take first columns that have no name of their own, and are a clock, away from the channels.
+    """Separate leading columns that are a clock or a row count, but are not named so, from the channels.
 
     Parameters
     ----------
     columns : list of RawColumn
     is_named : bool
-        Whether the first column has a name: then only a clock of hours, minutes, seconds and a fraction is looked for.
+        Whether the first column has a name: if so, only a clock of hours, minutes, seconds and a fraction is sought.
 
     Returns
     -------
     tuple
-        The other columns, the time if there is one, and what to tell the user. A column that counts the rows from 0
-        or 1 is neither signal nor time; one that rises in equal steps (within 1 %) is the time in seconds.
+        The other columns, the time or None, and notes for the user. A column that counts the rows from 0 or 1 is
+        neither signal nor time; one that rises in equal steps (within 1 %) is the time in seconds.
     """
     if len(columns) < 2 or len(columns[0].values) < 3:
         return columns, None, []
     if (time := _clock_of_parts(columns)) is not None:
-        return columns[4:], time, ["columns 1 to 4 are hour, minute, second and its fraction: taken for the time"]
+        return columns[4:], time, ["columns 1 to 4 are hour, minute, second and its fraction: taken as the time"]
     first = columns[0]
     if first.values.dtype.kind not in "fiu" or is_named:
         return columns, None, []
@@ -209,16 +209,16 @@ def without_clock(
                 allowed="the waveform, sample by sample",
                 remedy="export the time waveform; if column 1 is the time, say so in a header: time [s]",
             )
-        note = f"{first.name!r} has no name of its own, increases uniformly and was taken for the time in seconds"
+        note = f"{first.name!r} has no name of its own, increases uniformly and was taken as the time in seconds"
         return columns[1:], RawColumn("time", first.values, "s"), [note]
     return columns, None, []
 
 
 def _clock_of_parts(columns: Sequence[RawColumn]) -> RawColumn | None:
-    """Return the time of day in seconds from columns of hour, minute, second and fraction of a second, if these are.
+    """Return the time of day in seconds if the first columns are hour, minute, second and its fraction; else None.
 
-    The fraction is in the unit in which the whole rises evenly, to half a step: microseconds, milliseconds, hundredths
-    or tenths. It is handed over as an even grid, since such clocks are rounded.
+    The unit of the fraction is the one in which the time rises evenly, within half a step: microseconds, milliseconds,
+    hundredths or tenths. The time is returned as an even grid, since such clocks are rounded.
     """
     if len(columns) < 5 or any(c.values.dtype.kind not in "fiu" for c in columns[:4]):
         return None
@@ -237,7 +237,7 @@ def _clock_of_parts(columns: Sequence[RawColumn]) -> RawColumn | None:
 
 
 def with_pulse_channels(table: RawTable) -> RawTable:
-    """Return the table with channels of no known quantity that hold pulses as tachometers."""
+    """Return the table with pulse channels of no known quantity marked as tachometers."""
     if table.is_own_layout:
         return table
     columns = tuple(replace(c, quantity="tachometer") if _is_pulse_train(c) else c for c in table.columns)
@@ -245,10 +245,10 @@ def with_pulse_channels(table: RawTable) -> RawTable:
 
 
 def _is_pulse_train(column: RawColumn) -> bool:
-    """Whether a channel of no known quantity stays at two levels, and goes from one to the other again and again.
+    """Whether a channel of no known quantity rests at two levels and switches between them again and again.
 
-    A tenth of the samples at most is on the way, and of those that left a level most are at the other: neither impacts,
-    which fade, nor clipped vibration is like that.
+    At most a tenth of the samples lie in between, and most of those that have left one level are at the other. This
+    holds neither for impacts, which fade, nor for clipped vibration.
     """
     quantity = column.quantity or quantity_of(column.name, column.unit)
     if quantity not in ("unknown", "voltage") or column.values.dtype.kind not in "fiu" or column.values.ndim != 1:
@@ -269,18 +269,19 @@ def _is_pulse_train(column: RawColumn) -> bool:
 
 N_COHERENCE_SEGMENTS = 64
 N_COMPARED = 8
-"""Columns of which each pair is compared; a matrix without a time that has more of them is rather one of runs."""
+"""Columns compared in pairs; a matrix without a time that has more columns is more likely one of runs."""
 
 
 def ask_whether_runs(columns: list[RawColumn], where: str) -> list[str]:
-    r"""Ask whether columns without names are runs that were made one after the other, where they look like it.
+    r"""Return the question whether unnamed columns are separate runs, if they look like it; else nothing.
 
-    Sensors on one machine hear the same noise in much of the spectrum; runs at different times share steady tones at
-    most. Of n segments of independent noise the coherence exceeds c with the probability
+    Sensors on one machine share noise in much of the spectrum; runs at different times share at most steady tones.
+    For n segments of independent noise the coherence exceeds c with the probability
 
     .. math:: P(\hat\gamma^2 > c) = (1 - c)^{n - 1}.
 
-    Columns share no noise if in every pair of the first eight less than half of the spectrum is coherent at 5 %.
+    Columns share no noise if, in every pair of the first eight, less than half of the spectrum is coherent at the 5 %
+    level.
 
     Source: J. S. Bendat, A. G. Piersol, *Random Data*, 4th ed., ch. 9.
     """
@@ -301,9 +302,9 @@ def ask_whether_runs(columns: list[RawColumn], where: str) -> list[str]:
 
 
 def one_condition(table: RawTable, number: int, where: str) -> RawTable:
-    """Return the table of one of several runs that stand side by side as columns; its channel is called "vibration".
+    """Return the table of one of several runs stored side by side as columns; its channel is named "vibration".
 
-    The same name in all of them lets one be the reference of another.
+    As all runs have the same channel name, one can be the reference of another.
 
     Raises
     ------
@@ -315,7 +316,7 @@ def one_condition(table: RawTable, number: int, where: str) -> RawTable:
     columns, times = _conditions(table)
     if not 1 <= number <= len(columns):
         raise InputError(
-            f"condition {number} is asked for; beside the time there are {counted(len(columns), 'column')}",
+            f"condition {number} was requested; besides the time there are {counted(len(columns), 'column')}",
             where=where,
             allowed=", ".join(condition_numbers(table)),
             remedy="count the columns from 1, without the time",
@@ -326,24 +327,24 @@ def one_condition(table: RawTable, number: int, where: str) -> RawTable:
 
 
 def condition_numbers(table: RawTable) -> list[str]:
-    """Return what may stand behind a file's name to read one of its runs, e.g. "#1", "#2"."""
+    """Return the suffixes of a file's name that select one of its runs, e.g. "#1", "#2"."""
     numbers = sorted(_measurements(table)) or range(1, len(_conditions(table)[0]) + 1)
     shown = [f"#{number}" for number in numbers]
     return shown if len(shown) <= 8 else [*shown[:3], "…", shown[-1]]
 
 
 def _conditions(table: RawTable) -> tuple[list[RawColumn], list[RawColumn]]:
-    """Return (what was measured, times) of a table whose columns may be runs."""
+    """Return (measured columns, time columns) of a table whose columns may be runs."""
     is_time = [seconds_per_unit(c.name, c.unit) is not None for c in table.columns]
     measured = [c for c, time in zip(table.columns, is_time, strict=True) if not time]
     return measured, [c for c, time in zip(table.columns, is_time, strict=True) if time]
 
 
 def one_measurement(table: RawTable, number: int | None, where: str) -> RawTable:
-    """Return the table of one measurement, where the columns are those of several by the numbers in their names.
+    """Return the table of one measurement, if numbers in the column names show that there are several.
 
-    "X098_DE_time", "X099_DE_time", "X099RPM" are of two, 98 and 99. Without a number it is the one that the file is
-    called by, or the last: earlier ones were left over when it was saved. Its own speed goes with it.
+    "X098_DE_time", "X099_DE_time", "X099RPM" belong to two, 98 and 99. Without a number, the measurement in the file's
+    name is chosen, or else the last: earlier ones were left over when it was saved. Its speed is kept with it.
 
     Raises
     ------
@@ -372,9 +373,10 @@ def one_measurement(table: RawTable, number: int | None, where: str) -> RawTable
 
 
 def _measurements(table: RawTable) -> dict[int, list[RawColumn]]:
-    """Return the columns by the number that their names begin with; empty unless they are several measurements.
+    """Return the columns by the measurement number in their names; empty unless there are several measurements.
 
-    So they are if a speed bears such a number as well, or if their lengths differ: numbers of channels do neither.
+    There are if the name of a speed has such a number too, or if lengths differ between the numbers. Neither is the
+    case for channel numbers.
     """
     measurements: dict[int, list[RawColumn]] = {}
     for column in table.columns:
@@ -390,17 +392,17 @@ def _measurements(table: RawTable) -> dict[int, list[RawColumn]]:
 
 CONDITION_CHANNEL = "vibration"
 SEPARATE_RUNS = "Are these separate runs?"
-"""How the question begins whether columns are conditions."""
+"""Beginning of the question whether columns are conditions."""
 
 
 MAX_ROUNDING = 1e-4
-"""Of the whole time: stamps that are rounded to more do not tell the rate."""
+"""Part of the whole time: stamps rounded more coarsely do not determine the rate."""
 
 
 def rate_of_time(
     values: NumberArray, scale_s: float, where: str, row_place: Callable[[int], str]
 ) -> tuple[float, tuple[str, ...]]:
-    r"""Return the sampling rate of a uniform time column, and what is worth a warning.
+    r"""Return the sampling rate of a uniform time column, and warnings.
 
     .. math:: f_s = (N - 1) / (t_{N-1} - t_0)
 
@@ -420,13 +422,13 @@ def rate_of_time(
     float
         In Hz, from the mean step.
     tuple of str
-        Where times are rounded to more than a step: missing samples would not show.
+        A warning if times are rounded to more than a step: missing samples would not show.
 
     Raises
     ------
     InputError
-        If time does not increase, jumps, or leaves the uniform grid by more than 1 % of a step and by more than
-        the column's own rounding.
+        If time does not increase, jumps, or deviates from the uniform grid by more than 1 % of a step and by more than
+        the column's rounding.
     """
     t: FloatArray = np.asarray(values, dtype=np.float64)
     if len(t) < 2:
@@ -452,7 +454,7 @@ def rate_of_time(
         f"time does not increase at {row_place(i + 1)}: {t[i]:.9g} is followed by {t[i + 1]:.9g}",
         where=where,
         allowed="strictly increasing time",
-        remedy="remove doubled rows, export time with more digits, or drop the column and give --fs",
+        remedy="remove duplicate rows, export time with more digits, or drop the column and give --fs",
     )
     if steps[i] < 0:
         raise stands_still
@@ -462,12 +464,12 @@ def rate_of_time(
     jitter -= line
     np.abs(jitter, out=jitter)
     del line
-    if jitter.max() < 0.01 * step:  # then stamps increase, and no rounding hides any
+    if jitter.max() < 0.01 * step:  # then stamps increase, and rounding hides no missing sample
         return float(1.0 / (step * scale_s)), ()
     jitters, roundings = _jitters_by_rounding(values, t, jitter)
     is_uniform = bool(np.all(jitters <= np.maximum(0.01 * step, 0.51 * roundings)))
     coarsest = float(roundings.max())
-    # Stamps that were rounded lie one rounding apart where they are not equal; rows that are doubled lie farther.
+    # Rounded stamps are equal or one rounding step apart; next to duplicated rows the steps are larger.
     hides_none = is_uniform and coarsest <= MAX_ROUNDING * span and steps.max() < 1.5 * max(coarsest, step)
     if steps[i] == 0 and not hides_none:
         raise stands_still
@@ -501,11 +503,11 @@ def rate_of_time(
 
 
 def _jitters_by_rounding(values: NumberArray, t: FloatArray, jitter: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the largest jitter of times, and the rounding that they went through, for each power of ten.
+    """Return the largest jitter and the rounding step of the times, for each power of ten.
 
-    Times printed with too few digits jitter by half a digit about a grid that was uniform when it was sampled. What
-    counts decimals rounds all alike, what counts digits (`%g`, spreadsheets) rounds each power of ten by itself, as
-    float32 does each power of two.
+    Times printed with too few digits jitter by half a digit about a grid that was uniform when it was sampled. A fixed
+    number of decimals rounds all times alike; a fixed number of digits (`%g`, spreadsheets) rounds each power of ten
+    differently, as float32 does each power of two.
     """
     size = np.abs(t)
     power = np.floor(np.log10(size, out=np.full_like(t, -99.0), where=size > 0))
@@ -516,14 +518,14 @@ def _jitters_by_rounding(values: NumberArray, t: FloatArray, jitter: FloatArray)
         some, largest = t[inside], float(size[inside].max())
         jitters.append(float(jitter[inside].max()))
         roundings.append(float(np.spacing(np.float32(largest))) if is_single else _decimal_step(some))
-    # Few times of a power of ten may all be round by chance: none is rounded to more than those of the next one.
+    # A few times within a power of ten may all be round by chance: no power is rounded more coarsely than the next.
     return np.array(jitters), np.minimum.accumulate(np.array(roundings)[::-1])[::-1]
 
 
 def _decimal_step(t: FloatArray) -> float:
-    """Step of the decimal rounding that all of some times went through; 0 if there is none."""
+    """Return the decimal step to which all of the times were rounded; 0 if there is none."""
     some = t
-    if len(t) > 2000:  # drawn: of those at even distances all may be round
+    if len(t) > 2000:  # drawn at random: evenly spaced times may all be round
         some = np.random.default_rng(0).choice(t, 2000)
     for digits in range(13):
         scaled = some * 10.0**digits
@@ -534,7 +536,7 @@ def _decimal_step(t: FloatArray) -> float:
 
 @dataclass(frozen=True)
 class NamedArrays:
-    """What a file holds, by path ("bearing.gs").
+    """Contents of a file, by path ("bearing.gs").
 
     Parameters
     ----------
@@ -542,9 +544,9 @@ class NamedArrays:
         Numbers of one or two dimensions.
     texts : mapping of str to str
     units : mapping of str to str
-        Units of arrays where the file states them.
+        Units of arrays, if the file states them.
     rates_hz : mapping of str to float
-        Sampling rates that are stated for an array, by its path; for all, by "".
+        Sampling rates stated for an array, by its path; under "" for all.
     warnings : tuple of str
     """
 
@@ -558,15 +560,15 @@ class NamedArrays:
 def table_from_arrays(arrays: NamedArrays, reader: str, where: str) -> RawTable:
     """Return the table of a file of named arrays.
 
-    Arrays with one element are settings; among them the sampling rate is known by its name. Vectors are channels, and
-    a matrix is one channel per column or row, whichever are fewer. Vectors much shorter than the longest are left out,
-    and so are signals at lower rates than the highest, but for speeds in rpm, which are interpolated. Times of
-    tachometer pulses are kept for a rig file that names them.
+    Arrays with one element are settings; the sampling rate among them is recognised by its name. Vectors are channels,
+    and a matrix holds one channel per column or row, whichever are fewer. Vectors much shorter than the longest are
+    left out, and so are signals below the highest sampling rate, except speeds in rpm, which are interpolated.
+    Tachometer pulse times are kept for a rig file that names them.
 
     Raises
     ------
     InputError
-        If no array is a signal, or the file states two sampling rates without saying of what.
+        If no array is a signal, or the file states two sampling rates without saying for what.
     """
     scalars = {path: a for path, a in arrays.arrays.items() if a.size == 1}
     signals = {path: a for path, a in arrays.arrays.items() if a.size > 1 and a.ndim <= 2 and a.dtype.kind in "fiubc"}
@@ -607,8 +609,8 @@ def table_from_arrays(arrays: NamedArrays, reader: str, where: str) -> RawTable:
         time = RawColumn("time", signals[clocks[0]].reshape(-1), "s")
     if clocks:
         leaves = list(dict.fromkeys(path.rpartition(".")[2] for path in clocks))
-        warnings.append(f"taken for times and not for channels: {', '.join(leaves[:8])}")
-    # A channel is called by the last part of its path where that is unique.
+        warnings.append(f"taken as times, not as channels: {', '.join(leaves[:8])}")
+    # A channel is named by the last part of its path if that is unique.
     leaves = [c.name.rpartition(".")[2] for c in columns]
     columns = [replace(c, name=leaf) if leaves.count(leaf) == 1 else c for c, leaf in zip(columns, leaves, strict=True)]
     speeds_rpm, speed, hints = _stated_speed(scalars)
@@ -628,7 +630,7 @@ def table_from_arrays(arrays: NamedArrays, reader: str, where: str) -> RawTable:
 
 
 def _rates_of_clocks(signals: Mapping[str, NumberArray]) -> tuple[dict[str, float], list[str]]:
-    """Return the sampling rates of signals by the times of their length, where several times are there, and these."""
+    """Return the signals' rates by the time vectors of their length, and these; empty unless there are several."""
     times = [path for path, a in signals.items() if seconds_per_unit(path.rpartition(".")[2], "") is not None]
     rates: dict[int, float] = {}
     for path in times:
@@ -644,7 +646,7 @@ def _rates_of_clocks(signals: Mapping[str, NumberArray]) -> tuple[dict[str, floa
 def _at_highest_rate(
     signals: dict[str, NumberArray], rates_hz: Mapping[str, float], rate_hz: float | None, arrays: NamedArrays
 ) -> tuple[dict[str, NumberArray], float | None, list[str]]:
-    """Leave out signals whose rate is lower than the highest that is stated for one; interpolate a speed in rpm."""
+    """Leave out signals sampled below the highest stated rate, but interpolate speeds in rpm."""
     if rates_hz.keys().isdisjoint(signals):
         return signals, rate_hz, []
     stated = {path: hz for path in signals if (hz := rates_hz.get(path, rate_hz)) is not None}
@@ -665,14 +667,14 @@ def _at_highest_rate(
 
 
 def _is_pulse_times(path: str, array: NumberArray) -> bool:
-    """Whether a vector is called a tachometer and rises from each value to the next: times, no samples."""
+    """Whether a vector is named like a tachometer and always increases: times, not samples."""
     is_vector = 1 in array.shape or array.ndim == 1
     named = re.match(r"tach|keyphas", path.rpartition(".")[2], re.IGNORECASE) is not None
     return named and is_vector and array.dtype.kind in "fiu" and bool(np.all(np.diff(array.reshape(-1)) > 0))
 
 
 def _is_clock(path: str, array: NumberArray) -> bool:
-    """Whether a vector is the time of other channels, as Dewesoft's Data1_time_AI_1; one called "time" is a column's.
+    """Whether a vector is the time of other channels, e.g. Dewesoft's Data1_time_AI_1; plain "time" is a time column.
 
     "X097_DE_time" is a signal over time: only what increases is a clock.
     """
@@ -695,7 +697,7 @@ def _columns(path: str, array: NumberArray, arrays: NamedArrays, where: str) -> 
     over_time = array if array.shape[0] < array.shape[1] else array.T
     if len(over_time) > 0.5 * over_time.shape[1]:
         raise InputError(
-            f"{path!r} has shape {array.shape}: it is not clear which is time",
+            f"{path!r} has shape {array.shape}: it is not clear which dimension is time",
             where=where,
             allowed="a matrix with many more samples than channels",
             remedy="save each channel as a vector",
@@ -704,12 +706,12 @@ def _columns(path: str, array: NumberArray, arrays: NamedArrays, where: str) -> 
 
 
 def _column_name(path: str, number: int, where: str) -> str:
-    """Name a column of a matrix; one that is called as its file would be called otherwise in each recording."""
+    """Name a column of a matrix; the name of a matrix named after its file is not used, as it differs by recording."""
     return f"ch{number}" if path == PurePath(where).stem else f"{path}_{number}"
 
 
 def _one_rate(scalars: Mapping[str, NumberArray], stated_hz: float | None, where: str) -> float | None:
-    """Return the sampling rate that is stated, or from the scalars whose name says so; rates go before intervals."""
+    """Return the sampling rate as stated, or from scalars with such names; rates take precedence over intervals."""
     rates = {} if stated_hz is None else {"the file": stated_hz}
     intervals: dict[str, float] = {}
     for path, array in scalars.items():
@@ -740,7 +742,7 @@ def _one_rate(scalars: Mapping[str, NumberArray], stated_hz: float | None, where
 
 
 def _stated_speed(scalars: Mapping[str, NumberArray]) -> tuple[dict[str, float], ConstantSpeed | None, list[str]]:
-    """Return all scalars in rpm, the speed where they state one; mention others that may be, which were not used."""
+    """Return all scalars in rpm, the speed if they agree on one, and hints at possible speeds that were not used."""
     values = {path: float(a.reshape(-1)[0]) for path, a in scalars.items() if a.dtype.kind in "fiu"}
     in_rpm = {path: value for path, value in values.items() if plain_name(path).endswith("rpm")}
     possible = {path: value for path, value in values.items() if plain_name(path) in SPEED_NAMES or path in in_rpm}

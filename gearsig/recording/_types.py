@@ -1,4 +1,4 @@
-"""A recording: channels over time, with units, a speed source and where it came from."""
+"""Recordings: channels over time with their units, speed source and provenance."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ INTERVAL_NAMES = frozenset(
 )
 """Names of sampling intervals in seconds."""
 SPEED_NAMES = frozenset(("rpm", "rate", "speed", "shaftspeed", "rotspeed", "speedrpm", "drehzahl", "shaftrate", "hz"))
-"""Names of scalars that may be a shaft speed; told to the user, never used."""
+"""Names of scalars that may be a shaft speed: reported to the user, and used only if the name ends in "rpm"."""
 
 SECONDS_PER_UNIT = {
     "": 1.0,
@@ -92,15 +92,15 @@ SI_FACTORS: dict[str, dict[str, float]] = {
     "rotational_speed": {**dict.fromkeys(sorted(RPM_UNITS), 2 * pi / 60), "rad/s": 1.0},
     "angle": {"rad": 1.0},
     "angular_acceleration": {"rad/s²": 1.0},
-    "temperature": {"°C": 1.0, "degC": 1.0},  # of differences: the zero is not the kelvin's
+    "temperature": {"°C": 1.0, "degC": 1.0},  # for differences only: its zero is not the kelvin's
     "voltage": {"V": 1.0, "mV": 1e-3},
     "current": {"A": 1.0, "mA": 1e-3},
 }
-"""Quantity → unit → what a value is multiplied by to be in the SI unit, of every unit that is known here.
+"""Quantity → unit → factor to the SI unit, for every known unit.
 
-In one spelling each; `si_factor` finds the others ("m/s^2", "m/s**2", "Nm")."""
+Each unit is listed in one spelling; `si_factor` recognises the others ("m/s^2", "m/s**2", "Nm")."""
 
-# Texts of files may be made to be slow to match: quantifiers are possessive, and what stands about is stripped.
+# A file's text may be crafted to make matching slow: quantifiers are possessive, and the text is stripped first.
 _SIGN = re.compile(r"[=:;,\t]")
 _QUANTITY = re.compile(
     r"(?P<value>[-+]?(?:\d++[.,]?\d*+|[.,]\d++)(?:e[-+]?\d++)?)\s*+(?P<unit>[a-zµμ]++)?", re.IGNORECASE
@@ -121,7 +121,7 @@ def plain_name(name: str) -> str:
 
 
 def stated_rate_hz(name: str, value: float) -> float | None:
-    """Return the sampling rate that a number of some name states: itself, or 1 over an interval above 0; None: none.
+    """Return the sampling rate in Hz that a named number states: its value, 1 over a positive interval, or None.
 
     Examples
     --------
@@ -136,7 +136,7 @@ def stated_rate_hz(name: str, value: float) -> float | None:
 def split_unit(header: str) -> tuple[str, str]:
     """Split "acc [m/s^2]" or "acc (g)" into name and unit; round brackets only where they hold a known unit.
 
-    The letter of an axis before it, which data collectors write ("X:Time (Seconds)"), is no part of the name.
+    The axis letter that data collectors put first ("X:Time (Seconds)") is not part of the name.
 
     Examples
     --------
@@ -155,7 +155,7 @@ def split_unit(header: str) -> tuple[str, str]:
 
 
 def rate_in_line(line: str) -> float | None:
-    """Return the sampling rate that a line of text states, in Hz, once or for each channel alike.
+    """Return the sampling rate in Hz that a line of text states, once or identically for each channel.
 
     Examples
     --------
@@ -169,7 +169,7 @@ def rate_in_line(line: str) -> float | None:
 
 
 def interval_in_line(line: str) -> float | None:
-    """Return the sampling interval that a line of text states, in seconds.
+    """Return the sampling interval in seconds that a line of text states.
 
     Examples
     --------
@@ -181,7 +181,7 @@ def interval_in_line(line: str) -> float | None:
 
 
 def _in_line(line: str, names: frozenset[str]) -> tuple[float | None, str]:
-    """Return the number, and its unit in lower case, that a line states for one of some names."""
+    """Return the number that a line states for one of the names, and its unit in lower case."""
     line = line.lstrip("#%/; \t\r\n\f\v").rstrip("; ,\t\r\n\f\v")
     sign = _SIGN.search(line)
     if sign is None:
@@ -190,22 +190,22 @@ def _in_line(line: str, names: frozenset[str]) -> tuple[float | None, str]:
     if plain_name(label) not in names:
         return None, ""
     rest = line[sign.start() :].lstrip("=:;, \t")
-    for separator in (",", "\t", ";"):  # of channels; a comma may be a decimal sign
+    for separator in (",", "\t", ";"):  # between channels; a comma may be a decimal sign
         fields = {field.strip().removeprefix(label.strip()).lstrip("=: ") for field in rest.split(separator)} - {""}
         match = _QUANTITY.fullmatch(fields.pop()) if len(fields) == 1 else None
-        if match is not None and not re.fullmatch(r"[1-9]\d{0,2},\d{3}", match["value"]):  # of thousands, or a decimal
+        if match is not None and not re.fullmatch(r"[1-9]\d{0,2},\d{3}", match["value"]):  # thousands or decimal sign?
             return float(match["value"].replace(",", ".")), (match["unit"] or unit.strip("]) ")).casefold()
     return None, ""
 
 
 def is_unit(text: str) -> bool:
-    """Whether the text is a unit of a quantity or of time that is known here."""
+    """Whether the text is a known unit of a quantity or of time."""
     word = text.strip().casefold()
     return _plain_unit(text) in _QUANTITY_OF_UNIT or (word != "" and word in SECONDS_PER_UNIT)
 
 
 def same_unit(first: str, second: str) -> bool:
-    """Whether two units are one, however they are spelled.
+    """Whether two units are the same, however they are spelled.
 
     Examples
     --------
@@ -230,7 +230,7 @@ _QUANTITY_OF_UNIT = {
 
 
 def si_factor(quantity: str, unit: str) -> float | None:
-    """Return what values of a quantity are multiplied by to be in its SI unit; None where that is not known.
+    """Return the factor from a unit of a quantity to its SI unit; None if it is not known.
 
     Parameters
     ----------
@@ -250,9 +250,9 @@ def si_factor(quantity: str, unit: str) -> float | None:
 
 
 def quantity_of(name: str, unit: str) -> str:
-    """Return the quantity that a unit, or a telling name, stands for; "unknown" where neither tells.
+    """Return the quantity that the unit or the name indicates; "unknown" if neither does.
 
-    A pulse channel is known by its name, because its unit is that of a voltage.
+    A pulse channel is recognised by its name, because its unit is that of a voltage.
 
     Examples
     --------
@@ -287,11 +287,11 @@ class Channel:
     Parameters
     ----------
     name : str
-        Unique in its recording. Text from a file: never markup.
+        Unique in its recording. Text from a file: never to be treated as markup.
     quantity : str
         One of `QUANTITIES`.
     unit : str
-        As the file or the rig states it, empty where it is not known.
+        As the file or the rig states it; empty if it is not known.
     position : str
         Where the sensor sits, e.g. "pinion bearing, vertical".
     """
@@ -309,7 +309,7 @@ class Channel:
 
     @property
     def is_vibration(self) -> bool:
-        """Whether the analysis chain looks at this channel for faults."""
+        """Whether the analysis chain examines this channel for faults."""
         return self.quantity in VIBRATION_QUANTITIES
 
 
@@ -317,10 +317,10 @@ _RECORD_NUMBER = re.compile(r"^\d{3,}[-_. ]*|[-_. ]*\d{3,}$|\d{3,}")
 
 
 def names_without_number(names: Iterable[str]) -> dict[str, str]:
-    """Return channels' names without the number of their record, by which those of another record are named alike.
+    """Return channel names → names without the record number, so that a channel has the same name in every record.
 
-    It has three digits or more: fewer tell sensors apart, a1 from a2. Where names would not stay apart, or nothing
-    would be left of one, all stay as they are.
+    The number has three digits or more: fewer distinguish sensors, e.g. a1 and a2. If the shorter names would not be
+    unique, or one would be empty, all names stay unchanged.
 
     Examples
     --------
@@ -336,7 +336,7 @@ def names_without_number(names: Iterable[str]) -> dict[str, str]:
 
 @dataclass(frozen=True)
 class Provenance:
-    """Where a recording came from, and what was done to it since.
+    """Where a recording came from, and what has been done to it since.
 
     Parameters
     ----------
@@ -369,20 +369,20 @@ class Recording:
     channels : tuple of Channel
         One per row of `samples`, names unique.
     speed : SpeedSource or None
-        Where shaft speed and angle come from; None if the recording has no such thing. A rig's own `speed` is
-        used where this is None: see `speed_source`.
+        Where shaft speed and angle come from; None if the recording does not say. The rig's `speed` is then used:
+        see `speed_source`.
     rig : Rig or None
         The machine, as far as it is known.
     provenance : Provenance
     truth : mapping or None
         What a simulator put in (JSON-like values); None for measured data.
     warnings : tuple of str
-        What the reader noticed and the user should know, e.g. a doubled variable that was left out.
+        What the reader noticed and the user should know, e.g. that a duplicate variable was left out.
 
     Raises
     ------
     InputError
-        On a shape, rate, name or value that does not fit.
+        If a shape, rate, name or value does not fit.
 
     Examples
     --------
@@ -410,7 +410,7 @@ class Recording:
             samples = frozen_array(self.samples, "samples (channel, time)", ndim=2)
         except InputError as error:
             is_single = isinstance(self.samples, np.ndarray) and self.samples.ndim == 1
-            hint = error.remedy or ("of one channel, give samples[None]" if is_single else "")
+            hint = error.remedy or ("for one channel, give samples[None]" if is_single else "")
             raise InputError(error.what, where=where, allowed=error.allowed, remedy=hint) from None
         if samples.shape[1] == 0:
             raise InputError("there are no samples", where=where, remedy="check that the file was written completely")
@@ -450,7 +450,7 @@ class Recording:
 
     @property
     def name(self) -> str:
-        """Name of the file or simulator that it comes from; "recording" if made in memory."""
+        """Name of the source file or simulator; "recording" if made in memory."""
         return self.provenance.source or "recording"
 
     @property
@@ -496,7 +496,7 @@ class Recording:
         return DataFrame(self.samples.T, columns=list(self.channel_names), index=Index(self.time_s(), name="time_s"))
 
     def vibration_names(self) -> tuple[str, ...]:
-        """Names of the channels that the analysis looks at for faults."""
+        """Names of the channels that the analysis examines for faults."""
         return tuple(channel.name for channel in self.channels if channel.is_vibration)
 
     def select(self, names: Iterable[str]) -> Recording:
@@ -509,16 +509,16 @@ class Recording:
         )
 
     def with_rig(self, rig: Rig | None) -> Recording:
-        """Return the recording with another rig, whose sensors' quantity, unit, scale and position are applied.
+        """Return the recording with another rig, and apply its sensors' quantity, unit, scale and position.
 
-        Sensors apply once, to the values as they were read. Where those of the rig that it carries were applied
-        already, they stay with it: the other rig must have the same ones, or none. Where the file states another unit
-        and the rig no scale between the two, the rig's unit is taken, with a warning.
+        Sensors are applied once, to the values as read. If the sensors of the current rig have been applied, they are
+        kept: the other rig must have the same sensors, or none. If the rig states another unit than the file but no
+        scale, the rig's unit is used, with a warning.
 
         Raises
         ------
         InputError
-            If sensors were applied, and the other rig has different ones.
+            If sensors have been applied, and the other rig has different ones.
         """
         check_rig(rig)
         if rig is None or self.rig is rig:
@@ -553,7 +553,7 @@ class Recording:
         return replace(self, samples=samples, channels=tuple(channels), rig=rig, warnings=tuple(warnings))
 
     def _unmatched_sensors(self, rig: Rig) -> Iterator[str]:
-        """Say so where the rig describes a channel that is not here, and one is here that it does not describe."""
+        """Warn if the rig describes channels that are missing here while others here are not described."""
         described = [sensor.channel for sensor in rig.sensors]
         missing = [name for name in described if name not in self.channel_names]
         unknown = [name for name in self.channel_names if name not in (*described, getattr(rig.speed, "channel", ""))]
@@ -561,25 +561,25 @@ class Recording:
             here, there = (", ".join(map(short, names[:3])) + ", …" * (len(names) > 3) for names in (unknown, missing))
             are = "is" if len(missing) == 1 else "are"
             yield (
-                f"the rig file describes {counted(len(missing), 'channel')} that {are} not here ({there}) "
-                f"and nothing of {here}: compare the names"
+                f"the rig file describes {counted(len(missing), 'channel')} that {are} not in the recording ({there}) "
+                f"and does not describe {here}: compare the names"
             )
 
     def between(self, start_s: float, end_s: float) -> Recording:
-        """Return the part from `start_s` to `end_s`, whose time begins at 0 again; tachometer pulses go with it.
+        """Return the part from `start_s` to `end_s`, whose time starts at 0 again; pulse times are cut and shifted too.
 
         Raises
         ------
         InputError
-            If no sample lies there.
+            If there is no sample in that range.
         """
         times_s = number(start_s, "start_s", "s"), number(end_s, "end_s", "s")
         first, last = (int(np.clip(round(t * self.sampling_rate_hz), 0, self.n_samples)) for t in times_s)
         if first >= last:
             raise InputError(
-                f"no sample lies from {start_s:.6g} to {end_s:.6g} s",
+                f"there is no sample from {start_s:.6g} to {end_s:.6g} s",
                 where=self.name,
-                allowed=f"a part of 0 to {self.duration_s:.6g} s",
+                allowed=f"a part within 0 to {self.duration_s:.6g} s",
             )
         speed, start = self.speed_source, first / self.sampling_rate_hz
         if isinstance(speed, PulseTimes):
@@ -598,7 +598,7 @@ class Recording:
 
 
 def check_recording(value: object, name: str = "recording", kinds: type | UnionType = Recording) -> None:
-    """Raise unless the value is a recording, or of other kinds that do; the remedy goes by what was given.
+    """Raise unless the value is a recording or of another accepted kind; the remedy depends on what was given.
 
     Parameters
     ----------
@@ -616,5 +616,5 @@ def check_recording(value: object, name: str = "recording", kinds: type | UnionT
 
 
 def metres_per_second_squared(channel: Channel) -> float | None:
-    """Return what a channel's values are multiplied by to be m/s²; None where it is no acceleration in a known unit."""
+    """Return the factor from a channel's unit to m/s²; None if it is not an acceleration in a known unit."""
     return si_factor("acceleration", channel.unit) if channel.quantity in ("acceleration", "unknown") else None

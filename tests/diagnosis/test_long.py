@@ -69,7 +69,7 @@ def test_pulse_times_go_with_their_part(tmp_path):
 def test_text_has_no_parts(tmp_path):
     path = write_recording(LONG.between(0, 1), tmp_path / "x.csv")
     assert n_samples_of(path) is None
-    with pytest.raises(InputError, match="only read whole"):
+    with pytest.raises(InputError, match="only be read whole"):
         read_recording(path, part=slice(0, 5))
 
 

@@ -211,7 +211,7 @@ def test_over_load_the_limits_follow_the_baselines_dependence(make_recordings, t
     assert f"one of {1 / shown.trend.false_alarm_rate:.0f} recordings" in shown.text
     assert shown.trend.text.startswith("Limits from the 10 recordings of the baseline.")
     assert f"one of {1 / shown.trend.false_alarm_rate:.0f} recordings" in shown.trend.text
-    assert shown.trend.text.endswith("What is expected follows load.")
+    assert shown.trend.text.endswith("The expected value depends on load.")
     with pytest.raises(InputError, match="no recording states its speed"):
         fleet.trend_over("speed", "mill", "rms")
 

@@ -45,7 +45,7 @@ def test_pulses_per_revolution(tmp_path):
 def test_a_signal_that_rises_all_along_is_known_by_its_unit(tmp_path):
     times_s = np.cumsum(np.random.default_rng(1).uniform(0.03, 0.05, 200))
     np.savetxt(tmp_path / "p.csv", times_s)
-    with pytest.raises(InputError, match=r"times of pulses .*--tach-times"):
+    with pytest.raises(InputError, match=r"pulse times .*--tach-times"):
         read_recording(tmp_path / "p.csv", sampling_rate_hz=1000.0)
     np.savetxt(tmp_path / "angle.csv", times_s, header="angle [rad]", comments="")
     assert read_recording(tmp_path / "angle.csv", sampling_rate_hz=1000.0).n_samples == 200

@@ -54,7 +54,7 @@ def test_a_part_keeps_its_pulses_in_its_own_time() -> None:
     assert part.values("a") == pytest.approx([3.0, 4.0, 5.0, 6.0])
     assert isinstance(part.speed, PulseTimes)
     assert part.speed.times_s == pytest.approx([0.05, 0.3])
-    with pytest.raises(InputError, match="no sample lies from 2 to 3 s"):
+    with pytest.raises(InputError, match="there is no sample from 2 to 3 s"):
         whole.between(2.0, 3.0)
 
 

@@ -53,7 +53,7 @@ def test_paths_that_are_none():
     ("error", "said"),
     [
         (MemoryError(), r"x\.csv: does not fit into memory as CSV .*split the file"),
-        (PermissionError(13, "Permission denied"), r"x\.csv: cannot be opened \(Permission denied\).*who may read it"),
+        (PermissionError(13, "Permission denied"), r"x\.csv: cannot be opened \(Permission denied\).*permissions"),
         (KeyError("a"), r"x\.csv: cannot be read as CSV .*damaged"),
     ],
 )

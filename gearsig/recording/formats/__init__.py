@@ -1,4 +1,4 @@
-"""The file formats, one module each; a further format is a module with a `FileFormat` and its line here."""
+"""File formats, one module each; to add one, write a module with a `FileFormat` and list it here."""
 
 from gearsig.recording.formats._csv import CSV
 from gearsig.recording.formats._format import FileFormat
@@ -11,6 +11,6 @@ from gearsig.recording.formats._uff58 import UFF58
 from gearsig.recording.formats._wav import WAV
 
 FORMATS: tuple[FileFormat, ...] = (CSV, MAT, WAV, HDF5, PARQUET, TDMS, UFF58, MF4)
-"""In the order in which users are told them; content is tried against them from the last: all text looks like CSV."""
+"""In the order shown to users; content is tested from the last to the first, because all text looks like CSV."""
 
 __all__ = ["CSV", "FORMATS", "FileFormat"]

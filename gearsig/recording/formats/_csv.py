@@ -36,16 +36,16 @@ from gearsig.recording.formats._format import OWN_TEXT_MARK, FileFormat, metadat
 
 SNIFF_BYTES = 1 << 18
 N_PROOF_LINES = 5
-"""So many lines in a row must be numbers of equal count before they are taken for the table."""
+"""Lines from which the layout is judged: the first must hold only numbers, most others as many fields."""
 
-# Tried in this order; the first that reads most columns wins. The comma is last among the separators because it is
-# also a decimal sign: "1,5;2,7" must not become three columns of text.
+# Tried in this order; the first that reads the most columns wins. Commas come after tabs and semicolons, because they
+# are also decimal signs: "1,5;2,7" must not become three columns of text.
 CANDIDATES = (("\t", "."), (";", "."), ("\t", ","), (";", ","), (",", "."), (" ", "."), (" ", ","))
 MAX_LINES_ABOVE = 2000
-"""More lines than that are no header of a table."""
+"""More lines than this are not the header of a table."""
 COMMENT_SIGNS = ("#", "%", "//")
 
-# Possessive: digits that no number ends are looked at once.
+# Possessive: digits that do not end a number are examined only once.
 _NUMBER = re.compile(r"[+-]?(?:\d++\.?\d*+|\.\d++)(?:e[+-]?\d++)?\Z|[+-]?(?:nan|inf|infinity)\Z", re.IGNORECASE)
 _MINUTES = r":[0-9]{2}:[0-9]{2}(?:[.,][0-9]{1,9})?"
 _CLOCK = rf"(?:[0-9]{{1,2}}{_MINUTES}|(?:0?[0-9]|1[0-2]){_MINUTES} ?[AaPp][Mm])"
@@ -61,12 +61,12 @@ _DATE_TIMES = {
         "clock": _CLOCK,
     }.items()
 }
-"""Kinds of date and time → how they are written: ISO 8601, as people write it, in two columns, the time of day."""
+"""Kind of date and time → its notation: ISO 8601, as people write it, in two columns, or the time of day only."""
 DATE_TIME_EXAMPLES = (
     "2026-01-31T12:00:00.0001, 2026-01-31 12:00:00.0001Z, 31.01.2026 12:00:00,0001, 1/31/2026 12:00:00.0001 PM "
     "or 12:00:00.0001"
 )
-"""Of what is read as date and time."""
+"""Examples of what is read as date and time."""
 
 
 @dataclass(frozen=True)
@@ -76,10 +76,10 @@ class CsvLayout:
     Parameters
     ----------
     separator, decimal : str
-        The separator " " stands for any run of blanks.
+        The separator " " means any run of blanks.
     n_columns : int
     leading_separator, trailing_separator : bool
-        Whether each line begins or ends with a separator, beside which no column stands.
+        Whether each line begins or ends with a separator that has no column beside it.
     header, units : tuple of str
         One text per column, or nothing.
     preamble : tuple of str
@@ -89,9 +89,9 @@ class CsvLayout:
     offset : int
         Bytes before that line.
     bytes_per_line : float
-        Mean over the lines that were looked at.
+        Mean over the lines that were examined.
     date_times : str
-        Of the first column, or of the first two ("apart"): see `date_time_kind`; empty where it holds numbers.
+        Kind in the first column, or the first two ("apart"), see `date_time_kind`; empty if it holds numbers.
     """
 
     separator: str
@@ -109,7 +109,7 @@ class CsvLayout:
 
     @property
     def n_date_columns(self) -> int:
-        """Columns that together are the time."""
+        """Number of columns that together are the time."""
         return 0 if not self.date_times else 2 if self.date_times == "apart" else 1
 
 
@@ -124,7 +124,7 @@ def is_number(text: str, decimal: str) -> bool:
 
 
 def date_time_kind(fields: Sequence[str]) -> str:
-    """Return how the first fields of a line state date and time, and nothing where they do not.
+    """Return the kind of date and time that the first fields of a line hold; empty if they hold none.
 
     Examples
     --------
@@ -146,7 +146,7 @@ def date_time_kind(fields: Sequence[str]) -> str:
 
 
 def _date_time_form(fields: Sequence[str]) -> str:
-    """Return what `date_time_kind` does, whether or not there is such a day and time."""
+    """Return the kind as `date_time_kind` does, but without checking that the day and time exist."""
     texts = {kind: _date_time_text(fields, kind) for kind in _DATE_TIMES}
     return next((kind for kind, form in _DATE_TIMES.items() if form.match(texts[kind])), "")
 
@@ -156,9 +156,10 @@ def _date_time_text(fields: Sequence[str], kind: str) -> str:
 
 
 def _seconds_from_first(date_times: Any, kind: str) -> FloatArray:
-    """Return dates and times, as texts or as Arrow's, in seconds from the first: exact to a nanosecond over days.
+    """Return dates and times, given as texts or Arrow values, in seconds from the first, to a nanosecond over days.
 
-    Of days with slashes, month first as in America or day first, the reading by which the record is shorter is taken.
+    Dates with slashes may have the month first, as in America, or the day; the reading that gives the shorter record
+    is taken.
     """
     import pyarrow as pa
     from pyarrow import compute
@@ -168,7 +169,7 @@ def _seconds_from_first(date_times: Any, kind: str) -> FloatArray:
     if kind in ("local", "zoned"):
         return _from_first(date_times, "UTC" if kind == "zoned" else None)
     first, half_days = date_times[0].as_py() if len(date_times) else "", 0
-    if first[-1:] in ("m", "M"):  # twelve hours twice a day: 12 AM is midnight
+    if first[-1:] in ("m", "M"):  # 12-hour clock: 12 AM is midnight
         half_days = compute.match_substring_regex(date_times, "[pP].$").to_numpy(zero_copy_only=False)
         for old, new in ((r" ?[AaPp][Mm]$", ""), (r"(^|[ T\x1f])12(:[0-9]{2}:[^:]*)$", r"\100\2")):
             date_times = compute.replace_substring_regex(date_times, old, new)
@@ -186,7 +187,7 @@ def _seconds_from_first(date_times: Any, kind: str) -> FloatArray:
 
 
 def _from_first(date_times: Any, zone: str | None, half_days: Any = 0) -> FloatArray:
-    """Return dates and times as ISO 8601 has them, and half days to be added, in seconds from the first."""
+    """Return ISO 8601 dates and times, plus half days to be added, in seconds from the first."""
     import pyarrow as pa
 
     moments_ns = date_times.cast(pa.timestamp("ns", zone)).cast(pa.int64()).to_numpy(zero_copy_only=False)
@@ -196,7 +197,7 @@ def _from_first(date_times: Any, zone: str | None, half_days: Any = 0) -> FloatA
 
 
 def _as_iso(texts: Any, kind: str, order: str = r"\3-\2-\1") -> Any:
-    """Return dates and times that are written otherwise as ISO 8601 has them; the order is of a day's three numbers."""
+    """Return dates and times of other notations in ISO 8601; `order` is that of a date's three numbers."""
     from pyarrow import compute
 
     changes = [(r"^([0-9]{4})[/.]([0-9]{2})[/.]", r"\1-\2-")]
@@ -211,7 +212,7 @@ def _as_iso(texts: Any, kind: str, order: str = r"\3-\2-\1") -> Any:
 
 
 def split(line: str, separator: str) -> list[str]:
-    """Split one line; quotes are respected only where there are any."""
+    """Split one line into its fields, respecting quotes."""
     if separator == " ":
         return line.split()
     if '"' in line:
@@ -220,7 +221,7 @@ def split(line: str, separator: str) -> list[str]:
 
 
 def _text(line: bytes) -> str:
-    """Decode a line: what is not UTF-8 is Windows' Western code page, in which "m/s²" has other bytes."""
+    """Decode a line as UTF-8, or else as Windows' Western code page, in which "m/s²" has other bytes."""
     try:
         return line.decode("utf-8")
     except UnicodeDecodeError:
@@ -228,7 +229,7 @@ def _text(line: bytes) -> str:
 
 
 def _between_separators(fields: list[str]) -> tuple[list[str], bool, bool]:
-    """Return the fields without an empty first and last one, and whether there were these."""
+    """Return the fields without an empty first and last one, and whether each of these was present."""
     leading = len(fields) > 1 and not fields[0].strip()
     trailing = len(fields) > 1 + leading and not fields[-1].strip()
     return fields[leading : len(fields) - trailing], leading, trailing
@@ -267,7 +268,7 @@ def find_layout(data: bytes, where: str) -> CsvLayout:
 
 
 def own_layout(data: bytes) -> CsvLayout:
-    """Return the layout that gearsig itself writes: a description, a header, then the numbers."""
+    """Return the layout that gearsig writes: a description, a header, then the numbers."""
     header_at = data.find(b"\n") + 1
     offset = data.find(b"\n", header_at) + 1
     end = data.find(b"\n", offset)
@@ -286,7 +287,7 @@ def _first_lines(data: bytes) -> list[bytes]:
 
 
 def _table_start(texts: list[str], where: str) -> tuple[int, str, str]:
-    """Return the first line of numbers with the separator and decimal sign that read most columns there."""
+    """Return the first line of numbers, with the separator and decimal sign that read the most columns there."""
     for start, text in enumerate(texts[:MAX_LINES_ABOVE]):
         if not text.strip() or not any(c.isdigit() for c in text):
             continue
@@ -299,10 +300,10 @@ def _table_start(texts: list[str], where: str) -> tuple[int, str, str]:
 
 
 def _n_columns(proof: list[str], separator: str, decimal: str) -> int:
-    """Return how many columns of numbers all lines have, 0 if they do not agree or hold something else.
+    """Return how many columns of numbers the lines have; 0 if they do not agree or hold something else.
 
     The last line may be cut off, and a single bad field further down is reported later with its line: only the first
-    line must be clean, and the others must have as many fields for the most part.
+    line must be clean, and most of the others must have as many fields.
     """
     rows = [split(line, separator) for line in proof]
     if "" in (rows[0][0].strip(), rows[0][-1].strip()):
@@ -316,7 +317,7 @@ def _n_columns(proof: list[str], separator: str, decimal: str) -> int:
 
 
 MAX_HEADER_LINES = 12
-"""So many lines above the table may each say something of all columns: names, units, calibrations, types."""
+"""Lines above the table that may have a field for each column: names, units, calibrations, types."""
 
 
 def _header(
@@ -324,7 +325,7 @@ def _header(
 ) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
     """Return names, units and the remaining lines above the table.
 
-    The names are in the last line that has a field for each column, or above the units where a line holds these.
+    The names are in the last line that has a field for each column, or in the line above a row of units.
     """
     filled = [text for text in above if text.strip()]
     rows: list[tuple[str, ...]] = []
@@ -341,7 +342,7 @@ def _header(
 
 
 def _header_fields(text: str, separator: str, n_columns: int, leading: bool, trailing: bool) -> tuple[str, ...] | None:
-    """Return a line's fields if it can be the header of so many columns."""
+    """Return a line's fields if it can be the header of `n_columns` columns."""
     if rate_in_line(text) is not None:
         return None
     for sign in COMMENT_SIGNS:
@@ -357,7 +358,7 @@ def _header_fields(text: str, separator: str, n_columns: int, leading: bool, tra
         ]
     for fields in attempts:
         cleaned = tuple(field.strip() for field in fields)
-        if len(cleaned) == n_columns + leading + trailing:  # there may be a name where there are no numbers
+        if len(cleaned) == n_columns + leading + trailing:  # there may be a name without numbers
             cleaned = cleaned[leading : leading + n_columns]
         elif len(cleaned) == leading + n_columns + 1 and cleaned[-1].casefold() in ("", "comment"):
             cleaned = cleaned[leading:-1]
@@ -367,7 +368,7 @@ def _header_fields(text: str, separator: str, n_columns: int, leading: bool, tra
 
 
 def _all_units(fields: Iterable[str]) -> bool:
-    """Whether a row consists of units, in brackets or known; empty fields and "-" are units of plain numbers."""
+    """Whether a row consists of units, in brackets or known ones; empty fields and "-" mean plain numbers."""
     words = [field for field in fields if field not in ("", "-")]
     bracketed = [word[:1] + word[-1:] in ("[]", "()") for word in words]
     return bool(words) and all(b or is_unit(word) for b, word in zip(bracketed, words, strict=True))
@@ -392,7 +393,7 @@ def _raise_no_table(texts: list[str], where: str) -> None:
 
 
 # --------------------
-# The rows of a text file: a fast parser, and a careful one that can name the line and column of what is wrong.
+# The rows of a text file: a fast parser, and a careful one that can name the line and column of an error.
 # --------------------
 
 
@@ -400,7 +401,7 @@ MAX_LINE_BYTES = 1 << 20
 
 
 def parse_rows(data: bytes, layout: CsvLayout, names: tuple[str, ...], where: str) -> list[FloatArray]:
-    """Return one float64 array per column; what the fast parser cannot read is read again line by line."""
+    """Return one float64 array per column; if the fast parser fails, the rows are parsed line by line."""
     from pyarrow import ArrowInvalid
 
     try:
@@ -410,7 +411,7 @@ def parse_rows(data: bytes, layout: CsvLayout, names: tuple[str, ...], where: st
 
 
 def line_of_row(data: bytes, layout: CsvLayout, row: int) -> int:
-    """Return the line number of a row of the table, counting the blank lines between."""
+    """Return the line number of a row of the table; blank lines in between count."""
     for i, (line, _) in enumerate(_filled_lines(data, layout)):
         if i == row:
             return line
@@ -448,7 +449,7 @@ def _parse_fast(data: bytes, layout: CsvLayout) -> list[FloatArray]:
 
 
 def _with_single_blanks(text: bytes) -> bytes:
-    """Return the lines with one blank between fields and none at the ends."""
+    """Return the lines with one blank between fields and none at either end."""
     text = text.replace(b"\t", b" ").replace(b"\r", b"")
     while b"  " in text:
         text = text.replace(b"  ", b" ")
@@ -456,7 +457,7 @@ def _with_single_blanks(text: bytes) -> bytes:
 
 
 def _parse_carefully(data: bytes, layout: CsvLayout, names: tuple[str, ...], where: str) -> list[FloatArray]:
-    """Parse line by line: slow, and precise about the first thing that is wrong."""
+    """Parse line by line: slow, but precise about the first error."""
     from pyarrow import ArrowInvalid
 
     rows = []
@@ -490,7 +491,7 @@ def _parse_carefully(data: bytes, layout: CsvLayout, names: tuple[str, ...], whe
 
 
 def _filled_lines(data: bytes, layout: CsvLayout) -> Iterator[tuple[int, str]]:
-    """Yield the lines of the table that are not blank, with their numbers; long ones are shortened."""
+    """Yield the numbers and texts of the table's lines that are not blank; long lines are truncated."""
     at, number = layout.offset, layout.first_line
     while at < len(data):
         end = data.find(b"\n", at)
@@ -515,7 +516,7 @@ def _raise_field_count(n_fields: int, number: int, line: str, layout: CsvLayout,
 
 def _raise_no_date_time(field: str, number: int, name: str, layout: CsvLayout, where: str) -> None:
     raise InputError(
-        f"line {number}, column {name!r}: {field.strip()[:60]!r} is no date and time as those above it",
+        f"line {number}, column {name!r}: {field.strip()[:60]!r} is not a date and time like those above it",
         where=where,
         allowed=f"e.g. {DATE_TIME_EXAMPLES}, each {'with' if layout.date_times == 'zoned' else 'without'} a time zone",
         remedy="correct the field, or replace the column by seconds",
@@ -526,7 +527,7 @@ def _raise_no_number(field: str, number: int, name: str, layout: CsvLayout, wher
     text = field.strip()[:60]
     remedy = "correct the field, or remove the column" if text else "cut out the gap knowingly or export again"
     if re.match(r"[+-]?\d{1,3}(?:[.,' \u00a0]\d{3})+(?!\d)", text):
-        remedy = "export the numbers without signs between thousands"
+        remedy = "export the numbers without thousands separators"
     raise InputError(
         f"line {number}, column {name!r}: " + (f"{text!r} is not a number" if text else "the field is empty"),
         where=where,
@@ -537,28 +538,28 @@ def _raise_no_number(field: str, number: int, name: str, layout: CsvLayout, wher
 
 READER = "gearsig CSV reader"
 UNIT_LABELS = ("unit", "units", "yunit", "yunits", "yunitlabel", "amplitudeunit", "amplitudeunits", "einheit")
-"""What the units of all columns are called in a line above the table, plain."""
+"""Labels of a line above the table that states units, as `plain_name` writes them."""
 
 
 def read_csv(path: Path) -> RawTable:
     """Return the columns of a text file.
 
     The layout is found from the first lines: separator (comma, semicolon, tab, blanks), decimal point or comma, a
-    header, units in brackets or in a row of their own, lines above the header ("# …" or free text). A line
-    "sampling rate: 25600" among those states the rate. A first column of dates and times is the time, in seconds from
-    its first row; so is a day and the time of day in two columns.
+    header, units in brackets or in a separate row, lines above the header ("# …" or free text). A line such as
+    "sampling rate: 25600" among these states the rate. A first column of dates and times is the time, in seconds from
+    its first row; so are a date and a time of day in two columns.
 
     Raises
     ------
     InputError
-        With line and column, if a line has another number of columns or a field is no number.
+        Naming line and column, if a line has a different number of columns or a field is not a number.
     """
     where = path.name
     data = read_text_bytes(path)
     is_own = data.startswith(OWN_TEXT_MARK.encode())
     layout = own_layout(data) if is_own else find_layout(data, where)
     n_rows = (len(data) - layout.offset) / layout.bytes_per_line
-    check_memory(int(16 * n_rows * layout.n_columns), where)  # beside the text, which is in memory now
+    check_memory(int(16 * n_rows * layout.n_columns), where)  # besides the text, which is in memory by now
     names, units = _names_and_units(layout)
     values = parse_rows(data, layout, names, where)
 
@@ -580,7 +581,7 @@ def read_csv(path: Path) -> RawTable:
         columns, time, notes = without_clock(columns, is_named=is_named)
         warnings += notes if time is None or layout.header else [*notes, *ask_whether_runs(columns, where)]
     rate_hz = next((hz for line in layout.preamble if (hz := rate_in_line(line)) is not None), None)
-    if rate_hz is None and time is None and time_among(columns) is None:  # a step may be rounded more than the times
+    if rate_hz is None and time is None and time_among(columns) is None:  # steps may be rounded more than times
         steps = (step_s for line in layout.preamble if (step_s := interval_in_line(line)) is not None)
         rate_hz = next((1.0 / step_s for step_s in steps if step_s > 0), None)
     return RawTable(
@@ -594,8 +595,8 @@ def read_csv(path: Path) -> RawTable:
 
 
 def _with_stated_units(columns: list[RawColumn], preamble: tuple[str, ...]) -> list[RawColumn]:
-    """Return the columns with the units that a line above the table states for all signals, or for each."""
-    n_axes = int(len(columns) > 1 and rises(columns[0].values))  # a time that is known later
+    """Return the columns with the units that a line above the table states, one for all signals or one for each."""
+    n_axes = int(len(columns) > 1 and rises(columns[0].values))  # a time column, identified later
     signals = columns[n_axes:]
     for line in preamble:
         label, *fields = (field.strip() for field in re.split(r"[:=;\t]+", line.strip()))
@@ -609,9 +610,9 @@ def _with_stated_units(columns: list[RawColumn], preamble: tuple[str, ...]) -> l
 
 
 def _names_and_units(layout: CsvLayout) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return a name and a unit per column, one for day and time; a column without a name is called by its number.
+    """Return a name and a unit per column, one for date and time together; a column without a name is numbered.
 
-    A name that occurs twice is followed by the number of its column.
+    A name that occurs more than once is followed by its column number.
     """
     header = layout.header or ("",) * layout.n_columns
     pairs = [split_unit(text) for text in header]
@@ -628,7 +629,7 @@ def _names_and_units(layout: CsvLayout) -> tuple[tuple[str, ...], tuple[str, ...
 
 
 def _doubtful_comma(layout: CsvLayout, values: list[FloatArray]) -> list[str]:
-    """Say so where "1,5" was read as two columns although it may be one with decimal commas."""
+    """Return a warning if "1,5" was read as two columns but may be one with decimal commas."""
     whole = all(np.array_equal(v, np.round(v)) for v in values)
     if layout.separator == "," and layout.n_columns == 2 and not layout.header and whole:
         return ["two columns of whole numbers were read; if the comma is a decimal comma, add a header line"]
@@ -636,7 +637,7 @@ def _doubtful_comma(layout: CsvLayout, values: list[FloatArray]) -> list[str]:
 
 
 def write_csv(recording: Recording, path: Path) -> None:
-    """Write a line of JSON, a header line and one line per sample, numbers with all their digits."""
+    """Write a line of JSON, a header line and one line per sample, with all digits of the numbers."""
     import pyarrow as pa
     from pyarrow import csv as arrow_csv
 

@@ -1,4 +1,4 @@
-"""A file format as the rest of the program sees it, and what gearsig writes beside the samples in each."""
+"""A file format as the rest of the program sees it, and the metadata that gearsig writes in each."""
 
 from __future__ import annotations
 
@@ -16,33 +16,33 @@ from gearsig.recording._types import Recording
 from gearsig.rig import ConstantSpeed, EncoderChannel, PulseTimes, SpeedChannel, SpeedSource, TachometerChannel
 
 OWN_NAME = "gearsig_recording"
-"""Dataset, variable or key that holds the description of a recording that gearsig wrote."""
+"""Dataset, variable or key with the description of a recording that gearsig wrote."""
 
 
 @dataclass(frozen=True)
 class FileFormat:
-    """A file format: how it is recognized, read and written.
+    """A file format: how it is recognised, read and written.
 
-    Libraries of formats are heavy: `read` and `write` import them when they are called.
+    Format libraries are heavy: `read` and `write` import them when called.
 
     Parameters
     ----------
     name : str
-        As users are told it.
+        As shown to users.
     endings : tuple of str
-        Of files that are read, lower case, with the dot.
+        Of files that can be read; lower case, with the dot.
     sniff : callable
-        A file's first bytes → the kind of content, e.g. "MAT v5"; empty where it is of another format.
+        A file's first bytes → the kind of content, e.g. "MAT v5"; empty if it is of another format.
     read : callable
-        Path → `RawTable`; raises `InputError` where the file is damaged.
+        Path → `RawTable`; raises `InputError` if the file is damaged.
     read_part : callable, optional
-        Path and a slice of samples → `RawTable` of these alone; None: the format is only read whole.
+        Path and a slice of samples → `RawTable` of these alone; None: files can only be read whole.
     length : callable, optional
-        Path → samples per channel, without decoding them; beside `read_part`.
+        Path → samples per channel, without decoding them; given along with `read_part`.
     write : callable, optional
-        Writes a recording as a whole file at a path, so that `read` returns the same.
+        Writes a recording to a path as a complete file, so that `read` returns the same.
     written_endings : tuple of str
-        Endings under which recordings are written.
+        Endings with which recordings can be written.
     """
 
     name: str
@@ -56,12 +56,12 @@ class FileFormat:
 
 
 def begins(kind: str, *marks: bytes) -> Callable[[bytes], str]:
-    """Return the `sniff` of a format whose files begin with one of some marks."""
+    """Return the `sniff` of a format whose files begin with one of the given marks."""
     return lambda head: kind if head.startswith(marks) else ""
 
 
 # --------------------
-# What gearsig writes beside the samples, as one JSON text that every format can carry.
+# The metadata that gearsig writes beside the samples, as one JSON text that every format can hold.
 # --------------------
 
 
@@ -79,7 +79,7 @@ _SPEED_KINDS: dict[str, Any] = {
 def metadata_json(recording: Recording) -> str:
     """Return rate, channels, speed source, truth, warnings and history as JSON in ASCII.
 
-    The rig is not part of it: it is a file of its own.
+    The rig is not included: it is a separate file.
     """
     speed = recording.speed
     kind = next((kind for kind, source in _SPEED_KINDS.items() if isinstance(speed, source)), "")
@@ -101,7 +101,7 @@ def metadata_json(recording: Recording) -> str:
 def table_from_metadata(
     text: str, values: Sequence[NumberArray], reader: str, where: str, row_place: Callable[[int], str] = sample_place
 ) -> RawTable:
-    """Return the table of a file in gearsig's own layout from its JSON text and its columns in order."""
+    """Return the table of a file in gearsig's own layout, from its JSON text and its columns in order."""
     try:
         facts = json.loads(text)
         channels = facts["channels"]
@@ -152,7 +152,7 @@ def _check_own(layout: str, n_described: int, n_held: int, where: str) -> None:
 
 
 def _plain_value(value: Any) -> Any:
-    """Turn NumPy values, which a truth may hold, into JSON's."""
+    """Return NumPy values, which a truth may hold, as JSON values."""
     if isinstance(value, np.ndarray):
         return value.tolist()
     if isinstance(value, np.generic):

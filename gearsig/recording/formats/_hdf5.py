@@ -28,8 +28,8 @@ UNIT_ATTRIBUTES = ("unit", "units", "Unit", "Units", "unit_string")
 def read_hdf5(path: Path, part: slice | None = None) -> RawTable:
     """Return the signals of an HDF5 file.
 
-    One- and two-dimensional datasets of numbers become channels, single numbers and attributes named like a sampling
-    rate give the rate, an attribute "unit" or "units" of a dataset its unit. Only what the file itself holds is read:
+    One- and two-dimensional datasets of numbers become channels; single numbers and attributes named like a sampling
+    rate give the rate; an attribute "unit" or "units" of a dataset gives its unit. Only the file itself is read:
     external links, external storage and virtual datasets, which could name any file, are not followed.
 
     Parameters
@@ -41,7 +41,7 @@ def read_hdf5(path: Path, part: slice | None = None) -> RawTable:
     Raises
     ------
     InputError
-        If the file is damaged or would not fit into memory.
+        If the file is damaged or does not fit into memory.
     """
     import h5py
 
@@ -64,17 +64,17 @@ def read_hdf5(path: Path, part: slice | None = None) -> RawTable:
             arrays[dataset_path] = np.atleast_1d(load_dataset(dataset, where, part))
             rates_hz |= _rates_of(dataset.attrs, dataset_path)
         units = _units_of(path, datasets)
-    notes = [f"not followed, because they lead out of the file: {', '.join(skipped[:8])}"] if skipped else []
+    notes = [f"links that were not followed: {', '.join(skipped[:8])}"] if skipped else []
     return table_from_arrays(NamedArrays(arrays, {}, units, rates_hz, tuple(notes)), READER, where)
 
 
 def _own_text(dataset: Any, path: Path) -> str:
-    """Return the single text of a dataset, taken from the file's heap by hand.
+    """Return the single text of a dataset, decoded from the file's heap without the library.
 
-    The library takes as much memory as a damaged reference says, and goes round for ever in a damaged heap. A reference
-    is length (4 bytes), address of the collection (8), number of the object (4); a collection begins "GCOL", version,
-    size, 16 bytes in all; each object with number, count, 4 bytes unused and its size, 16 bytes in all, and is filled
-    up to 8. Source: The HDF Group, *HDF5 File Format Specification*, version 3.0, III.E.
+    The library allocates as much memory as a damaged reference says, and loops for ever in a damaged heap. A reference
+    consists of length (4 bytes), address of the collection (8) and number of the object (4). A collection begins with
+    "GCOL", version and size, 16 bytes in all; each object with number, count, 4 unused bytes and size, 16 bytes in all,
+    and is padded to a multiple of 8. Source: The HDF Group, *HDF5 File Format Specification*, version 3.0, III.E.
     """
     at, n_bytes = dataset.id.get_offset(), path.stat().st_size
     with path.open("rb") as file:
@@ -95,7 +95,7 @@ def _own_text(dataset: Any, path: Path) -> str:
 
 
 def own_datasets(group: Any, skipped: list[str], prefix: str = "", depth: int = MAX_DEPTH) -> list[tuple[str, Any]]:
-    """Return the datasets under a group that lie in the file itself, by path with dots."""
+    """Return the datasets under a group that the file itself holds, by path with dots."""
     import h5py
 
     datasets: list[tuple[str, Any]] = []
@@ -120,7 +120,7 @@ def own_datasets(group: Any, skipped: list[str], prefix: str = "", depth: int = 
 
 
 def decoded_bytes(dataset: Any) -> int:
-    """Return what a dataset takes when it is read; chunks are unpacked whole, be the dataset smaller than one."""
+    """Return the bytes that reading a dataset takes; chunks are unpacked whole, even if the dataset is smaller."""
     return int(max(dataset.size, prod(dataset.chunks or (0,))) * dataset.dtype.itemsize)
 
 
@@ -142,7 +142,7 @@ def load_dataset(dataset: Any, where: str, part: slice | None = None) -> NumberA
 
 
 def hdf5_length(path: Path) -> int:
-    """Return the samples of the longest signal."""
+    """Return the number of samples of the longest signal."""
     import h5py
 
     with h5py.File(path, "r", locking=False) as file:
@@ -164,8 +164,8 @@ def _rates_of(attributes: Any, path: str) -> dict[str, float]:
 def _units_of(path: Path, datasets: list[tuple[str, Any]]) -> dict[str, str]:
     """Return the units that attributes state, by the datasets' paths.
 
-    Texts of no fixed length are read in another process: the library takes as much memory as a damaged reference says,
-    goes round for ever in a damaged heap, and ends the process over a type that there is not.
+    Texts of variable length are read in another process: the library allocates as much memory as a damaged reference
+    says, loops for ever in a damaged heap, and ends the process on an unknown type.
     """
     import h5py
 
@@ -218,7 +218,7 @@ def write_hdf5(recording: Recording, path: Path) -> None:
             samples.attrs["channel_names"] = [c.name.replace("\0", " ") for c in recording.channels]
             samples.attrs["units"] = [c.unit.replace("\0", " ") for c in recording.channels]
             file.create_dataset(OWN_NAME, data=metadata_json(recording))
-    except RuntimeError as error:  # of a file that cannot be closed, as on a disk that is full
+    except RuntimeError as error:  # when a file cannot be closed, e.g. on a full disk
         number = re.search(r"errno = (\d+)", str(error))
         raise (OSError(int(number[1]), str(error)) if number else OSError(str(error))) from error
 

@@ -1,4 +1,4 @@
-"""Reads MATLAB's MAT files of version 5 (saved with -v6 or -v7)."""
+"""Read and write MATLAB's MAT files: version 5 (saved with -v6 or -v7) is read and written, version 7.3 only read."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from gearsig.recording.formats._hdf5 import decoded_bytes, load_dataset, own_dat
 
 MATRIX = 14
 STORED = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
-"""Types that numbers are stored in; a variable of another class may be stored in a smaller one."""
+"""Types in which numbers are stored; a variable may be stored in a smaller type than its class."""
 TEXT = {1: "latin-1", 2: "latin-1", 3: "utf-16", 4: "utf-16", 16: "utf-8", 17: "utf-16", 18: "utf-32"}
 NUMERIC = {6: "f8", 7: "f4", 8: "i1", 9: "u1", 10: "i2", 11: "u2", 12: "i4", 13: "u4", 14: "i8", 15: "u8"}
 CELL, STRUCT, OBJECT, CHAR, SPARSE, FUNCTION, OPAQUE = 1, 2, 3, 4, 5, 16, 17
@@ -40,7 +40,7 @@ Part = tuple[int, memoryview]
 
 
 class Unreadable:
-    """Stands for a value that holds no signal here: a sparse array, a function, an object of a class."""
+    """Placeholder for a value that holds no signal: a sparse array, a function or an object of a class."""
 
 
 def decode_variable(body: memoryview, order: str) -> tuple[str, Any]:
@@ -61,13 +61,13 @@ def decode_variable(body: memoryview, order: str) -> tuple[str, Any]:
     Raises
     ------
     InputError
-        If codes or lengths are not as the format says; the caller adds file and place.
+        If codes or lengths violate the format; the caller adds file and place.
     """
     return _matrix(body, order, MAX_DEPTH)
 
 
 def tags(body: memoryview, order: str) -> Iterator[Part]:
-    """Yield type and content of the elements that follow one another."""
+    """Yield the type and content of consecutive elements."""
     at = 0
     while at < len(body):
         if at + 8 > len(body):
@@ -80,7 +80,7 @@ def tags(body: memoryview, order: str) -> Iterator[Part]:
         if code not in STORED and code not in TEXT and code != MATRIX:
             raise _damage(f"an element is of the unknown type {code}")
         if start + size > len(body) or (start == at + 4 and size > 4):
-            raise _damage("an element is longer than what holds it")
+            raise _damage("an element is longer than the one that contains it")
         yield code, body[start : start + size]
         at += step
 
@@ -139,7 +139,7 @@ def _text(parts: Sequence[Part], order: str) -> str:
 
 
 def _struct(parts: Sequence[Part], n_elements: int, order: str, depth: int) -> Any:
-    """Return a dict for a single struct, a list of dicts for an array of them."""
+    """Return a dict for a single struct, a list of dicts for a struct array."""
     if len(parts) < 2:
         raise _damage("a struct has no field names")
     lengths, text = _numbers(parts[0], order), bytes(parts[1][1])
@@ -178,7 +178,8 @@ def variables(path: Path) -> Iterator[tuple[str, Any]]:
     Raises
     ------
     InputError
-        If the file is cut off, damaged or would not fit into memory; the byte is named where the variable begins.
+        If the file is truncated, damaged or does not fit into memory; the error names the byte where the variable
+        begins.
     """
     n_bytes = path.stat().st_size
     total = 0
@@ -219,7 +220,7 @@ def _decoded(body: memoryview, order: str, where: str, at: int) -> tuple[str, An
 
 
 def _unpacked(packed: bytes, path: Path, at: int, before: int) -> bytes:
-    """Decompress in chunks, so that a bomb is noticed early."""
+    """Decompress in chunks, so that a decompression bomb is noticed early."""
     stream = zlib.decompressobj()
     chunks: list[bytes] = []
     size = 0
@@ -252,13 +253,13 @@ def read_mat5(path: Path) -> RawTable:
     """Return the signals of a MAT file.
 
     Variables and fields of structs become channels if they are vectors or matrices; single numbers named like a
-    sampling rate (fs, sr, SampFreq, dt, …) give the rate. A variable that stands in the file twice is taken from the
-    copy that is not all zeros.
+    sampling rate (fs, sr, SampFreq, dt, …) give the rate. Of a variable that occurs twice, the copy that is not all
+    zeros is used.
 
     Raises
     ------
     InputError
-        If the file is damaged, holds only objects or text, or would not fit into memory.
+        If the file is damaged, holds only objects or text, or does not fit into memory.
     """
     where = path.name
     values, notes = _load(path)
@@ -275,7 +276,7 @@ def read_mat5(path: Path) -> RawTable:
 
 
 def _load(path: Path) -> tuple[dict[str, Any], list[str]]:
-    """Return the variables by name; among copies the last that is not blank, with a note."""
+    """Return the variables by name, of copies the last that is not blank, and warnings."""
     chosen: dict[str, Any] = {}
     doubled: dict[str, None] = {}
     differ: dict[str, None] = {}
@@ -290,14 +291,14 @@ def _load(path: Path) -> tuple[dict[str, Any], list[str]]:
     notes = []
     if doubled:
         names = ", ".join(doubled)
-        notes.append(f"variables stand in the file more than once, the copy that is not all zeros was taken: {names}")
+        notes.append(f"variables occur more than once in the file; the copy that is not all zeros was used: {names}")
     if differ:
-        notes.append(f"the copies of {', '.join(differ)} differ: the last was taken")
+        notes.append(f"the copies of {', '.join(differ)} differ: the last was used")
     return chosen, notes
 
 
 def _is_blank(value: Any) -> bool:
-    """Whether an array is empty or all zeros; a struct or cell is if all its numbers are."""
+    """Whether an array is empty or all zeros; a struct or cell is blank if all its contents are."""
     if isinstance(value, dict):
         return all(_is_blank(item) for item in value.values())
     if isinstance(value, list):
@@ -324,7 +325,7 @@ def _flatten(
     if isinstance(value, dict):
         name = next((text for key in ("Name", "Label") if isinstance(text := value.get(key), str)), "")
         data = next((key for key in ("Data", "Values", "Value") if _is_signal(value.get(key))), None)
-        if name and data is not None:  # an element of a list of channels, called by what it states
+        if name and data is not None:  # an element of a list of channels, which states its name
             value = {**value, name.replace(".", "_"): value[data], "unit": value.get("Unit", value.get("Units", ""))}
             del value[data]
         for name, item in value.items():
@@ -345,12 +346,12 @@ def _is_signal(value: Any) -> bool:
 
 
 def _function(value: dict[str, Any], axis: dict[str, Any]) -> dict[str, Any]:
-    """Return a function over an axis, as Simcenter Testlab exports it, as its signals, their unit and the step.
+    """Return the signals, their unit and the step of a function over an axis, as Simcenter Testlab exports it.
 
     Raises
     ------
     InputError
-        If the axis is one of frequency or order.
+        If the axis is frequency or order.
     """
 
     def label(of: Any) -> str:
@@ -372,7 +373,7 @@ def _function(value: dict[str, Any], axis: dict[str, Any]) -> dict[str, Any]:
 
 
 # --------------------
-# Reads MATLAB's MAT files of version 7.3, which are HDF5 files with MATLAB's conventions.
+# MATLAB's MAT files of version 7.3, which are HDF5 files with MATLAB's conventions.
 # --------------------
 
 
@@ -388,7 +389,7 @@ def read_mat73(path: Path) -> RawTable:
     Raises
     ------
     InputError
-        If the file is damaged, holds no plain arrays, or would not fit into memory.
+        If the file is damaged, holds no plain arrays, or does not fit into memory.
     """
     import h5py
 
@@ -405,7 +406,7 @@ def read_mat73(path: Path) -> RawTable:
             if _matlab_class(dataset) == "char":
                 texts[name] = _text73(dataset)
             elif dataset.dtype.kind in "fiub":
-                # MATLAB stores columns first, HDF5 rows first: every matrix arrives transposed.
+                # MATLAB stores by columns, HDF5 by rows: every matrix arrives transposed.
                 arrays[name] = np.atleast_2d(load_dataset(dataset, where)).T
             else:
                 skipped.append(name)
@@ -414,14 +415,14 @@ def read_mat73(path: Path) -> RawTable:
 
 
 def _matlab_class(dataset: Any) -> str:
-    # One of any length may be damaged in ways that the library does not survive; MATLAB writes none.
+    # A text of variable length may be damaged in ways that crash the library; MATLAB writes none.
     is_fixed = "MATLAB_class" in dataset.attrs and dataset.attrs.get_id("MATLAB_class").dtype.kind == "S"
     value = dataset.attrs["MATLAB_class"] if is_fixed else b""
     return value.decode("ascii", errors="replace") if isinstance(value, bytes) else str(value)
 
 
 def _text73(dataset: Any) -> str:
-    """Return a char array, which MATLAB stores as UTF-16 code units."""
+    """Return the text of a char array, which MATLAB stores as UTF-16 code units."""
     if dataset.size > MAX_TEXT or dataset.dtype.kind != "u":
         return ""
     units = np.asarray(dataset[()]).reshape(-1).astype("<u2")
@@ -429,7 +430,7 @@ def _text73(dataset: Any) -> str:
 
 
 def write_mat(recording: Recording, path: Path) -> None:
-    """Write the contents samples (time, channel), fs, channel_names and gearsig_recording (JSON)."""
+    """Write the variables samples (time, channel), fs, channel_names and gearsig_recording (JSON)."""
     from scipy.io import savemat
 
     if recording.samples.nbytes >= 2**31:

@@ -23,15 +23,15 @@ READER = "gearsig MF4 reader"
 
 
 def read_mf4(path: Path) -> RawTable:
-    """Return the fastest channels of an MDF file, scaled as it says, with their time.
+    """Return the fastest channels of an MDF file, scaled as it states, with their time.
 
-    Each group of channels has a time of its own. The group with most samples counts, and others with the same times;
-    slower ones are left out with a note.
+    Each group of channels has its own time. The group with the most samples is used, and others with the same times;
+    slower ones are left out with a warning.
 
     Raises
     ------
     InputError
-        If `asammdf` is not installed, or the file is damaged, holds no numbers or would not fit into memory.
+        If `asammdf` is not installed, or the file is damaged, holds no numbers or does not fit into memory.
     """
     where = path.name
     if find_spec("asammdf") is None:
@@ -48,7 +48,7 @@ def read_mf4(path: Path) -> RawTable:
         return call_apart(_read, path, longest_s=4.0 + 1e-6 * size, most_bytes=most_bytes)
     except (BrokenProcessPool, MemoryError):
         raise InputError(
-            "is damaged: its reader crashes, finds no end, or asks for far more memory than it can hold",
+            "is damaged: its reader crashes, does not finish, or needs far more memory than the file can hold",
             where=where,
             allowed="a complete MF4 file",
         ) from None
@@ -59,7 +59,7 @@ def _load() -> None:
 
     import asammdf  # noqa: F401
 
-    logging.getLogger("asammdf").disabled = True  # it writes of damaged files; what they come to is said once, by us
+    logging.getLogger("asammdf").disabled = True  # it logs errors of damaged files, which are reported once, here
 
 
 def _read(path: Path) -> RawTable:
@@ -79,7 +79,7 @@ def _read(path: Path) -> RawTable:
 
 
 def _columns(signals: list[Any]) -> tuple[RawColumn, ...]:
-    """Name channels as the file does, numbered where a name is used twice."""
+    """Return the channels, named as in the file; names used more than once are numbered."""
     n_used = Counter(str(s.name) for s in signals)
     return tuple(
         RawColumn(f"{s.name} ({i})" if n_used[str(s.name)] > 1 else str(s.name), s.samples, str(s.unit or ""))

@@ -21,13 +21,13 @@ READER = "gearsig Parquet reader"
 def read_parquet(path: Path, part: slice | None = None) -> RawTable:
     """Return the columns of numbers of a Parquet file.
 
-    Units stand in the column's metadata ("unit", "units") or in brackets in its name; a key of the file's metadata
-    named like a sampling rate states the rate. The index that pandas writes is left out.
+    Units are in the column's metadata ("unit", "units") or in brackets in its name; a key of the file's metadata that
+    is named like a sampling rate states the rate. The index that pandas writes is left out.
 
     Raises
     ------
     InputError
-        If the file is damaged or would not fit into memory.
+        If the file is damaged or does not fit into memory.
     """
     from pyarrow import parquet, types
 
@@ -40,7 +40,7 @@ def read_parquet(path: Path, part: slice | None = None) -> RawTable:
         numeric = [f for f in schema if any(test(f.type) for test in is_number)]
         kept = [f for f in numeric if not f.name.startswith("__index_level_")]
         row_bytes = sum(max(1, int(f.type.bit_width) // 8) for f in kept)
-        # Buffered: column by column, and nothing of it before it is used.
+        # Buffered: column by column, nothing before it is used.
         lazily = parquet.ParquetFile(file, metadata=parts.metadata, buffer_size=4096, pre_buffer=False)
         sizes = _group_bytes(lazily, kept, row_bytes)
         check_decoded(sum(sizes), path, at_once_bytes=None if part is None else max(sizes, default=0))
@@ -73,14 +73,14 @@ def _column(field: Any, values: Any) -> RawColumn:
 
 
 def parquet_length(path: Path) -> int:
-    """Return the rows that the file states."""
+    """Return the number of rows that the file states."""
     from pyarrow import parquet
 
     return int(parquet.read_metadata(path).num_rows)
 
 
 def _column_values(parts: Any, name: str, part: slice | None) -> NumberArray:
-    """Return a column, or the part of it that some row groups hold."""
+    """Return a column, or a part of it from the row groups that hold it."""
     if part is None:
         whole: NumberArray = parts.read(columns=[name]).column(name).to_numpy()
         return whole
@@ -96,13 +96,13 @@ def _column_values(parts: Any, name: str, part: slice | None) -> NumberArray:
 
 
 def _group_bytes(parts: Any, fields: Sequence[Any], row_bytes: int) -> list[int]:
-    """Return what some columns unpack to in each group of rows, pages and dictionaries as the file states them."""
+    """Return the decoded bytes of some columns in each row group; pages and dictionaries count as the file states."""
     names, schema = {field.name for field in fields}, parts.schema
     columns = [i for i in range(len(schema)) if schema.column(i).path in names]
     sizes = []
     for i in range(parts.metadata.num_row_groups):
-        # What is stated of a column may contradict itself. To read it, be it no rows at all, raises an error that can
-        # be caught; the question below would end the process.
+        # A column's metadata may be inconsistent. Reading it, even no rows of it, raises an error that can be caught;
+        # the request for its size below would end the process.
         list(parts.reader.iter_batches(0, [i], columns))
         group = parts.metadata.row_group(i)
         stated = sum(int(group.column(column).total_uncompressed_size) for column in columns)
@@ -120,7 +120,7 @@ def _stated_rate(metadata: Mapping[bytes, bytes]) -> float | None:
 
 
 def write_parquet(recording: Recording, path: Path) -> None:
-    """Write one column per channel; the JSON stands in the schema's metadata, units in the columns'."""
+    """Write one column per channel, the JSON in the schema's metadata and units in the columns' metadata."""
     import pyarrow as pa
     from pyarrow import parquet
 

@@ -22,21 +22,21 @@ READER = "gearsig TDMS reader"
 def read_tdms(path: Path, part: slice | None = None) -> RawTable:
     """Return the channels of a TDMS file, scaled as its properties say.
 
-    The rate is one over the waveform property "wf_increment", or a property named like a sampling rate, of the channel,
-    its group or the file; the unit is "unit_string". Channels of text or of time stamps, and those that were sampled
+    The rate is one over the waveform property "wf_increment", or a property of the channel, its group or the file that
+    is named like a sampling rate; the unit is "unit_string". Channels of text or time stamps, and channels sampled
     slower than others, are left out.
 
     Raises
     ------
     InputError
-        If the file is damaged, or it would not fit into memory.
+        If the file is damaged or does not fit into memory.
     """
     from nptdms import TdmsFile
 
     where = path.name
     if part is None:
         check_memory(3 * path.stat().st_size, where)
-    # The open file is given, not its name: the index file beside it, which may be of another recording, is not read.
+    # The open file is passed, not its name: the index file beside it may belong to another recording and is not read.
     with _quiet(), path.open("rb") as stream, TdmsFile.open(stream) as file:
         _check_complete(file, where)
         channels = {}
@@ -47,7 +47,7 @@ def read_tdms(path: Path, part: slice | None = None) -> RawTable:
             check_decoded(sum(8 * len(channel) for group in file.groups() for channel in group.channels()), path)
         for group in file.groups():
             for channel in group.channels():
-                # A dot separates the levels of names elsewhere; within a name it would cut it.
+                # A dot separates the levels of names; within a name it would split it.
                 name = f"{group.name}.{channel.name.replace('.', '_')}"
                 if channel.dtype.kind not in "fiub":
                     left_out.append(channel.name)
@@ -63,7 +63,7 @@ def read_tdms(path: Path, part: slice | None = None) -> RawTable:
 
 
 def tdms_length(path: Path) -> int:
-    """Return the samples of the longest channel of numbers."""
+    """Return the number of samples of the longest numeric channel."""
     from nptdms import TdmsFile
 
     with _quiet(), path.open("rb") as stream, TdmsFile.open(stream) as file:
@@ -73,7 +73,7 @@ def tdms_length(path: Path) -> int:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep the library from writing to the terminal what is raised here as an error."""
+    """Keep the library from also printing what is raised here as an error."""
     from nptdms.log import log_manager
 
     before = log_manager.log_level
@@ -85,7 +85,7 @@ def _quiet() -> Iterator[None]:
 
 
 def _check_complete(file: Any, where: str) -> None:
-    """Raise where the last segment ends before its data: the library would return what is there."""
+    """Raise if the last segment is truncated: the library would return what is there."""
     if file.file_status.incomplete_final_segment:
         raise InputError(
             "the last segment is cut off",

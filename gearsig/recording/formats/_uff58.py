@@ -27,7 +27,7 @@ QUANTITIES = {8: "displacement", 9: "force", 11: "velocity", 12: "acceleration",
 def read_uff58(path: Path) -> RawTable:
     """Return the time responses (function type 0 or 1) of a universal file.
 
-    A channel is called by the response's name, or node and direction. Other data sets are left out.
+    A channel has the name of the response, or else its node and direction. Other data sets are left out.
 
     Raises
     ------
@@ -57,7 +57,7 @@ def read_uff58(path: Path) -> RawTable:
 
 
 def _one_rate(signals: list[dict[str, Any]], where: str) -> float | None:
-    """Return the rate of evenly spaced signals, None where each sample has its own time."""
+    """Return the rate in Hz of evenly spaced signals; None if each sample has its own time."""
     if any(int(s.get("abscissa_spacing", 1)) == 0 for s in signals):
         return None
     steps_s = [float(s.get("abscissa_inc", 0.0)) for s in signals]

@@ -1,4 +1,4 @@
-"""WAV files, with channel scales from a LEA chunk where there is one."""
+"""WAV files, with channel scales from a LEA chunk if there is one."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from gearsig.recording._types import Recording
 from gearsig.recording.formats._format import FileFormat, metadata_json, table_from_metadata
 
 # --------------------
-# The chunks of a RIFF/WAVE file beside its samples.
+# The chunks of a RIFF/WAVE file other than its samples.
 # --------------------
 
 
@@ -36,14 +36,14 @@ class LeaChannel:
 
 
 def find_chunks(path: Path) -> tuple[dict[bytes, bytes], int]:
-    """Return the chunks other than "data" by name, and the place after the last; refuse one whose audio is cut off.
+    """Return the chunks other than "data" by name, and the position after the last.
 
-    What follows the audio and is no chunk, as some vendors append, is left out.
+    Bytes after the audio that are not a chunk, as some vendors append, are left out.
 
     Raises
     ------
     InputError
-        If the file is cut off or has no data chunk.
+        If the audio, or a chunk with units or scales, is truncated, or if samples or their format are missing.
     """
     n_bytes = path.stat().st_size
     chunks: dict[bytes, bytes] = {}
@@ -51,7 +51,7 @@ def find_chunks(path: Path) -> tuple[dict[bytes, bytes], int]:
     with path.open("rb") as file:
         head = file.read(12)
         order = ">" if head[:4] == b"RIFX" else "<"
-        if head[:4] == b"RF64":  # 64-bit lengths stand in a chunk of their own; scipy checks them
+        if head[:4] == b"RF64":  # 64-bit lengths are in a separate chunk; scipy checks them
             return chunks, n_bytes
         last = file.tell()
         while len(tag := file.read(8)) == 8:
@@ -81,12 +81,12 @@ def find_chunks(path: Path) -> tuple[dict[bytes, bytes], int]:
 
 
 def parse_lea(chunk: bytes) -> list[LeaChannel]:
-    """Return names, scales and units from a LEA chunk, an empty list if it is not as inferred here.
+    """Return names, scales and units from a LEA chunk; empty if it does not have the layout inferred here.
 
-    The layout is not published; it was inferred from one file whose scales are known. Per channel: four bytes "le"
-    and the channel number in two digits, length (uint32), value of full scale (float32), name and unit, each with its
-    length (uint16) before it, two float32 that are not used (in that file: 0, and a figure of at most 1). It is taken
-    only if every length fits exactly.
+    The layout is not published; it was inferred from one file whose scales are known. Per channel: four bytes, "le"
+    and the channel number in two digits; length (uint32); value of full scale (float32); name and unit, each preceded
+    by its length (uint16); two unused float32 (in that file: 0, and a number of at most 1). The chunk is used only if
+    every length fits exactly.
     """
     channels: list[LeaChannel] = []
     try:
@@ -113,20 +113,21 @@ def _counted_text(body: bytes, at: int) -> tuple[str, int]:
 
 READER = "gearsig WAV reader"
 
-# Zero and full scale of the integer types as scipy returns them; it left-justifies 24 bit in 32.
+# Zero and full scale of the integer types as scipy returns them; 24-bit samples are left-justified in 32.
 _SCALES = {"uint8": (128.0, 128.0), "int16": (0.0, 2.0**15), "int32": (0.0, 2.0**31), "int64": (0.0, 2.0**63)}
 
 
 def read_wav(path: Path, part: slice | None = None) -> RawTable:
     """Return the channels of a WAV file, scaled to ±1 full scale.
 
-    Integers of 8 to 32 bit are divided by their full scale, floats are kept. Channels are called "ch1", "ch2", … with
-    the unit "FS" (full scale), unless a LEA chunk states names, scales and units; a rig's sensors give scales else.
+    Integers of 8 to 32 bit are divided by their full scale, floats are kept. Channels are named "ch1", "ch2", … with
+    the unit "FS" (full scale), unless a LEA chunk states names, scales and units; otherwise a rig's sensors give
+    scales.
 
     Raises
     ------
     InputError
-        If the file is cut off or its coding is not PCM or float.
+        If the file is truncated or its coding is not PCM or float.
     """
     from scipy.io import wavfile
 
@@ -137,7 +138,7 @@ def read_wav(path: Path, part: slice | None = None) -> RawTable:
         check_memory(6 * n_bytes, where)
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # a warning means a damaged file, and becomes an error
-        # Chunks that scipy does not know are none of its business; find_chunks has checked the lengths.
+        # Chunks unknown to scipy are harmless: find_chunks has checked the lengths.
         warnings.filterwarnings("ignore", message="Chunk .*not understood")
         if part is None:
             rate_hz, frames = wavfile.read(path if end == n_bytes else _up_to(path, end))
@@ -149,12 +150,12 @@ def read_wav(path: Path, part: slice | None = None) -> RawTable:
         return table_from_metadata(chunks[OWN_CHUNK].decode("utf-8", errors="replace"), rows, READER, where)
     described = parse_lea(chunks.get(b"LEA ", b""))
     columns = [_column(i, row, described if len(described) == len(rows) else []) for i, row in enumerate(rows)]
-    notes = (f"{n_bytes - end} bytes after the audio are no WAV chunk and were left out",) if end < n_bytes else ()
+    notes = (f"{n_bytes - end} bytes after the audio are not a WAV chunk and were left out",) if end < n_bytes else ()
     return RawTable(tuple(columns), READER, sampling_rate_hz=float(rate_hz), warnings=notes)
 
 
 def wav_length(path: Path) -> int:
-    """Return the samples per channel; 24-bit samples, which cannot be mapped, are refused."""
+    """Return the number of samples per channel; 24-bit samples, which cannot be mapped, are refused."""
     from scipy.io import wavfile
 
     find_chunks(path)
@@ -164,7 +165,7 @@ def wav_length(path: Path) -> int:
 
 
 def _up_to(path: Path, end: int) -> io.BytesIO:
-    """Return the file without what follows its last chunk; its header then states that length."""
+    """Return the file without the bytes after its last chunk, and with that length in its header."""
     with path.open("rb") as file:
         whole = bytearray(file.read(end))
     whole[4:8] = struct.pack(">I" if whole[:4] == b"RIFX" else "<I", end - 8)
@@ -180,7 +181,7 @@ def _column(i: int, values: NumberArray, described: list[LeaChannel]) -> RawColu
 
 
 def _to_full_scale(values: NumberArray) -> NumberArray:
-    """Return ±1 full scale: float32 for up to 24 bit, which it holds exactly, float64 beyond."""
+    """Return values scaled to ±1: float32 for up to 24 bit, which it holds exactly, else float64."""
     if values.dtype.kind == "f":
         return values
     if values.dtype.name not in _SCALES:
@@ -194,12 +195,12 @@ def _to_full_scale(values: NumberArray) -> NumberArray:
 
 
 def write_wav(recording: Recording, path: Path) -> None:
-    """Write float32 samples in the channels' units and a chunk "gsig" with the JSON."""
+    """Write float32 samples in the channels' units, and the JSON in a chunk "gsig"."""
     from scipy.io import wavfile
 
     rate_hz = round(recording.sampling_rate_hz)
     n_bytes = 4 * recording.samples.size
-    # The header holds the bytes per second in 32 bits, and per frame in 16.
+    # The header holds the bytes per second in 32 bits, and those per frame in 16.
     if (
         rate_hz < 1
         or 4 * rate_hz * len(recording.channels) >= 2**32
