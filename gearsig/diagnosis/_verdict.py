@@ -39,7 +39,7 @@ NOT_ALONE = "{} and misalignment would only show against an earlier recording."
 
 NO_FAULT, CANNOT_TELL = "No fault shows.", "Cannot tell."
 
-SURER_WITH, WHAT_WOULD_HELP = "Surer with: ", "What would help: "
+SURER_WITH, WHAT_WOULD_HELP = "More certain with: ", "What would help: "
 """Start of the last sentence of a verdict that cannot tell."""
 
 _RANK = {kind: i for i, kind in enumerate(Kind)}
@@ -118,9 +118,9 @@ def _remedy(gaps: list[Finding]) -> list[str]:
     if first is None:
         return []
     surer = first.surer.partition(". ")[0].rstrip(".")
-    if first.code in (DEPTH_UNKNOWN, SPEED_UNKNOWN):  # say what to do, not what to have
-        return [f"{WHAT_WOULD_HELP}{surer[:1].lower()}{surer[1:]}."]
-    return [f"{SURER_WITH}{surer}."]
+    # Say what to do, not what to have, where a value is missing.
+    opener = WHAT_WOULD_HELP if first.code in (DEPTH_UNKNOWN, SPEED_UNKNOWN) else SURER_WITH
+    return [f"{opener}{surer[:1].lower()}{surer[1:]}."]
 
 
 def _problem_title(problem: ChannelProblem) -> str:

@@ -423,7 +423,7 @@ def _finding_lines(number: int, finding: Finding, *, says_surer: bool) -> list[s
         lines.append(_paragraph(f"how sure: {sureness_text(finding)}"))
     lines += [_paragraph(f"evidence: {text}") for text in finding.evidence]
     if finding.surer and says_surer:
-        lines.append(_paragraph(f"surer with: {finding.surer}"))
+        lines.append(_paragraph(f"more certain with: {finding.surer}"))
     return [*lines, ""]
 
 

@@ -241,7 +241,7 @@ def test_the_unit_of_the_channel_does_not_matter(gain: float, knocking: Analysis
 
 def test_the_text_tells_place_strength_and_remedy(knocking: Analysis) -> None:
     text = analysis_text(knocking, with_indicators=True)
-    for part in ("gear stage/in; tooth 1", "how strong:", "how sure:", "surer with:", "FM4", ", tooth 1"):
+    for part in ("gear stage/in; tooth 1", "how strong:", "how sure:", "more certain with:", "FM4", ", tooth 1"):
         assert part in text
     assert max(len(line) for line in text.splitlines()[:20]) <= 100
 

@@ -34,7 +34,7 @@ def test_no_fault_is_only_said_where_one_would_have_shown(findings: list[Finding
 
 def test_an_open_question_comes_with_what_would_settle_it() -> None:
     gap = Finding("x", Kind.CANNOT_TELL, "Noise hides it.", surer="A longer recording. Or another sensor.")
-    assert verdict_of((gap,)) == "Cannot tell. Noise hides it. Surer with: A longer recording."
+    assert verdict_of((gap,)) == "Cannot tell. Noise hides it. More certain with: a longer recording."
 
 
 UNUSED = Finding(

@@ -181,7 +181,7 @@ def test_what_would_make_it_surer_is_said_once(gearbox):
     assert SURER_WITH not in " ".join(headline_of(analysis))
     assert SURER_WITH in headline_of(analysis, with_remedy=True)[1]
     assert SURER_WITH in " ".join(headline_of(replace(analysis, findings=())))
-    assert analysis_text(analysis).count("surer with:") == 1
+    assert analysis_text(analysis).count("more certain with:") == 1
 
 
 def test_levels_that_changed_are_told_apart_by_their_channels_with_a_minus_sign(gearbox):

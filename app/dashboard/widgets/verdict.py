@@ -237,7 +237,7 @@ def _show_measures(card: FindingCard) -> None:
     lines = [
         ("how strong", card.strength),
         ("how sure", card.confidence_basis),
-        ("surer with", card.surer),
+        ("more certain with", card.surer),
     ]
     text = "  \n".join(f":small[:gray[{name}:] {as_typed(in_page_text(value))}]" for name, value in lines if value)
     if text:
