@@ -8,7 +8,7 @@ import pytest
 from scipy.signal import resample_poly
 
 from gearsig.comparison import compare
-from gearsig.diagnosis import Analysis, CannotTell, Finding, Kind, analyze
+from gearsig.diagnosis import Analysis, CannotTell, Finding, Kind, Outcome, analyze
 from gearsig.prepared import refined_angle
 from gearsig.recording import Recording, read_recording
 from gearsig.rig import ConstantSpeed, OperatingPoint
@@ -154,6 +154,7 @@ def test_motor_bench_names_the_right_part_of_the_right_bearing_or_none(file: str
     assert likely == ([(code, "drive end")] if code else [])
     if file == "normal_0.mat":
         assert not claims(analysis)
+        assert analysis.outcome is Outcome.NO_FAULT
 
 
 @pytest.mark.parametrize(("file", "race"), [("OR007@6_0.mat", "outer-race"), ("IR021_0.mat", "inner-race")])

@@ -847,7 +847,8 @@ def races_beside_shaft(signals: AnalysisSignals, envelopes: Sequence[BandEnvelop
     If a race rings from one impact to the next, there are no further multiples; slip may also bring the first so near
     to a whole number of turns that it is taken for the shaft's. This line and its two sidebands then lie at equal
     distances from the shaft's multiples, on one side, whereas a varying speed spreads the multiples to both sides,
-    higher ones more. A multiple of another shaft is attributed to that shaft.
+    higher ones more. A multiple of another shaft is attributed to that shaft. One band of one channel alone does not
+    count: impacts excite more than that, and healthy bearings show as much in one.
     """
     races = {}
     for bearing, name, order in expected_parts(signals):
@@ -857,6 +858,7 @@ def races_beside_shaft(signals: AnalysisSignals, envelopes: Sequence[BandEnvelop
             continue
         low, high = (order * (1 + side * slip_of(signals)) - k * shaft for side in (-1, 1))
         others = [turns for turns in signals.known_shaft_orders.values() if turns != shaft]
+        n_envelopes = 0
         for excess in (envelope.excess for envelope in envelopes):
             values, width = excess.spectrum.values, excess.spectrum.resolution
             off = np.arange(ceil(low / width), int(high / width) + 1) * width
@@ -871,8 +873,9 @@ def races_beside_shaft(signals: AnalysisSignals, envelopes: Sequence[BandEnvelop
                 continue
             is_peak = values[here] >= np.maximum(values[here - 1], values[here + 1])
             least = np.maximum(10 ** (BESIDE_DB / 20) * excess.floor[here], 10 ** (ONE_SIDED_DB / 20) * values[there])
-            if np.any(np.all(is_peak & (values[here] >= least), axis=1)):
-                races[part_text(name, bearing.name)] = k, bearing.shaft
+            n_envelopes += bool(np.any(np.all(is_peak & (values[here] >= least), axis=1)))
+        if n_envelopes > 1:
+            races[part_text(name, bearing.name)] = k, bearing.shaft
     return races
 
 
