@@ -704,9 +704,7 @@ def _condition(
     facts = facts_of(recording, now, twin)
     messages += _messages_of_recording(recording, facts)
     match, why = matching_reference(now, recording.rig, healthy)
-    if match is None or teeth_mismatch_text(
-        match.reduced, match.name
-    ):  # if a healthy one fits, the cause is damage
+    if match is None or teeth_mismatch_text(match.reduced, match.name):  # if a healthy one fits, the cause is damage
         messages += teeth_mismatch_text(now, name)
     if why:
         messages.append(f"{name} is compared with the simulation: {why}.")
