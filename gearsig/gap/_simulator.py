@@ -236,8 +236,8 @@ class DriveFacts:
     ----------
     path : PathOfContact
     contact : ToothContact
-        Contact of the rig; half the play and driven inertia come from a healthy recording where it
-        shows them.
+        Contact of the rig; half the play and driven inertia come from a healthy recording where it shows
+        them.
     module_mm : float
     motor_torque_nm, brake_torque_nm : float
         With the valve open, and during a stop.

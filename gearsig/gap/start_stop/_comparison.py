@@ -139,8 +139,8 @@ def simulated_drive(simulator: DriveSimulator, cycles: PreparedCycles, healthy: 
     """Set a simulated drive to a rig and a recording.
 
     Geometry, inertias, contact, flank friction and play are the rig's; play, inertia and load friction are taken from a
-    healthy recording where it shows them. Times of valve and brake, the speed limited by the flow and, without a healthy
-    recording, the load friction are the recording's own, since the way the machine is driven is not a gap.
+    healthy recording where it shows them. Times of valve and brake, the speed limited by the flow and, without a
+    healthy recording, the load friction are the recording's own, since the way the machine is driven is not a gap.
     """
     m = cycles.motion
     contact, ratio = m.contact, m.path.teeth[1] / m.path.teeth[0]
