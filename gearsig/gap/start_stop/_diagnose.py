@@ -1,18 +1,17 @@
 """The gap between start–stop recordings and a simulated drive: where, which cause, how far it shrinks, what next.
 
-Orders and sidebands mean nothing where the speed crosses zero. What a start–stop machine tells is in its equations:
-play and deflection of the flanks, tooth by tooth and over the mesh cycle, under a torque that is measured; inertia and
 Orders and sidebands have no meaning where the speed crosses zero. The evidence of a start–stop machine is in its
 equations: play and deflection of the flanks, tooth by tooth and over the mesh cycle, under a measured torque; inertia
 and friction of the load, from torque against acceleration; ripple of the torque over the pinion's angle; impacts. They
 hold whatever the valve and the brake do, so a simulated drive need not repeat the same motion.
 
 1. These equations are fitted to the cycles of a recording, and to those of its baseline: a healthy recording, or a run
-of the drive simulated from the rig's drawing (with valve, brake and load friction taken from the recording: nuisances).
+   of the drive simulated from the rig's drawing (with valve, brake and load friction taken from the recording:
+   nuisances).
 2. Each cause is simulated at some severities, with linear interpolation between them. The predicted change is compared
-with the observed one, relative to the floor: the differences between healthy drives (`floors.json`).
+   with the observed one, relative to the floor: the differences between healthy drives (`floors.json`).
 3. Severity and evidence come from all cycles. The shrink comes from every second cycle, checked on the others and vice
-versa, against the same cause at wrong teeth and orders. Both enter probabilities calibrated on blind cases.
+   versa, against the same cause at wrong teeth and orders. Both enter probabilities calibrated on blind cases.
 """
 
 from __future__ import annotations
