@@ -263,8 +263,8 @@ def facts_of(prepared: PreparedRecording, now: ReducedRecording, twin: Twin) -> 
     if stated_nm == 0.0:
         raise RefusalError(
             "the rig file states a torque of 0, at which nothing presses the simulated teeth together",
-            remedy="give the drag of the driven side, some percent of the rated torque; without torque_nm a usual one "
-            "is assumed",
+            remedy="give the drag torque of the driven side, a few percent of the rated torque; without torque_nm a "
+            "usual torque is assumed",
         )
     return ConditionFacts(
         recording.name,
@@ -424,9 +424,9 @@ def tooth_count_mismatch_text(now: ReducedRecording, name: str, reference: Reduc
         if shares.get(stated, 1.0) < HARDLY_EXPLAINED and shares.get(best, 0.0) > WELL_EXPLAINED:
             shaft = shaft_text(now.frame, side)
             message = (
-                f"{name}: the teeth do not fit. What repeats with {shaft} does so {best} times a revolution, and the "
-                f"rig file gives its gear {stated} teeth. Unless it is a recording of another machine, the rig file is "
-                "wrong; until that is settled nothing here can be relied on."
+                f"{name}: the teeth do not fit. What repeats with {shaft} does so {best} times per revolution, but the "
+                f"rig file gives its gear {stated} teeth. Unless the recording is of another machine, the rig file is "
+                "wrong; until this is settled, nothing here is reliable."
             )
             return [message]
     return []
@@ -484,8 +484,8 @@ def swapped_recordings_text(now: ReducedRecording, reference: ReducedRecording, 
             message = (
                 f"{name}: recording and reference may have been exchanged. {tooth} of {shaft_text(now.frame, side)} "
                 f"(at {360.0 * place:.0f}°) stands {prominence_db:.0f} dB above the median tooth in the reference, "
-                f"and is {lost_db:.0f} dB weaker in the recording; damage adds such a burst and takes none away. If "
-                "so, what is named is what the reference has: give the two the other way round."
+                f"and is {lost_db:.0f} dB weaker in the recording; damage adds such a burst but never removes "
+                "one. If so, the answer describes the reference: swap the two."
             )
             return [message]
     return []
@@ -511,7 +511,7 @@ def teeth_mismatch_text(now: ReducedRecording, name: str) -> list[str]:
     if share >= MIN_MESH_SHARE or tooth_count_mismatch_text(now, name):  # that is said by itself
         return []
     message = (
-        f"{name}: only {percent(share)} of what repeats with a shaft lies at mesh harmonics of the rig's "
+        f"{name}: only {percent(share)} of what repeats with a shaft is at mesh harmonics of the rig's "
         f"{'/'.join(map(str, now.frame.teeth))} teeth. Is it a recording of this machine?"
     )
     return [message]
@@ -529,8 +529,8 @@ def pattern_mismatch_text(now: ReducedRecording, reference: ReducedRecording, na
         return []
     by = " and ".join(f"{max(a, 0.0):.2f}" for a in agreements)
     message = (
-        f"{name}: the patterns of the teeth of both gears agree with the reference by {by} only, where 1 is the same "
-        "gears. The reference is of another machine, all teeth have changed since, or flanks part at a light load."
+        f"{name}: the tooth patterns of the two gears agree with the reference by only {by}, where 1 means the same "
+        "gears. The reference is of another machine, all teeth have changed since, or flanks separate at a light load."
     )
     return [message]
 
@@ -619,7 +619,7 @@ def conditions_of(
     conditions = readable(recordings, condition_of, "recording", messages)
     if not references:
         messages.append(
-            "No healthy reference: a recording of the same rig when it was healthy would make it much surer."
+            "No healthy reference: a recording of the same rig when it was healthy would make it much more certain."
         )
     return conditions, messages
 
@@ -638,8 +638,8 @@ def _path_of(
     if min(missed_db, default=0.0) <= MAX_MISSED_DB:
         return path
     messages.append(
-        f"{path.name} is not used: beside each other, its mesh harmonics miss those of the healthy reference at the "
-        f"same speed by {min(missed_db):.1f} dB. Is it of the same machine, sensors and load?"
+        f"{path.name} is not used: relative to each other, its mesh harmonics differ from those of the healthy "
+        f"reference at the same speed by {min(missed_db):.1f} dB. Is it of the same machine, sensors and load?"
     )
     return None
 
@@ -737,7 +737,7 @@ def with_common_channels(
         messages.append(f"{name}: its only channel is taken for the reference's only one, which has another name.")
     left_out = [channel for channel in now.channels if channel not in reference.channels]
     if left_out:
-        messages.append(f"{name}: {', '.join(left_out)} is left out, for the reference has no such channel.")
+        messages.append(f"{name}: {', '.join(left_out)} is left out, because the reference has no such channel.")
     return now.of_channels(reference.channels)
 
 
@@ -765,13 +765,13 @@ def _reduced(prepared: PreparedRecording) -> tuple[ReducedRecording, list[str]]:
     unknown = [c.name for c in recording.channels if c.name in live and metres_per_second_squared(c) is None]
     if unknown:
         messages.append(
-            f"{name}: {', '.join(unknown)} is no acceleration in a known unit; it is compared as if it were m/s², so "
-            "that without a reference its level says nothing."
+            f"{name}: {', '.join(unknown)} is not an acceleration in a known unit; it is compared as if it were in "
+            "m/s², so without a reference its level means nothing."
         )
     reduced = reduce_recording(prepared, channels=live)
     messages += [f"{name}: channel {p.channel} is dead ({p.evidence}) and left out." for p in dead.values()]
     grave = prepared.grave_problems(live)
-    messages += [f"{name}: {p.text}; what differs may be no more than that." for p in grave]
+    messages += [f"{name}: {p.text}; this alone may explain the difference." for p in grave]
     return reduced, messages
 
 
@@ -786,7 +786,7 @@ def _messages_of_recording(prepared: PreparedRecording, facts: ConditionFacts) -
         )
     if _torque_nm(prepared.rig) is None:
         texts.append(
-            f"{facts.name}: the torque is not given; {facts.point.torque_nm:.3g} N·m are usual for the gears' size."
+            f"{facts.name}: the torque is not given; {facts.point.torque_nm:.3g} N·m, usual for such gears, is assumed."
         )
     return texts
 
@@ -799,6 +799,6 @@ def _mismatched_reference(condition: Condition) -> list[str]:
         return []
     message = (
         f"The reference of {condition.facts.name} is itself {size:.1f} structural floors from the simulation of a "
-        "healthy machine: if it was not healthy, only what changed since is seen."
+        "healthy machine: if it was not healthy, only changes since then are seen."
     )
     return [message]

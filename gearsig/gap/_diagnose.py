@@ -72,41 +72,41 @@ from gearsig.rig import Rig
 from gearsig.severity import TEETH_COUNT, CrackEstimate, NoCrackSeen, estimate_crack
 
 USER_EFFECT_MESSAGE = (
-    "The recognition has never seen “{title}”: it was simulated, fitted and scored on held-out data like the likeliest "
+    "Recognition was not trained on “{title}”: it was simulated, fitted and scored on held-out data like the likeliest "
     "effects. Its probability is the share of “unknown” that its held-out shrink beyond placebos explains, and is not "
     "calibrated."
 )
 NOT_SIMULATED = (
-    "The recognition has never seen “{title}”, and it could not be simulated on this rig: nothing is said of it."
+    "Recognition was not trained on “{title}”, and it could not be simulated on this rig: nothing is known about it."
 )
 
 OF_THE_TWIN = (
     "The severity is the one with which the twin comes nearest, and its interval is the fit's. The path to a sensor is "
-    "not known: on 19 development cases of another rig the true severity was 1 to 58 times the fitted one, in the "
-    "middle 5 times, and within the interval in 12. Take it for an order of magnitude, rather too small."
+    "not known: on 19 development cases of another rig the true severity was 1 to 58 times the fitted one, with a "
+    "median of 5, and within the interval in 12. Take it as an order of magnitude, more likely too small."
 )
 """Measured by `tests/benchmarks/gap_severity.py 70`."""
 
 OF_THE_WAVEFORM = (
-    "The severity is the one with which the twin's waveform comes nearest; its interval holds nine in ten where the "
-    "simulator is as like the machine as one of its own specimens is to another."
+    "The severity is the one with which the twin's waveform comes nearest; its interval is right nine times in ten "
+    "where the simulator resembles the machine as closely as its own specimens resemble each other."
 )
 
 BY_THE_CRACK_ESTIMATE = (
-    "The crack estimate (`gearsig crack`) says of {name}: {text} {depth}It rests on the shape of one tooth's event, "
-    "the probability here on all features and on trials on the twin, so that the two can differ."
+    "The crack estimate (`gearsig crack`) says about {name}: {text} {depth}It rests on the shape of one tooth's event, "
+    "the probability here on all features and on trials on the twin, so the two can differ."
 )
 NO_CRACK_ESTIMATE = (
-    "The crack estimate (`gearsig crack`) says nothing of a crack in {name}: {reason}. The probability here rests on "
-    "all features and on trials on the twin."
+    "The crack estimate (`gearsig crack`) says nothing about a crack in {name}: {reason}. The probability here rests "
+    "on all features and on trials on the twin."
 )
 OF_THE_DEPTH = (
-    "A crack's depth here is that one; its interval held nine in ten of the machines that it was calibrated on. "
+    "That is the crack's depth given here; its interval held for nine in ten of the machines it was calibrated on. "
 )
 
 NOT_NEARER = (
     "With {title} the twin comes no nearer to data that it was not fitted to: no severity is given, and no twin with "
-    "the effect. What speaks for it is how the recordings changed, by recognition alone."
+    "the effect. The only evidence for it is how the recordings changed, by recognition."
 )
 
 
@@ -363,7 +363,7 @@ def _check(
         raise InputError("no recording is given", remedy="give one, or better several operating conditions of one rig")
     if run_ups and not references:
         raise InputError(
-            "a run-up is given, and no healthy reference",
+            "a run-up is given, but no healthy reference",
             where="run_up",
             remedy="give a healthy recording at the recordings' speed as well: the run-up tells which path that takes "
             "to the sensors which has changed since",
@@ -439,10 +439,10 @@ def _labelled_facts(
 
 def _refuse_further(learn: Sequence[LabelledRecording], run_up: Recording | None, machines: str) -> None:
     if run_up is not None:
-        raise InputError(f"a run-up of {machines} tells nothing", where="run_up", remedy="leave it out")
+        raise InputError(f"a run-up of {machines} cannot be used", where="run_up", remedy="leave it out")
     if learn:
         raise InputError(
-            f"labelled recordings of {machines} tell nothing yet",
+            f"labelled recordings of {machines} cannot be used yet",
             where="learn",
             remedy="give a healthy reference instead",
         )
@@ -480,12 +480,12 @@ def _waveform_messages(
     missed_db = 20.0 / np.log(10.0) * condition.gain_scatter
     values = ", ".join(f"{title} {correlation:.2f}" for title, correlation in likeliest_first(matches).items())
     is_decided = any(trial.match is not None and trial.match.is_good for trial in tried.values())
-    meant = "the highest is likeliest" if is_decided else "too little to part them: the twin is not like this machine"
+    meant = "the highest is likeliest" if is_decided else "too low to separate them: the twin is not like this machine"
     message = (
         f"Correlation of the recorded change, without mesh harmonics, with that of the twin: {values}; {meant}. "
         f"Relative to each other, the mesh harmonics of the healthy twin miss those of the reference by "
-        f"{missed_db:.0f} dB. Each harmonic of a fault is allowed as much, so that its waveform tells "
-        "less where this is large."
+        f"{missed_db:.0f} dB. Each harmonic of a fault is allowed the same error, so its waveform is "
+        "weaker evidence where this is large."
     )
     return [message]
 
@@ -502,7 +502,7 @@ def _tooth_error_evidences(
         if c.facts.reference
     ]
     known = [evidence for evidence in evidences if evidence is not None]
-    return known, [f"No transmission error, in spite of encoders, of {refusal}." for refusal in refusals]
+    return known, [f"No transmission error despite encoders: {refusal}." for refusal in refusals]
 
 
 def _encoder_messages(evidences: Sequence[ToothErrorEvidence], known: Mapping[str, GapEffect]) -> list[str]:
@@ -510,15 +510,15 @@ def _encoder_messages(evidences: Sequence[ToothErrorEvidence], known: Mapping[st
     if not evidences:
         return []
     clearest = max(evidences, key=lambda evidence: evidence.rms_um)
-    changed = f"The transmission error by the encoders changed by {clearest.rms_um:.2g} µm rms where it changed most"
+    changed = f"The transmission error from the encoders changed by {clearest.rms_um:.2g} µm rms where it changed most"
     if all(evidence.is_unlike_any for evidence in evidences):
-        slower = "At a few revolutions per second or less its profile tells crack, spall and chip apart."
-        return [f"{changed}, which at this speed tells no fault from another: the drive swings along. {slower}"]
+        slower = "At a few revolutions per second or less its profile distinguishes crack, spall and chip."
+        return [f"{changed}, which at this speed does not distinguish faults: the drive oscillates too. {slower}"]
     levels = ToothErrorEvidence(mean_log_likelihoods(evidences), clearest.rms_um, clearest.gear).probabilities
     shown = {known[name].title: p for name, p in levels.items() if p >= 0.05 and name in known}
     likely = ", ".join(f"{title} {odds_text(p)}" for title, p in shown.items())
     where = {"driver": ", on the driver", "driven": ", on the driven gear"}.get(clearest.gear, "")
-    return [f"{changed}{where}; by its profile alone, all faults of teeth as likely before: {likely}."]
+    return [f"{changed}{where}; by its profile alone, with all tooth faults equally likely before: {likely}."]
 
 
 def _fit_messages(named: GapCause | None, tried: Mapping[str, TriedEffect], crack: CrackAnswer) -> list[str]:

@@ -208,7 +208,7 @@ _TOOTH = {
     "kurtosis": "kurtosis",
     "width": "number of teeth within 3 dB of the strongest",
     "below_mesh": "part below the mesh order",
-    "centroid": "middle of the spectrum",
+    "centroid": "centroid of the spectrum",
     "agreement": "agreement with the reference",
 }
 _OF_A_SHAFT = {
@@ -224,11 +224,11 @@ _CYCLIC = {
     "ball": "rolling elements",
     "cage": "cages",
     "mesh": "mesh order",
-    "strange": "an order that belongs to nothing known",
+    "strange": "an order of unknown origin",
     "depth": "depth of modulation",
     "half_mesh": "half the mesh order",
 }
-_ALIKE_PARTS = {"mesh": "harmonics", "repeated": "what either gear repeats", "noise": "what nothing repeats"}
+_ALIKE_PARTS = {"mesh": "harmonics", "repeated": "part that either gear repeats", "noise": "part that neither repeats"}
 _ALIKE = {
     f"{key}{suffix}": f"{words}{', ' if said else ''}{said}"
     for key, words in _ALIKE_PARTS.items()
@@ -238,7 +238,7 @@ _ALIKE = {
     for a, b in (("mesh", "repeated"), ("repeated", "noise"), ("mesh", "noise"))
     for suffix, said in (("less", "the former over the latter"), ("apart", "apart"), ("together", "changed alike"))
 }
-_BURST_WAYS = {"plain": "as it is", "even": "magnitudes made even"}
+_BURST_WAYS = {"plain": "as it is", "even": "magnitudes flattened"}
 _BURST_WORDS = (
     {f"course.{i}": f"share of quarter pitch {i}" for i in range(N_QUARTERS)}
     | {f"echo.{i}": f"autocorrelation at lag {lag:.2f} pitches" for i, lag in enumerate(ECHO_LAGS_PITCHES)}

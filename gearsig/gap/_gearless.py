@@ -63,7 +63,7 @@ PARTS = {f"bearing-{part.replace(' ', '-')}": (part, name) for name, (part, _) i
 
 SAME_EDGE = 0.1
 """Relative tolerance of a band's edges."""
-GROWTH_NOT_KNOWN = "Whether it has grown cannot be told."
+GROWTH_NOT_KNOWN = "Whether it has grown is not known."
 
 MIN_RISE_DB = 6.0
 """Twice the reference's level: smaller differences occur between two recordings of the same machine."""
@@ -333,7 +333,7 @@ def _why_unknown(part: UnexpectedFinding, races: Races, rig: Rig) -> str:
         return f"damage of a {PARTS[code][0]} is not in the catalogue"
     why = "what makes the line is not known" if code == LINE else "what makes the impacts is not known"
     loose = shafts_of_unknown_speed(rig)
-    return f"{why}; it may turn with {loose}, whose speed the rig file does not tell" if loose else why
+    return f"{why}; it may turn with {loose}, whose speed the rig file does not give" if loose else why
 
 
 def _share_of_unknown(
@@ -412,14 +412,14 @@ def _part_text(part: UnexpectedFinding, rig: Rig) -> str:
 
 
 NO_GEAR_PAIR = (
-    "The rig has no gear pair, so that no simulator could be set to it: nothing was simulated, and no effect of gears "
-    "is tried. How large the gap is, how severe its cause and how far it shrinks cannot be told; there is no twin. "
-    "Damaged races of the bearings were looked for; unbalance, misalignment, clearance, drive and load were not."
+    "The rig has no gear pair, so no simulator can model it: nothing was simulated, and no effect of gears was tried. "
+    "How large the gap is, how severe its cause and how far it shrinks are not known; there is no twin. Only damaged "
+    "races of the bearings were looked for, not unbalance, misalignment, clearance, drive or load."
 )
 HOW_SURE = (
     "The probabilities are not the calibrated ones of rigs with a gear pair. A race has the confidence of the bearing "
     "search: an upper limit, from how rarely noise makes such lines and how well other parts or a wrong speed explain "
-    "them. What is left over is shared between unknown and none."
+    "them. The remainder is shared between unknown and none."
 )
 NO_REFERENCE = "No healthy reference: what stands out may have been there when the machine was healthy."
 N_SHOWN = 6.5
@@ -532,8 +532,8 @@ def _loose_shafts(rig: Rig) -> list[str]:
     if not loose:
         return []
     message = (
-        f"The rig file does not tell the speed of {loose}, as it names no gear pair: what turns with it is taken for "
-        "something strange, and its bearings were not looked for. Give the teeth of the pair."
+        f"The rig file does not give the speed of {loose}, as it names no gear pair: whatever turns with it counts as "
+        "unexplained, and its bearings were not examined. Give the teeth of the pair."
     )
     return [message]
 
@@ -655,8 +655,8 @@ def with_unexpected(outcome: GapOutcome, unexpected: Sequence[UnexpectedFinding]
     if len(races) < len(unexpected):
         return GapOutcome.UNKNOWN, []
     return GapOutcome.UNDECIDED, [
-        f"{part.recording}: {part.finding.title.rstrip('.')}{_odds(part)}, by the search for bearing orders; few of "
-        "the features that are compared show it."
+        f"{part.recording}: {part.finding.title.rstrip('.')}{_odds(part)}, found by the search for bearing orders; "
+        "few of the compared features show it."
         for part in races
     ]
 
@@ -683,7 +683,7 @@ def _fault_of_reference(reference: Analysis, now: Analysis, name: str) -> list[s
     perhaps = "" if is_shown else " and the recording shows no fault: they may have been exchanged"
     title = fault.title.rstrip(".")
     message = (
-        f"The reference of {name} does not look healthy ({title}){perhaps}. What is named may be what the "
-        "reference has and the recording has not."
+        f"The reference of {name} does not look healthy ({title}){perhaps}. What is named may be in the "
+        "reference and not in the recording."
     )
     return [message]

@@ -147,7 +147,7 @@ def _rigs(request: GapRequest, files: Sequence[Path]) -> tuple[Rig, ...]:
         recording_rig = read_rig(rig_file) if rig_file is not None and has_rig_file else None
         if recording_rig is None and common is None:
             raise InputError(
-                "no rig file is given, and none lies beside it",
+                "no rig file is given, and there is none beside it",
                 where=str(path),
                 remedy="give --rig RIG.toml with the gears' teeth and module; `gearsig rig example` prints one",
             )
@@ -266,7 +266,9 @@ def read_labelled(
         if recording_rig is not None and rig is not None:
             _check_same(rig, recording_rig, path.name)
         if recording_rig is None and rig is None:
-            raise InputError("no rig is given, and none lies beside it", where=path.name, remedy="give --rig RIG.toml")
+            raise InputError(
+                "no rig is given, and there is none beside it", where=path.name, remedy="give --rig RIG.toml"
+            )
         recording = read_whole(path, _merged(rig, recording_rig), sampling_rate_hz=sampling_rate_hz)
         return recording.with_name(f"{folder.name}/{path.name}")
 
@@ -294,7 +296,7 @@ def _lines(path: Path) -> list[tuple[str, Mapping[str, str]]]:
             f"cannot be read ({error.strerror})", where=str(path), remedy=f"put {TABLE} there: {example}"
         ) from None
     except UnicodeDecodeError:
-        raise InputError("is no text in UTF-8", where=str(path), remedy="save it as CSV UTF-8") from None
+        raise InputError("is not UTF-8 text", where=str(path), remedy="save it as CSV UTF-8") from None
     header = text.partition("\n")[0]
     rows = csv.reader(text.splitlines(), delimiter=";" if header.count(";") > header.count(",") else ",", strict=True)
     lines: list[tuple[str, Mapping[str, str]]] = []
@@ -310,10 +312,10 @@ def _lines(path: Path) -> list[tuple[str, Mapping[str, str]]]:
             if not any(cell.strip() for cell in row):
                 continue
             if len(row) > len(names):
-                raise InputError(f"{len(row)} cells stand under {len(names)} names", where=where, allowed="one each")
+                raise InputError(f"{len(row)} cells for {len(names)} column names", where=where, allowed="one each")
             lines.append((where, dict(zip(names, (cell.strip() for cell in row), strict=False))))
     except csv.Error as error:
-        raise InputError(f"is no table ({error})", where=f"{path.name}, line {rows.line_num}") from None
+        raise InputError(f"is not a table ({error})", where=f"{path.name}, line {rows.line_num}") from None
     if not 0 < len(lines) <= MAX_LABELLED:
         raise InputError(
             f"names {len(lines)} recordings", where=path.name, allowed=f"1 to {MAX_LABELLED}, a line for each"
@@ -327,7 +329,7 @@ def _named(folder: Path, name: str, where: str, column: str) -> Path:
         raise InputError(f"no {column} is named", where=where, allowed="the name of a file in the folder")
     path, root = (folder / name).resolve(), folder.resolve()
     if not path.is_relative_to(root):
-        raise InputError(f"{name!r} lies outside the folder", where=where, allowed="files in it, or in folders below")
+        raise InputError(f"{name!r} is outside the folder", where=where, allowed="files in it, or in folders below")
     if not path.is_file():
         raise InputError(f"there is no file {name!r}", where=where, remedy="check its name")
     return path
@@ -381,14 +383,14 @@ def is_gearless(rig: Rig) -> bool:
         return False
     if not rig.bearings:
         raise RefusalError(
-            "the rig file describes neither a gear pair nor a bearing: there is nothing to set a simulator to, and "
+            "the rig file describes neither a gear pair nor a bearing: there is nothing to simulate and "
             "nothing to look for",
             remedy=f"describe the gear pair (teeth, module) or the bearings (geometry or orders); {EXAMPLE}",
         )
     if not any(bearing.orders() and rig.ratio(bearing.shaft) is not None for bearing in rig.bearings):
         names = ", ".join(repr(bearing.name) for bearing in rig.bearings)
         raise RefusalError(
-            f"the rig has no gear pair, and of no bearing ({names}) the orders and the speed of its shaft are known",
+            f"the rig has no gear pair, and for no bearing ({names}) are both orders and shaft speed known",
             remedy="give the bearings' geometry or orders, on the shaft whose speed is known",
         )
     return True
@@ -400,8 +402,8 @@ def _check_teeth(rig: Rig) -> None:
     if gears:
         gear_text = "both gears" if len(gears) == 2 else f"the {gears[0]} gear"
         raise RefusalError(
-            f"the rig data are missing that a simulation needs: teeth of {gear_text} of pair {pair.name!r}",
-            remedy="complete the rig file; `gearsig analyze` says what can be said without them",
+            f"data that a simulation needs are missing: teeth of {gear_text} of pair {pair.name!r}",
+            remedy="complete the rig file; `gearsig analyze` shows what can be found without them",
         )
 
 
@@ -427,7 +429,7 @@ def with_stage(rig: Rig, stage: str = "") -> Rig:
     if not stage and len(names) > 1:
         raise RefusalError(
             f"the rig has {len(names)} gear pairs ({', '.join(names)}), and one is diagnosed at a time",
-            remedy="say which with --stage NAME (stage=… from Python); the others are taken for background",
+            remedy="say which with --stage NAME (stage=… from Python); the others are treated as background",
         )
     if stage and len(chosen) != 1:
         problem = f"{len(chosen)} pairs sit on shaft {stage!r}" if chosen else f"there is no gear pair {stage!r}"
@@ -457,14 +459,14 @@ def twin_rig(rig: Rig) -> tuple[Rig, list[str]]:
         module = float(f"{np.clip(module, *MODULES_MM):.2g}")
         width = pair.face_width_mm or WIDTH_MODULES * module
         pair = replace(pair, module_mm=module, face_width_mm=width)
-        why = f"that the torque of {torque_nm:.3g} N·m lets expect" if torque_nm else "as usual for small gearboxes"
+        why = f"as the torque of {torque_nm:.3g} N·m suggests" if torque_nm else "as usual for small gearboxes"
         messages.append(
-            f"Of the gears only teeth are known: the twin has a module of {module:g} mm, {why}, and a face width of "
-            f"{width:g} mm. A machine may have half or twice that: severities in mm and µm are orders of magnitude."
+            f"Only the gears' teeth are known: the twin has a module of {module:g} mm, {why}, and a face width of "
+            f"{width:g} mm. The machine may have half or twice that: severities in mm and µm are orders of magnitude."
         )
     if len(rig.pairs) > 1:
         further_names = ", ".join(further.name for further in rig.pairs[1:])
-        messages.append(f"Diagnosed is {pair.name}; what {further_names} is heard at is background, and taken out.")
+        messages.append(f"{pair.name} is diagnosed; the orders of {further_names} are background, and removed.")
     elif not messages:
         return rig, []
     point, on = rig.operating_point, (pair.driver, pair.driven)

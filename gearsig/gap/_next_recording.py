@@ -94,7 +94,7 @@ def next_recordings(
         for channel, apart in _informative_sensors(distances, places, now, best_sensor):
             place = places.get(channel, "")
             text = _text(
-                point, place, f"{titles[0]} and {titles[1]} lie {apart:.2g}", now, is_new=point not in present_points
+                point, place, f"{titles[0]} and {titles[1]} are {apart:.2g}", now, is_new=point not in present_points
             )
             recordings.append(NextRecording(point, (first.name, second.name), apart, now, text, place))
     return tuple(sorted(recordings, key=lambda of_first: -of_first.standard_deviations)[:5])

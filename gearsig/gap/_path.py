@@ -201,10 +201,10 @@ def measured_path(run_up: PreparedRecording, twin: Twin, *, seed: int) -> Measur
     """
     recording, frame = run_up.recording, gear_frame(run_up.rig)
     if not isinstance(twin, CanRunUp):
-        raise RefusalError("the simulator cannot run up, so that a run-up measures no path", remedy="leave it out")
+        raise RefusalError("the simulator cannot run up, so a run-up measures no path", remedy="leave it out")
     if not isinstance(recording.speed_source, ANGLE_SOURCES):
         raise RefusalError(
-            f"{recording.name}: nothing tells the angle of a shaft against which phases could be measured",
+            f"{recording.name}: no shaft's angle is known, against which phases could be measured",
             remedy="record the run-up with a tachometer or an encoder",
         )
     n_revolutions = run_up.angle_of(frame.shafts[DRIVER]).n_revolutions

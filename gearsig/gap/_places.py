@@ -511,7 +511,7 @@ def locate_mesh(condition: Condition) -> GapPlace | None:
         change = condition.change_db[scored]
         title = f"{feature_text(scored, frame)}, {by_decibels(change)}"
         if scored.startswith("alike."):
-            title = "what lies beside the mesh harmonics, which themselves hardly moved"
+            title = "orders around the mesh harmonics, which themselves hardly changed"
         return GapPlace(PlaceKind.MESH, title, change, orders=_harmonic_order(scored, frame))
     total = condition.change_db["mesh.total"]
     alike = condition.has_reference and abs(total) > 0.7 * abs(change) and total * change > 0
@@ -703,7 +703,7 @@ def locate_tail(condition: Condition) -> GapPlace:
     channel = max(condition.now.channels, key=lambda c: float(condition.now.channels[c].tail[:, 2].mean()))
     if name == "raw.near_the_extreme":
         piled = float(condition.now.channels[channel].tail[:, 2].mean()) > CLIPPED_SHARE
-        clipping = ", as clipping makes them" if change > 0 and piled else ""
+        clipping = ", as clipping causes them" if change > 0 and piled else ""
         title = f"samples close to the largest amplitude{clipping}, {by_decibels(change)}"
         return GapPlace(PlaceKind.TAIL, title, change, channel=channel, follows=not clipping)
     tails = "heavier" if change > 0 else "lighter"
@@ -811,11 +811,11 @@ def distributed_place(condition: Condition, side: int, shaft: str, channel: str)
         scored = level
     change = condition.change_db[scored]
     if not scored.endswith(ALL_ROUND):
-        title = f"shape of the teeth's pattern of {shaft}, no tooth in particular"
+        title = f"shape of the tooth pattern of {shaft}, no tooth in particular"
         return GapPlace(PlaceKind.TOOTH, title, change, channel=channel, follows=True)
     of_difference = not scored.startswith("tooth.")
-    by = f"{by_decibels(change)} against what healthy machines change by" if of_difference else by_decibels(change)
-    subject = "what has changed of the pattern of the teeth" if of_difference else "pattern of the teeth"
+    by = f"{by_decibels(change)} relative to changes of healthy machines" if of_difference else by_decibels(change)
+    subject = "change in the tooth pattern" if of_difference else "tooth pattern"
     return GapPlace(PlaceKind.TOOTH, f"{subject} of {shaft} all round, {by}", change, channel=channel)
 
 

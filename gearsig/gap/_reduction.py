@@ -687,7 +687,7 @@ def _check_mesh(signal: AngleSignal, frame: GearFrame, recording: Recording, spe
     if signal.highest_order < frame.teeth[0] + max(frame.shaft_orders):
         mesh_hz = frame.teeth[0] * speed_hz
         raise RefusalError(
-            f"the gears mesh at {mesh_hz:.4g} Hz, above what {recording.sampling_rate_hz:.6g} Hz of sampling rate show",
+            f"the gears mesh at {mesh_hz:.4g} Hz, too high for a sampling rate of {recording.sampling_rate_hz:.6g} Hz",
             remedy=f"sample at {4.0 * mesh_hz:.2g} Hz at least",
         )
 

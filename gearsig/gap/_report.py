@@ -572,7 +572,7 @@ class LabelledFacts:
         n, first = sum(self.counts.values()), next(iter(self.without), NONE)
         kinds = ", ".join(f"{label.replace('_', ' ')} {count}" for label, count in self.counts.items())
         return (
-            f"Labelled recordings of this rig that joined what is known of other machines: {n} ({kinds}). "
+            f"Labelled recordings of this rig, used in addition to what is known of other machines: {n} ({kinds}). "
             f"Without {'them' if n > 1 else 'it'} the likeliest would be {first.replace('_', ' ')}, "
             f"{odds_text(self.without.get(first, 0.0))} (outcome: {self.outcome_without.value})."
         )
@@ -604,15 +604,14 @@ class PathFacts:
         believed = ", ".join(f"{channel} {value:.2f}" for channel, value in self.credibility.items())
         return (
             f"The path from the mesh to the sensors was measured by {self.run_up} from {self.low_hz:.0f} to "
-            f"{self.high_hz:.0f} Hz; the waveforms of simulated tooth faults pass it before they are compared. So much "
-            f"of it is repeated by mesh harmonics of other numbers at the same frequencies, and counts: {believed} "
-            "(1: all)."
+            f"{self.high_hz:.0f} Hz; the waveforms of simulated tooth faults pass it before they are compared. It "
+            f"counts as far as different mesh harmonics repeat it at the same frequencies: {believed} (1: fully)."
         )
 
 
 def too_small_to_judge_text(shrinkage: Shrinkage) -> str:
     """Return the statement that the simulated effect is too small to judge."""
-    return f"hardly shows on the simulator at these conditions (at most {shrinkage.predicted or 0.0:.2g} floors)"
+    return f"hardly shows in the simulation at these conditions (at most {shrinkage.predicted or 0.0:.2g} floors)"
 
 
 def evidence_direction_text(evidence: Evidence) -> str:
@@ -747,9 +746,7 @@ class GapReport(Result, rows="causes"):
         return _where_seen(self), _which_seen(self), NO_SIMULATION, _next_seen(self)
 
 
-NO_SIMULATION = (
-    "How far: cannot be told; the simulators have a gear pair and this rig has none, so nothing was simulated."
-)
+NO_SIMULATION = "How far: not known; the simulators need a gear pair and this rig has none, so nothing was simulated."
 
 
 def _where(report: GapReport) -> str:
@@ -774,7 +771,7 @@ def _which(report: GapReport) -> str:
     first = report.causes[0]
     odds = odds_text(first.probability)
     if report.outcome is GapOutcome.NO_GAP:
-        return f"Which: none ({odds}); what differs is no more than between healthy machines and the simulator."
+        return f"Which: none ({odds}); the difference is no larger than between healthy machines and the simulator."
     if report.outcome is GapOutcome.UNDECIDED:
         return _which_undecided(report)
     if report.outcome is GapOutcome.UNKNOWN:
@@ -807,7 +804,9 @@ def _kind_and_inseparable(report: GapReport, rivals: Sequence[str]) -> str:
     beyond = [name for name in rivals if name not in within]
     if not within:
         return _or_text(report, rivals)
-    return f"{_kind(report.kind)}: {_or_text(report, within)}{f'; else {_or_text(report, beyond)}' if beyond else ''}"
+    return (
+        f"{_kind(report.kind)}: {_or_text(report, within)}{f'; otherwise {_or_text(report, beyond)}' if beyond else ''}"
+    )
 
 
 def _or_text(report: GapReport, names: Sequence[str]) -> str:
@@ -821,7 +820,7 @@ def _which_unknown(report: GapReport) -> str:
     unknown = next((cause.probability for cause in report.causes if cause.name == UNKNOWN), 1.0)
     if best is None or best.probability <= unknown:
         return "Which: unknown; nothing in the catalogue explains it well enough."
-    return f"Which: unknown; {best.title} comes nearest ({odds_text(best.probability)}), too little to be named."
+    return f"Which: unknown; {best.title} comes nearest ({odds_text(best.probability)}), not enough to be named."
 
 
 def named_cause(name: str, probability: float, effects: Mapping[str, GapEffect], place: str = "") -> GapCause:
@@ -831,7 +830,7 @@ def named_cause(name: str, probability: float, effects: Mapping[str, GapEffect],
         return GapCause(name, e.group, e.title, e.unit, probability, place=place, is_nuisance=e.is_nuisance)
     if name not in (NONE, UNKNOWN):
         return GapCause(name, USER_LABELS, f"“{name.replace('_', ' ')}”", "", probability)
-    title = "nothing beyond what healthy machines differ by" if name == NONE else "nothing in the catalogue"
+    title = "nothing beyond the differences between healthy machines" if name == NONE else "nothing in the catalogue"
     return GapCause(name, name, title, "", probability)
 
 
@@ -873,7 +872,7 @@ def unbounded_fits(causes: Sequence[GapCause], outcome: GapOutcome) -> list[str]
     named = named_effects(causes, outcome)
     return [
         f"{cause.title[0].upper()}{cause.title[1:]}: the fit to the twin bounds its severity neither above nor below. "
-        "How the recordings changed speaks for it, the simulation hardly does."
+        "The evidence for it is how the recordings changed, hardly the simulation."
         for cause in causes
         if cause.name in named and cause.severity is not None and cause.severity.is_unbounded
     ]
@@ -915,7 +914,7 @@ def _shrinkage_text(report: GapReport) -> str:
     for one, both in zip(report.steps[1:], report.steps[2:], strict=False):  # with two effects, where one leaves much
         left = f"from {one.remaining.value:.2g} to {both.remaining.value:.2g} structural floors"
         far += (
-            f" It cannot make all lines; {both.label} beside it takes the whole gap {left}, and may be there as well."
+            f" It cannot explain all lines; adding {both.label} takes the whole gap {left}, so that may be present too."
         )
     return far
 
@@ -929,17 +928,15 @@ WIDE = 2.0
 
 HEALTHY_MACHINE = "the same machine when it was healthy"
 NEXT_STEPS = {
-    "healthy": f"{HEALTHY_MACHINE}, at the same speed and load; then only what has changed since counts",
+    "healthy": f"{HEALTHY_MACHINE}, at the same speed and load; then only changes since count",
     "encoders": "encoders on both shafts: no path distorts their transmission error, whose profile over one engagement "
-    "tells a damaged tooth from a displaced one",
+    "distinguishes a damaged tooth from a displaced one",
     "slow_loads": f"two loads below {SLOW_RPM:.0f} rpm, at which the gears ring less over one engagement",
-    "run_up": "a run-up of the healthy machine (--run-up), which measures the path that a tooth's fault takes to the "
-    "sensors",
+    "run_up": "a run-up of the healthy machine (--run-up), which measures the path from a tooth fault to the sensors",
     "other_speed": "the same machine at twice or half the speed: a resonance stays at its frequency, what belongs to a "
     "shaft at its order",
-    "less_gain": "the same with less gain, or a wider range: tops that are cut off and loud low orders both look like "
-    "a sine",
-    "label": "two labelled recordings of each likely cause on this rig (--learn): nothing else tells so much",
+    "less_gain": "the same with less gain, or a wider range: clipped peaks and strong low orders both look like a sine",
+    "label": "two labelled recordings of each likely cause on this rig (--learn): nothing else helps as much",
 }
 
 
@@ -951,19 +948,19 @@ def _next(report: GapReport) -> str:
     if best:
         return f"Next: {best}"
     if report.outcome in (GapOutcome.UNKNOWN, GapOutcome.UNDECIDED):
-        purpose = {"speed": ", which tells orders from resonances"}
+        purpose = {"speed": ", which distinguishes orders from resonances"}
         ways = "".join(f", or another {what}{purpose.get(what, '')}" for what in _unvaried_quantities(report)[:1])
         return f"Next: another sensor nearer to where it is loudest{ways}."
     if report.outcome is GapOutcome.NO_GAP:
-        return "Next: nothing is needed; keep these recordings, later ones are best compared with them."
+        return "Next: nothing is needed; keep these recordings as references for later ones."
     if not names_single_effect(report.causes) and sum(cause.shrinkage is not None for cause in report.causes) < 2:
         ways = " or ".join(_unvaried_quantities(report)) or "sensor"
-        return f"Next: another {ways}; no two effects are likely enough to compute which would tell most."
+        return f"Next: another {ways}; no two effects are likely enough to compute which would help most."
     where_to_look = _common_place(report)
     look = f"look at {where_to_look}; " if where_to_look else ""
     why = "speed or load that was simulated would put the two likeliest effects further apart"
     if names_single_effect(report.causes):
-        why = "effect is likely enough to be told from this one by a further recording"
+        why = "effect is likely enough to be separated from this one by a further recording"
     return f"Next: {look}no other {why}."
 
 
@@ -1000,4 +997,4 @@ def _which_seen(report: GapReport) -> str:
 def _next_seen(report: GapReport) -> str:
     if report.references:
         return "Next: another sensor nearer to the bearings, or a longer recording."
-    return f"Next: {HEALTHY_MACHINE}, at the same speed; then only what has changed since is named."
+    return f"Next: {HEALTHY_MACHINE}, at the same speed; then only changes since are named."

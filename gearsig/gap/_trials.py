@@ -826,7 +826,7 @@ def cause_place(
     if name in TOOTH_FAULTS and len(gears) == 1:
         return place_of(AddedEffect(name, 0.0, {"gear": gears.pop(), "tooth": 1.0}), frame, places)
     either = " or ".join(shaft_text(frame, side) for side in range(len(SIDES)))
-    return f"{either} (which cannot be told)"
+    return f"{either} (which one is not known)"
 
 
 def _is_clear(tried: TriedEffect, conditions: Sequence[Condition]) -> bool:

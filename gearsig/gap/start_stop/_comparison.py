@@ -295,10 +295,10 @@ def read_cycles(recording: Recording) -> PreparedCycles:
         roles = find_roles(recording, contact_pair(rig)) if rig.contact or len(rig.pairs) == 1 else {}
         if not any(role.endswith((" angle", " speed")) for role in roles):
             raise RefusalError(
-                f"{recording.name} holds no angle or speed of pinion and wheel, and "
+                f"{recording.name} has no angle or speed of pinion and wheel, but "
                 "the model forging compares their starts and stops",
-                remedy="compare vibration of stationary running with --model cracked; else name the channels' shafts "
-                "in the rig file's [[sensor]] tables",
+                remedy="compare vibration of stationary running with --model cracked; otherwise name the channels' "
+                "shafts in the rig file's [[sensor]] tables",
             )
     motion = measure_motion(recording, rig)
     check_turns(motion)

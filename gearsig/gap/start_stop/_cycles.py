@@ -232,14 +232,14 @@ def cut_cycles(motion: motions.PairMotion) -> PreparedCycles:
     segments = motions.motion_segments(motion.driver_angle_rad, rate)
     if not motions.is_start_stop(segments) and segments.standing_part < 0.05:
         raise RefusalError(
-            f"{where} turns all the time: it holds none of the starts and stops that the start–stop diagnosis rests on",
+            f"{where} turns all the time: it has none of the starts and stops that the start–stop diagnosis needs",
             remedy="record starts and stops; compare stationary running with --model cracked or reduced-fe",
         )
     n = len(segments.moving)
     if n < 2:
         raise RefusalError(
             f"{where} has {n} start{'' if n == 1 else 's'}: what is fitted to one cycle must be checked on another",
-            remedy="record several starts and stops; six or more tell most",
+            remedy="record several starts and stops; preferably six or more",
         )
     number = np.full(len(motion.driver_angle_rad), -1, dtype=np.int64)
     phase = np.full(len(number), PHASES.index("rest"), dtype=np.int64)
@@ -564,8 +564,8 @@ FEATURES: Mapping[str, DriveFeature] = {
     "driven_wave": DriveFeature("wave of the compression once per revolution of the driven gear", PlaceKind.SHAFT),
     "off_centre": DriveFeature("torque of the load once per revolution", PlaceKind.SHAFT),
     "impact": DriveFeature("hardest impact of the flanks in a cycle", is_level=True, follows=True),
-    "contact_scatter": DriveFeature("what the loaded flanks' equation leaves over", is_level=True, follows=True),
-    "load_scatter": DriveFeature("what the load's equation of motion leaves over", is_level=True, follows=True),
+    "contact_scatter": DriveFeature("residual of the loaded flanks' equation", is_level=True, follows=True),
+    "load_scatter": DriveFeature("residual of the load's equation of motion", is_level=True, follows=True),
 }
 NAMES = tuple(FEATURES)
 """Names of the changes, see `change_of`."""

@@ -226,20 +226,20 @@ def _messages(
     missing = [effects[name].title for name in TRIED if name in effects and name not in known]
     if missing:
         lacking = [c.name for c in every if c.now.motion.torque_nm is None]
-        why = "only a healthy reference tells what is ordinary"
+        why = "only a healthy reference shows what is normal"
         if lacking:
             why = f"no torque was recorded in {', '.join(lacking)}"
-        yield f"Not considered, as {why}: {', '.join(missing)}. Such a cause ends in none or unknown."
+        yield f"Not considered, because {why}: {', '.join(missing)}. Such a cause would appear as none or unknown."
     if every[0].reference is not None:
         yield (
             "Tooth and order count from the zero of the pinion's encoder, which must be the same in both recordings. "
-            "In the figures of torque and teeth the healthy reference stands for the simulation before."
+            "In the figures of torque and teeth, the healthy reference takes the place of the simulation before."
         )
     for c in every:
         if c.now.n_cycles < 4:
             yield f"{c.name} has {c.now.n_cycles} starts: how far the gap shrinks rests on few cycles."
         if not c.features.play_um > 0.0:
-            yield f"{c.name} loads one flank only: its play cannot be told; record a stop with the brake."
+            yield f"{c.name} loads one flank only: its play is not known; record a stop with the brake."
     hidden = []
     for name, cause in evidence.predicted.items():
         min_severity = cause.minimum_severity(clearest.floor())
@@ -338,7 +338,7 @@ def _phases(compared: DriveComparison) -> list[GapPlace]:
         if np.isfinite(change_db) and change_db > 3.0:
             title = (
                 f"{phase}{f', {flank} flank' if flank else ''}: measured {quantity} is {readable(rms, 2)} "
-                f"{UNITS[quantity]} off its prediction, {readable(usual, 2)} ordinarily"
+                f"{UNITS[quantity]} off its prediction, normally {readable(usual, 2)}"
             )
             channel = "" if quantity == COMPRESSION else quantity
             kind = PlaceKind.SPEED
@@ -460,7 +460,7 @@ def refuse_start_stop(recordings: Sequence[Recording], model: str) -> None:
             continue
         if starts:
             raise RefusalError(
-                f"{recording.name} starts and stops: orders, which the model {model} is compared by, need a shaft that "
-                "goes on turning",
+                f"{recording.name} starts and stops: the model {model} is compared by orders, which need a shaft that "
+                "turns continuously",
                 remedy="--model forging",
             )
