@@ -505,10 +505,9 @@ def teeth_mismatch_text(now: ReducedRecording, name: str) -> list[str]:
     """Return a message if little of the shaft-synchronous power lies at the mesh harmonics of the stated teeth.
 
     Gears of fewer than about 15 teeth escape detection, since any order is near one of their harmonics.
-    @509: # that is said by itself => # which has its own message
     """
     share = max(_mesh_share(now, side) for side in (DRIVER, DRIVEN))
-    if share >= MIN_MESH_SHARE or tooth_count_mismatch_text(now, name):  # that is said by itself
+    if share >= MIN_MESH_SHARE or tooth_count_mismatch_text(now, name):  # which has its own message
         return []
     message = (
         f"{name}: only {percent(share)} of what repeats with a shaft is at mesh harmonics of the rig's "

@@ -493,10 +493,10 @@ class NextRecording:
     point : OperatingCondition
     separates : (str, str)
     standard_deviations : float
-            Distance between the two predictions at that point, in structural floors.
-        now : float
-            The same distance at the points recorded so far.
-        text : str
+        Distance between the two predictions at that point, in structural floors.
+    now : float
+        The same distance at the points recorded so far.
+    text : str
     place : str
         Place of the additional sensor that alone shows this distance; empty: the existing sensors do.
     """
@@ -928,7 +928,7 @@ WIDE = 2.0
 
 HEALTHY_MACHINE = "the same machine when it was healthy"
 NEXT_STEPS = {
-    "healthy": f"{HEALTHY_MACHINE}, at the same speed and load; then only changes since count",
+    "healthy": f"{HEALTHY_MACHINE}, at the same speed and load, so that only changes since then count",
     "encoders": "encoders on both shafts: no path distorts their transmission error, whose profile over one engagement "
     "distinguishes a damaged tooth from a displaced one",
     "slow_loads": f"two loads below {SLOW_RPM:.0f} rpm, at which the gears ring less over one engagement",
@@ -997,4 +997,4 @@ def _which_seen(report: GapReport) -> str:
 def _next_seen(report: GapReport) -> str:
     if report.references:
         return "Next: another sensor nearer to the bearings, or a longer recording."
-    return f"Next: {HEALTHY_MACHINE}, at the same speed; then only changes since are named."
+    return f"Next: {HEALTHY_MACHINE}, at the same speed, so that only changes since then are named."

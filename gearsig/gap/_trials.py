@@ -761,7 +761,6 @@ def place_of(added: AddedEffect, frame: GearFrame, places: Sequence[GapPlace]) -
     """Return "tooth 7 of the gear on the input shaft", "bearing 2", "order 6"; empty where the effect has no place.
 
     The tooth is that of the recording; the simulated tooth represents any of them.
-    @774: # the same teeth meet at every revolution => # the same teeth mesh at every revolution
     """
     options = added.options
     if "bearing" in options:
@@ -773,7 +772,7 @@ def place_of(added: AddedEffect, frame: GearFrame, places: Sequence[GapPlace]) -
         return ""
     shaft = frame.shafts[SIDES.index(str(side))]
     words = shaft_text(frame, SIDES.index(str(side)))
-    mate = " or its mate" if frame.teeth[0] == frame.teeth[1] else ""  # the same teeth meet at every revolution
+    mate = " or its mate" if frame.teeth[0] == frame.teeth[1] else ""  # the same teeth mesh at every revolution
     if "tooth" not in options:
         return f"the gear on {words}{mate}" if "gear" in options else words
     tooth_place = _tooth_place(shaft, places)
