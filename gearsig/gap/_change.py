@@ -317,7 +317,7 @@ def turned_difference(now: ReducedRecording, healthy: ReducedRecording, side: in
 
 
 def as_mounted(now: ReducedRecording, healthy: ReducedRecording) -> tuple[ReducedRecording, tuple[str, ...]]:
-    """Return a reference whose channels have the signs of the recording's, and which were inverted."""
+    """Return a reference whose channels have the signs of the recording's, and the names of those inverted."""
     lines_now, lines_healthy = (lines_of_shaft(reduced, DRIVER) for reduced in (now, healthy))
     names = reversed_channels(lines_now, lines_healthy, whole_teeth=now.marks[DRIVER] or now.marks[DRIVEN])
     return healthy.turned_about(names) if names else healthy, names

@@ -101,12 +101,13 @@ NO_CRACK_ESTIMATE = (
     "on all features and on trials on the twin."
 )
 OF_THE_DEPTH = (
-    "That is the crack's depth given here; its interval held for nine in ten of the machines it was calibrated on. "
+    "That depth is also the crack's severity here; its interval held for nine in ten of the machines it was calibrated "
+    "on. "
 )
 
 NOT_NEARER = (
     "With {title} the twin comes no nearer to data that it was not fitted to: no severity is given, and no twin with "
-    "the effect. The only evidence for it is how the recordings changed, by recognition."
+    "the effect. The only evidence for it is recognition, from how the recordings changed."
 )
 
 

@@ -227,7 +227,7 @@ class LabelledEvidence:
     ratios : mapping
         Label → `labelled_support`, mean over the operating conditions.
     alike : mapping
-        Label outside the learned population → agreement of the recognition's probabilities between both, 0 to 1.
+        Label outside the learned population → agreement of recognition between both kinds of recordings, 0 to 1.
     """
 
     counts: Mapping[str, int]
@@ -271,7 +271,7 @@ def with_labelled(
 ) -> dict[str, float]:
     """Return the probabilities updated with labelled recordings, most probable first: p_c ∝ p_c exp(s_c).
 
-    A label outside the learned population enters with p = max_c p_c times the agreement of the recognition's
+    A label outside the learned population enters with p = max_c p_c times the agreement of recognition's
     probabilities between the recording and those with that label.
 
     Parameters

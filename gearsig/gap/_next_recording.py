@@ -56,7 +56,7 @@ def next_recordings(
 
     Parameters
     ----------
-    first, second : Tried
+    first, second : TriedEffect
     titles : (str, str)
         Titles of both effects.
     twin : Twin

@@ -434,7 +434,7 @@ _APART = 20.0
 """Spacing of a shaft's orders, in line widths, from which they can be distinguished from the mains in four of five
 positions."""
 _N_STRONG_MULTIPLES = 3
-"""Harmonics of a shaft that unbalance, misalignment and the like raise, with their own harmonics."""
+"""Multiples of a shaft's order that unbalance, misalignment and the like raise directly, along with their harmonics."""
 _N_BESIDE, _AMONG_MULTIPLES_DB = 3, 10.0
 """Multiples on either side with which hum on one of them is compared, and the excess that it must have over the
 strongest."""
