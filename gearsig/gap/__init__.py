@@ -1,12 +1,12 @@
 """The sim-to-real gap: where recording and simulation differ, which effect causes it, how far it closes.
 
-Start with `diagnose_gap`: recordings, a simulator and healthy references in, a `GapReport` out, with its `verdict`,
-`places`, `causes`, `steps` and `next_steps`. `read_labelled` reads labelled recordings of the same rig. A simulator of
-one's own offers what `GapSimulator` and `Twin` describe, an effect what `GapEffect` does.
+Start with `diagnose_gap`, which takes recordings, a simulator and healthy references and returns a `GapReport` with its
+`verdict`, `places`, `causes`, `steps` and `next_steps`. `read_labelled` reads labelled recordings of the same rig. To
+add a simulator of your own, implement `GapSimulator` and `Twin`; for an effect, `GapEffect`.
 
-The stages in order: `reduce_recording` (averages and lines of a recording), `change_features` (against the reference),
-`gap_places` (where), `attribute` (which, by the `EffectClassifier` of `load_learned`), `try_effects` and `shrinkage`
-(how far, on the twin), `next_recordings`. Drives that start and stop: `gearsig.gap.start_stop`.
+The stages are, in order: `reduce_recording` (averages and lines of a recording), `change_features` (against the
+reference), `gap_places` (where), `attribute` (which, by the `EffectClassifier` of `load_learned`), `try_effects` and
+`shrinkage` (how far, on the twin), `next_recordings`. For drives that start and stop see `gearsig.gap.start_stop`.
 """
 
 from gearsig.gap._attribution import (

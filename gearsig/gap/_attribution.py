@@ -1,7 +1,8 @@
-"""Calibrated probabilities of the causes: by the forests; of effects that they do not know, by a trial.
+"""Calibrated probabilities of the causes: from the forests or, for effects unknown to them, from a trial.
 
-The trials of effects that they do know say how far the gap shrinks. How well one explains it can weigh as well, and the
-calibration gives that the weight 0: on blind cases look-alikes shrink the gap as far as the true effect does.
+Trials of effects that the forests know show how far the gap shrinks. How well such an effect explains the gap could
+count as well, but the calibration gives it the weight 0: on blind cases look-alikes shrink the gap as far as the true
+effect does.
 """
 
 from __future__ import annotations
@@ -44,34 +45,34 @@ from gearsig.gap._trials import TriedEffect, try_effects
 CALIBRATION_FILE = Path(__file__).with_name("calibration.json")
 
 SIZES = (0.3, 6.0)
-"""Structural floors that a gap's size counts from and to."""
+"""Limits of the gap's size in the calibration, in structural floors."""
 
 
 @dataclass(frozen=True)
 class GapCalibration:
-    """p ∝ exp(a m s^κ ln p_forest + b (score − s0) + c[kind] + d[kind] ln s), s the gap's size, fitted to known cases.
+    """p ∝ exp(a m s^κ ln p_forest + b (score − s0) + c[kind] + d[kind] ln s), s: the gap's size; fitted to known cases.
 
     Parameters
     ----------
     sharpness : float
         a.
     shrink_weight : float
-        b; the score is the held-out shrink less that of placebos. Only for effects that were tried.
+        b; the score is the held-out shrink less that of the placebos. Only for effects that were tried.
     neutral_shrink : float
-        s0, the score that says nothing for the effect nor against it.
+        s0, the score that is evidence neither for nor against the effect.
     none_bias, unknown_bias : float
-        c of both causes that are no effect.
+        c of the two causes that are not effects.
     named_from : float
-        Probability of the machine's effects together from which one is named.
+        Total probability of the machine's effects from which one is named.
     apart : float
-        The likeliest effect's share, of the first two together, from which it stands alone.
+        The most probable effect's share of the first two together from which it is named alone.
     effect_biases : mapping
-        c of effects: of machines that others built some look more often, some less often, like what the population
-        shows than that says. 0 where it is missing.
+        c of effects, 0 where missing. It corrects for effects that resemble the population's features more, or less,
+        often on machines that others built.
     sharper, none_slope : float
-        κ, and d of no gap: of a large gap more can be said, and hardly that it is none.
+        κ, and d of no gap: a large gap allows more certain statements, and makes "no gap" improbable.
     several : float
-        m where there is more than one operating condition, else 1: by how much more they say than one of them does.
+        m where there are several operating conditions, else 1: how much more evidence they give than one.
     """
 
     sharpness: float
@@ -88,11 +89,11 @@ class GapCalibration:
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> GapCalibration:
-        """Build it from what a JSON file holds."""
+        """Build the calibration from the contents of a JSON file."""
         return cls(**{field.name: values[field.name] for field in fields(cls) if field.name in values})
 
     def to_mapping(self) -> dict[str, Any]:
-        """Return plain values, for a JSON file."""
+        """Return plain values for a JSON file."""
         numbers = asdict(self)
         biases = numbers.pop("effect_biases")
         return {name: round(float(value), 4) for name, value in numbers.items()} | (
@@ -102,18 +103,18 @@ class GapCalibration:
     def probabilities(
         self, forest: Mapping[str, float], scores: Mapping[str, float], size: float = 1.0, n_conditions: int = 1
     ) -> dict[str, float]:
-        """Return cause → probability, likeliest first.
+        """Return cause → probability, most probable first.
 
         Parameters
         ----------
         forest : mapping
-            Cause → probability by the forest.
+            Cause → probability from the forest.
         scores : mapping
-            Effect → score of those that were tried.
+            Effect → score, of the effects that were tried.
         size : float
-            Of the gap, in structural floors.
+            Size of the gap in structural floors.
         n_conditions : int
-            That were joined in `forest`.
+            Number of conditions joined in `forest`.
         """
         counted = float(np.clip(size, *SIZES))
         sharpness = self.sharpness * counted**self.sharper * (self.several if n_conditions > 1 else 1.0)
@@ -130,15 +131,15 @@ class GapCalibration:
     def outcome(
         self, probabilities: Mapping[str, float], known: Mapping[str, GapEffect] = MappingProxyType({})
     ) -> GapOutcome:
-        """Return what may be said; nothing that is less likely than all else together.
+        """Return the outcome; nothing is named that is less probable than all else together.
 
         Parameters
         ----------
         probabilities : mapping
             Cause → probability.
         known : mapping
-            Effects by name. Where those of one group are likelier than all else, the kind of fault is told, whichever
-            of them it is.
+            Effects by name. If the effects of one group are together more probable than all else, the kind of fault is
+            named even where the effect is uncertain.
         """
         none, unknown = probabilities[NONE], probabilities[UNKNOWN]
         if max(none, unknown) >= LIKELIER_THAN_NOT:
@@ -155,21 +156,21 @@ class GapCalibration:
 
 
 def score_of(shrink: float, placebo: float) -> float:
-    """Return what an effect's held-out shrinkage says for it: s − max(p, 0), cut to −1 … 1.
+    """Return an effect's evidence from its held-out shrinkage s and that of its placebos p: s − max(p, 0) in −1 … 1.
 
     Parameters
     ----------
     shrink : float
-        Share of the gap that the effect closes on held-out data, 1 − after²/before²; below 0 where the gap grows.
+        Share of the gap that the effect closes on held-out data, 1 − after²/before²; negative where the gap grows.
     placebo : float
-        The same of the effect at wrong orders or on wrong shafts, which close a part by chance.
+        The same for the effect at wrong orders or on wrong shafts, which close part of it by chance.
     """
     return float(np.clip(shrink - max(placebo, 0.0), -1.0, 1.0))
 
 
 @cache
 def load_gap_calibration(*, with_reference: bool) -> GapCalibration:
-    """Return the calibration that comes with this version."""
+    """Return the calibration shipped with this version."""
     return GapCalibration.from_mapping(
         calibration_values()["with_reference" if with_reference else "without_reference"]
     )
@@ -177,17 +178,17 @@ def load_gap_calibration(*, with_reference: bool) -> GapCalibration:
 
 @cache
 def calibration_values(file: Path = CALIBRATION_FILE) -> dict[str, Any]:
-    """Return what a calibration's file holds, "with_reference", "without_reference" and "provenance"."""
+    """Return the contents of a calibration file: "with_reference", "without_reference" and "provenance"."""
     values: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
     return values
 
 
 NOT_SEEN = 0.2
-"""Probability that an effect is too weak to be seen at one of several conditions: of 0, 0.1, 0.2, 0.4 the likeliest, by
-the independent rig's machines at two points each, learned from the other simulators."""
+"""Probability that an effect is too weak to be seen at one of several conditions: the most likely of 0, 0.1, 0.2 and
+0.4 on the independent rig's machines at two points each, learned from the other simulators."""
 
 NOT_SEEN_LOADED = {"backlash": 0.9}
-"""The same at a condition whose load keeps the flanks together, where another one lets them part."""
+"""The same at a condition whose load keeps the flanks in contact while another condition lets them separate."""
 
 
 def joint_probabilities(
@@ -195,20 +196,20 @@ def joint_probabilities(
 ) -> dict[str, float]:
     """Return the joint probabilities of n conditions, p ∝ Π p_i^(1/n): the logarithmic opinion pool.
 
-    One machine's conditions say nearly the same: three of them carry the log evidence of little more than one, and
-    their product is far too sure. How much more than one they say is in the calibration. At one of several conditions
-    an effect may not show, q: p_i(x|e) = (1 − q) p_forest(x|e) + q p_forest(x|none).
+    The conditions of one machine are strongly dependent: three carry little more log evidence than one, so their
+    product is overconfident. The calibration holds how much more they carry. With several conditions an effect may be
+    invisible at one of them with probability q: p_i(x|e) = (1 − q) p_forest(x|e) + q p_forest(x|none).
 
     Source: C. Genest, J. V. Zidek, "Combining probability distributions", Statistical Science 1 (1986).
 
     Parameters
     ----------
     per_condition : sequence of mapping
-        Cause → probability, of each condition.
+        Cause → probability, for each condition.
     loads_n_per_mm : sequence of float
-        Of the teeth, at each; nan where it is not known.
+        Tooth load at each condition; nan where not known.
     allowed : collection of str
-        Causes, those of no effect among them.
+        Allowed causes, including "none" and "unknown".
     """
     parts_somewhere = any(load <= LIGHT_LOAD_N_PER_MM for load in loads_n_per_mm)
     joint = dict.fromkeys(sorted(allowed), 1.0)
@@ -235,25 +236,25 @@ TriedT = TypeVar("TriedT", bound=Tried)
 
 @dataclass(frozen=True)
 class Attribution(Generic[TriedT]):
-    """What calibrated probabilities are made of.
+    """The evidence from which calibrated probabilities are computed.
 
     Parameters
     ----------
     uncalibrated : mapping
-        Cause → probability: by the forests, or by likelihood.
+        Cause → probability, from the forests or from likelihoods.
     tried : dict
-        Effect → how it was tried.
+        Effect → its trial.
     calibration : GapCalibration
-        The one that belongs to this way of comparing.
+        The calibration for this kind of baseline.
     size : float
-        Of the gap in structural floors; of several conditions the largest.
+        Size of the gap in structural floors; with several conditions the largest.
     n_conditions : int
     untrained : tuple of str
-        Effects that the forests do not know, the user's own: each was to be tried.
+        Effects unknown to the forests (the user's own), each of which should be tried.
     labelled : LabelledEvidence or None
-        What labelled recordings of the rig say.
+        Evidence from labelled recordings of the rig.
     tooth_error_log_likelihoods : mapping
-        Effect → log-likelihood of the transmission error's change, of faults of teeth; empty without encoders.
+        Tooth fault → log-likelihood of the change in transmission error; empty without encoders.
     """
 
     uncalibrated: Mapping[str, float]
@@ -267,18 +268,18 @@ class Attribution(Generic[TriedT]):
 
     @property
     def scores(self) -> dict[str, float]:
-        """Effect → what its held-out shrink says for it."""
+        """Effect → score from its held-out shrink."""
         known = ((name, tried.shrinkage) for name, tried in self.tried.items())
         return {name: score_of(s.shrink.value, s.placebo) for name, s in known if s is not None}
 
     @property
     def matches(self) -> dict[str, float]:
-        """Effect → log-likelihood of its waveform, of the faults of teeth that were tried."""
+        """Tooth fault → log-likelihood of its waveform, of those that were tried."""
         known = ((name, getattr(tried, "match", None)) for name, tried in self.tried.items())
         return {name: match.log_likelihood for name, match in known if match is not None}
 
     def probabilities(self, calibration: GapCalibration | None = None) -> dict[str, float]:
-        """Return cause → probability, likeliest first; calibrated, but for effects that the forests do not know."""
+        """Return cause → probability, most probable first; not calibrated for effects unknown to the forests."""
         posterior = (calibration or self.calibration).probabilities(
             self.uncalibrated, self.scores, self.size, self.n_conditions
         )
@@ -289,14 +290,14 @@ class Attribution(Generic[TriedT]):
 
 
 MAX_TRIED, MIN_TRIED_PROBABILITY = 3, 0.06
-"""Effects that are simulated: so many of the likeliest, none less likely than this."""
+"""The most probable effects to simulate: the maximum number, and the minimum probability."""
 
 
 def with_likelihoods(probabilities: Mapping[str, float], matches: Mapping[str, float]) -> dict[str, float]:
-    """Return the probabilities with those of faults of teeth parted anew by what tells them apart, likeliest first.
+    """Return the probabilities with those of tooth faults redistributed by likelihood, most probable first.
 
-    p_i ∝ p_i L_i among those that have a likelihood; what they have together stays: a waveform tells how a tooth is
-    damaged, and that one is, the features tell.
+    p_i ∝ p_i L_i among those that have a likelihood; their sum is kept. The waveform distinguishes how a tooth is
+    damaged; that a tooth is damaged follows from the features.
 
     Parameters
     ----------
@@ -316,10 +317,10 @@ def with_likelihoods(probabilities: Mapping[str, float], matches: Mapping[str, f
 
 
 def with_unknown_distributed(probabilities: Mapping[str, float], scores: Mapping[str, float]) -> dict[str, float]:
-    """Return the probabilities with those of effects that only a trial speaks for, likeliest first.
+    """Return the probabilities including effects that only a trial supports, most probable first.
 
-    They share max_i s_i of what is unknown, each in proportion to its own s_i = max(score, 0): to the forests, a gap
-    that none of their effects explains is unknown, whoever else explains it.
+    They receive max_i s_i of the unknown probability, each in proportion to its s_i = max(score, 0): to the forests, a
+    gap that none of their effects explains is unknown, even if another effect explains it.
     """
     positive = {name: max(score, 0.0) for name, score in scores.items()}
     total = sum(positive.values())
@@ -342,32 +343,32 @@ def attribute(
     labelled: Sequence[LabelledChange] = (),
     tooth_error_log_likelihoods: Mapping[str, float] = MappingProxyType({}),
 ) -> Attribution[TriedEffect]:
-    """Ask the forests and what is labelled, then simulate, fit and score the likeliest effects, `max_tried` at most.
+    """Evaluate the forests and labelled recordings, then simulate, fit and score the `max_tried` likeliest effects.
 
-    Effects that the forests do not know are tried as well, unless nothing is.
+    Effects unknown to the forests are tried as well, unless `max_tried` is 0.
 
     Parameters
     ----------
     conditions : sequence of Condition
         Of one machine, at one or several operating points.
     known : mapping
-        Effect → `GapEffect`, of the simulator.
+        Effect → `GapEffect` of the simulator.
     effects : sequence of str
-        Those that may be named; empty: all that are known.
+        Effects that may be named; empty: all known ones.
     twin : Twin
         The simulator, set to the rig.
     cache : path or None
         Folder of simulated banks; None: nothing is kept.
     on_progress : callable
-        Takes what is done, in words, and the part of it that is, 0 to 1.
+        Called with the current step in words and the fraction completed, 0 to 1.
     max_tried : int
-        Effects to simulate, likeliest first; 0: none, the forests alone decide.
+        Number of effects to simulate, most probable first; 0: none, only the forests decide.
     fresh : bool
-        Whether kept banks are made anew.
+        Whether to simulate kept banks again.
     labelled : sequence of LabelledChange
-        Of the same rig.
+        Changes in labelled recordings of the same rig.
     tooth_error_log_likelihoods : mapping
-        Fault of a tooth → ln L of the transmission error's change; empty without encoders.
+        Tooth fault → ln L of the change in transmission error; empty without encoders.
 
     Returns
     -------
@@ -377,7 +378,7 @@ def attribute(
     Raises
     ------
     RefusalError
-        If the rig has a place for some of the likeliest effects, and none of them can be simulated there.
+        If the rig has a place for some of the most probable effects, but none of them can be simulated there.
     """
     forest = _forest(conditions, effects, known)
     with_reference = all(c.has_reference for c in conditions)
@@ -392,7 +393,7 @@ def attribute(
     likely = [name for name, p in first.items() if name in known and p >= MIN_TRIED_PROBABILITY][:max_tried]
     trained = conditions[0].learned.causes
     untrained = [name for name in effects or known if name not in trained] if max_tried else []
-    if max_tried and any(name in TOOTH_FAULTS for name in likely):  # waveforms part them: all are tried, or none
+    if max_tried and any(name in TOOTH_FAULTS for name in likely):  # waveforms distinguish them: try all or none
         likely += [name for name in TOOTH_FAULTS if name in first and name in known and name not in likely]
     likely += untrained
     tried = try_effects([known[name] for name in likely], twin, conditions, cache, on_progress, fresh=fresh)
@@ -402,21 +403,21 @@ def attribute(
 def _forest(
     conditions: Sequence[Condition], effects: Sequence[str], known: Mapping[str, GapEffect]
 ) -> dict[str, float]:
-    """Return the forests' joint probabilities over what may be named."""
+    """Return the forests' joint probabilities over the causes that may be named."""
     allowed = {NONE, UNKNOWN, *(effects or known)} & set(conditions[0].learned.causes)
     per_condition = [c.classifier.probabilities(c.change, c.tooth_load_n_per_mm, known.values()) for c in conditions]
     return joint_probabilities(per_condition, [c.tooth_load_n_per_mm for c in conditions], allowed)
 
 
 def with_unknown_within_floor(probabilities: Mapping[str, float], size: Interval) -> dict[str, float]:
-    """Return the probabilities with that of an unknown cause given to none, where the whole gap is within its floor.
+    """Move the probability of an unknown cause to "none" where the whole gap is within its floor.
 
     Parameters
     ----------
     probabilities : mapping
         Cause → probability.
     size : Interval
-        Of the whole gap, in structural floors.
+        Size of the whole gap, in structural floors.
     """
     if size.high > 1.0:
         return dict(probabilities)
@@ -425,38 +426,40 @@ def with_unknown_within_floor(probabilities: Mapping[str, float], size: Interval
 
 
 # --------------------
-# What an order that is most of the gap says against effects that cannot make it.
+# Evidence from an order that dominates the gap against effects that cannot cause it.
 # --------------------
 
 
 MAX_SHARE_OF_REST = 0.5
-"""Share of the gap from which one order is more of it than all else."""
+"""Share of the gap above which one order outweighs all else."""
 
 FAR_FROM_HEALTHY = 3.0
-"""Structural floors of an order from which it is no matter of healthy machines' differences."""
+"""Structural floors of an order beyond which differences between healthy machines do not explain it."""
 
 N_FIRST_ORDERS = 2
-"""Multiples of a shaft that hardly anything but its own faults raises alone: it would have to turn along."""
+"""Multiples of a shaft's order that, on their own, hardly anything but that shaft's faults raises: any other cause
+would have to turn with it."""
 
 
 def with_dominant_order_counted(
     probabilities: Mapping[str, float], effects: Mapping[str, GapEffect], places: Sequence[GapPlace], frame: GearFrame
 ) -> dict[str, float]:
-    """Return the probabilities with those of causes lowered that cannot make the order that is most of the gap.
+    """Lower the probabilities of causes that cannot produce the order that dominates the gap.
 
-    A cause of 2 % of a gap is hardly its cause: p → 2 (1 − s) p for a share s of more than a half; unknown gets the
-    rest. Only orders count against an effect, lines at their place in the spectrum: noise, tails and envelopes at a
-    shaft's multiples follow from much that theory does not list. Where healthy machines are far from them they count
-    against no gap as well, and the first orders of a shaft against unknown; the others share that.
+    A cause that explains 2 % of a gap is hardly its cause: p → 2 (1 − s) p for a share s of more than one half; the
+    difference goes to "unknown". Only orders count against an effect, that is, lines at their place in the spectrum:
+    noise, tails and envelopes at a shaft's multiples follow from much that theory does not list. Orders far from those
+    of healthy machines count against "none" as well, and the first orders of a shaft against "unknown"; the other
+    causes share that probability.
 
     Parameters
     ----------
     probabilities : mapping
         Cause → probability.
     effects : mapping
-        Effect → where it shows.
+        Effect → its `GapEffect`, which states where it shows.
     places : sequence of GapPlace
-        Of the gap, with their shares.
+        Places of the gap with their shares.
     frame : GearFrame
     """
     lowered = dict(probabilities)
@@ -476,9 +479,10 @@ def with_dominant_order_counted(
 def likely_beside(
     causes: Sequence[GapCause], effects: Mapping[str, GapEffect], places: Sequence[GapPlace], frame: GearFrame
 ) -> GapCause | None:
-    """Return the likeliest effect that makes an order beyond its floor which the first cannot make; None: none does.
+    """Return the likeliest effect that explains an order beyond its floor which the first cannot; None: there is none.
 
-    It is no rival of the first, that is there instead of it: of another kind, and not a fault of a tooth as well.
+    It accompanies the first effect and is no alternative to it: it is of another group, and the two are not both tooth
+    faults.
     """
     first = causes[0]
     if first.name not in effects:
@@ -510,7 +514,7 @@ def _is_first_of_a_shaft(place: GapPlace, frame: GearFrame) -> bool:
 
 
 def _is_an_order(place: GapPlace, frame: GearFrame) -> bool:
-    """Whether a place is one of lines: a shaft's, those of the residual, or an envelope's at no shaft's order."""
+    """Whether a place consists of lines: a shaft's, those of the residual, or an envelope's at no shaft's order."""
     if place.kind is PlaceKind.ENVELOPE and place.orders:
         return all(
             abs(turns - round(turns)) > SAME_ORDER * turns for turns in np.divide(place.orders[0], frame.shaft_orders)
@@ -520,6 +524,6 @@ def _is_an_order(place: GapPlace, frame: GearFrame) -> bool:
 
 def _can_make(shows_in: Sequence[str], place: GapPlace) -> bool:
     kinds = kinds_of(shows_in)
-    if place.kind is PlaceKind.LINE:  # of the supply, or of a bearing, whose lines stand in envelope and spectrum
+    if place.kind is PlaceKind.LINE:  # mains, or a bearing with lines in envelope and spectrum
         return not kinds or "mains_lines" in shows_in or PlaceKind.ENVELOPE in kinds
     return not kinds or place.kind in kinds

@@ -33,14 +33,15 @@ from gearsig.rig import SIDES
 from gearsig.severity import ShaftLines, difference_lines, reversed_channels
 
 # --------------------
-# What changed about each mesh harmonic: the harmonic itself, what either gear repeats beside it, what nothing repeats.
+# The change of each mesh harmonic and of its surroundings: the harmonic itself, the part that either gear repeats, and
+# the part that neither repeats.
 #
-# A path to a sensor changes all three alike. Flanks that wear alike change the harmonic and leave the rest; friction
-# takes along what is beside it; rough flanks raise what a gear repeats and the noise, and leave the harmonic; teeth
-# that part raise the noise. So each segment of orders from half a tooth below a harmonic to half a tooth above is
-# compared with what it was when the gears were healthy.
+# A changed path to a sensor alters all three equally. Evenly worn flanks change the harmonic alone. Friction also
+# changes its surroundings. Rough flanks raise the repeated part and the noise, but not the harmonic. Teeth that
+# separate raise the noise. Each segment, from half a tooth count below a harmonic to half above, is therefore compared
+# with its level when the gears were healthy.
 #
-# Source of the separation into what is common to all teeth, to one gear, and to nothing: R. B. Randall,
+# Source of the separation into parts common to all teeth, to one gear, and to neither: R. B. Randall,
 # *Vibration-based Condition Monitoring*, 2nd ed., 2021, chapter 5.
 # --------------------
 
@@ -50,17 +51,17 @@ _PARTS = ("mesh", "repeated", "noise")
 _PAIRS = ((MESH, REPEATED), (REPEATED, NOISE), (MESH, NOISE))
 
 MIN_OVER_NOISE = (4.0, 0.5)
-"""Power of a harmonic over the noise on its line, and of all repeated lines over the noise on them, to be compared."""
+"""Minimum ratio to noise for a comparison: of a harmonic to the noise in its line; of all repeated lines to theirs."""
 
 MAX_DB = 30.0
 MIN_POWER = 1.0
-"""dB²: changes as small as a decibel are alike by chance."""
+"""dB²: changes of about a decibel agree by chance."""
 
 
 def alike_features(now: ReducedRecording, healthy: ReducedRecording) -> Iterator[NamedValue]:
     """Yield medians, spreads and differences of the three parts' changes, in dB, over segments and channels.
 
-    0 where nothing that they compare stands clear of noise.
+    A feature is 0 where nothing that it compares exceeds the noise.
     """
     changes = segment_changes(now, healthy)
     for part, name in enumerate(_PARTS):
@@ -77,18 +78,17 @@ def alike_features(now: ReducedRecording, healthy: ReducedRecording) -> Iterator
 
 
 def segment_changes(now: ReducedRecording, healthy: ReducedRecording) -> FloatArray:
-    """Return how each mesh harmonic, what a gear repeats beside it, and what nothing repeats changed.
+    """Return the changes of each mesh harmonic, of the repeated part around it and of the non-repeated part.
 
     Parameters
     ----------
     now, healthy : ReducedRecording
-        With the same channels.
+        Both with the same channels.
 
     Returns
     -------
     array, (n_channels, n_harmonics, 3)
-        dB, within ± `MAX_DB`: `MESH`, `REPEATED`, `NOISE`. nan where
-        a part does not stand clear of noise.
+        dB, within ± `MAX_DB`, in the order `MESH`, `REPEATED`, `NOISE`. nan where a part does not exceed the noise.
     """
     rows = []
     for name in now.channels:
@@ -138,38 +138,38 @@ def _rms(values: FloatArray) -> float:
 
 
 def _rise(values: FloatArray) -> float:
-    """Return the mean step from one harmonic to the next."""
+    """Return the mean step from one harmonic to the next, in dB."""
     steps = [values[:, b] - values[:, a] for a, b in pairwise(range(values.shape[1]))]
     finite = _finite(np.array(steps))
     return float(finite.mean()) if len(finite) else 0.0
 
 
 def _agreement(a: FloatArray, b: FloatArray) -> float:
-    """Return 10 (2 Σ ab)/(Σ a² + Σ b² + n): 10 where both changed alike and much, −10 where in opposite directions."""
+    """Return 10 (2 Σ ab)/(Σ a² + Σ b² + n): 10 for equal large changes, −10 for opposite ones."""
     is_known = np.isfinite(a) & np.isfinite(b)
     x, y = a[is_known], b[is_known]
     return float(20.0 * np.sum(x * y) / (np.sum(x**2 + y**2) + MIN_POWER * max(len(x), 1)))
 
 
 # --------------------
-# Whether all channels changed alike: the excitation did, or one sensor's path.
+# Whether all channels changed equally: a change of the excitation, or of one sensor's path.
 # --------------------
 
 
 def apart_features(now: ReducedRecording, healthy: ReducedRecording) -> Iterator[NamedValue]:
-    """Yield by how much the channels' changes differ from each other, rms in dB; 0 where there is one channel.
+    """Yield the differences between the channels' changes, RMS in dB; 0 where there is one channel.
 
-    What drives the gears harder is seen by every sensor, each through its own path; a sensor that was mounted anew, or
-    a bearing that holds its shaft less, changes the paths, and each in its own way.
+    A stronger excitation of the gears reaches every sensor through its own path. A remounted sensor, or a bearing that
+    supports its shaft less, changes the paths, each differently.
     """
     after, before = _mesh_levels(now), _mesh_levels(healthy)
-    n = min(after.shape[1], before.shape[1])  # the faster recording shows fewer
+    n = min(after.shape[1], before.shape[1])  # the faster recording has fewer
     yield "apart.mesh", _scatter(after[:, :n] - before[:, :n])
     yield "apart.floor", _scatter(_floor_levels(now) - _floor_levels(healthy))
 
 
 def _scatter(changes: FloatArray) -> float:
-    """Return the rms, over all, of what the channels' mean leaves."""
+    """Return the RMS of all deviations from the channels' mean."""
     return float(np.sqrt(np.mean((changes - changes.mean(axis=0)) ** 2))) if len(changes) > 1 else 0.0
 
 
@@ -179,7 +179,7 @@ def _mesh_levels(reduced: ReducedRecording) -> FloatArray:
 
 
 def _floor_levels(reduced: ReducedRecording) -> FloatArray:
-    """Return the residual's levels in bands, (n_channels, n_bands), in dB."""
+    """Return the residual's band levels, (n_channels, n_bands), in dB."""
     return _decibels(np.array([sums.moments.mean(axis=0)[:, 0] for sums in reduced.channels.values()]))
 
 
@@ -189,33 +189,34 @@ def _decibels(power: FloatArray) -> FloatArray:
 
 
 MIN_NOISE = 1e-8
-"""Of all lines together over the mesh's power: two gears of equal teeth leave nothing of their own in one average."""
+"""Power of all lines together relative to the mesh: two gears of equal teeth leave nothing of their own in an
+average."""
 
 MIN_SURPRISE = 0.1
-"""Energy below any that a healthy machine's own noise makes: of two gears of equal teeth one has no average of its own,
-and what rounding leaves in it says nothing."""
+"""Energy below any that a healthy machine's own noise causes: with two gears of equal teeth, one has no average of its
+own, and rounding errors in it are no evidence."""
 
 REPEATS = 0.1
-"""Share by which a healthy machine's pattern differs on another day, see `normalised_differences`."""
+"""Relative variation of a healthy machine's pattern from day to day, see `normalised_differences`."""
 
 
 def change_features(now: ReducedRecording, healthy: ReducedRecording) -> Features:
     """Return the differences of all features, and features of the difference of the averages.
 
-    The reference's scatter counts as well: variances of both add, SE² = SE²_now + SE²_healthy, each by the jackknife
-    over blocks of revolutions.
+    The reference's scatter is included: variances add, SE² = SE²_now + SE²_healthy, each from the jackknife over blocks
+    of revolutions.
 
     Parameters
     ----------
     now : ReducedRecording
         The recording.
     healthy : ReducedRecording
-        The reference, with the same channels, of the same gears.
+        The reference, with the same channels and the same gears.
 
     Returns
     -------
     Features
-        dB, or ten times the decadic logarithm; above 0 where the recording has more.
+        dB, or ten times the decadic logarithm; positive where the recording has more.
     """
     (names, after), before = whole_and_parts(now), whole_and_parts(healthy)[1]
     joined, values = _joined(names, after[0] - before[0], now, healthy)
@@ -231,16 +232,16 @@ def change_features(now: ReducedRecording, healthy: ReducedRecording) -> Feature
 
 
 def change_feature_values(now: ReducedRecording, healthy: ReducedRecording) -> tuple[tuple[str, ...], FloatArray]:
-    """Return the change features without their scatter, as for single simulations, which need none.
+    """Return the change features without their scatter, for example of single simulations.
 
     Parameters
     ----------
     now, healthy : ReducedRecording
-        As of `change_features`.
+        As in `change_features`.
 
     Returns
     -------
-    names : tuple of str, n of them
+    names : tuple of str, (n,)
     values : array, (n,)
         dB, or ten times the decadic logarithm.
     """
@@ -251,13 +252,13 @@ def change_feature_values(now: ReducedRecording, healthy: ReducedRecording) -> t
 def difference_features(
     now: ReducedRecording, simulated: ReducedRecording, credibility: FloatArray | float = 1.0
 ) -> Features:
-    """Return the differences of all features alone: a simulation's flanks are not this machine's.
+    """Return the differences of all features only, as a simulation's flanks are not those of this machine.
 
     Parameters
     ----------
     now, simulated : ReducedRecording
     credibility : array, (n_features,), or float
-        How much of what the simulation says of each feature is subtracted, see `credibility_of`.
+        Fraction of each simulated feature that is subtracted, see `credibility_of`.
     """
     (names, measured), before = whole_and_parts(now), credibility * whole_and_parts(simulated)[1]
     return _with_scatter(names, measured[0] - before[0], measured[1:] - before[0], measured[0] - before[1:])
@@ -273,13 +274,13 @@ def _with_scatter(names: tuple[str, ...], values: FloatArray, *left_out: FloatAr
 def _joined(
     names: tuple[str, ...], differences: FloatArray, now: ReducedRecording, healthy: ReducedRecording
 ) -> tuple[tuple[str, ...], FloatArray]:
-    """Return names and values of the differences and of the patterns' features behind them."""
+    """Return names and values of the differences, followed by the features of the patterns."""
     patterns = dict(_patterns(now, healthy))
     return (*names, *patterns), np.concatenate([differences, list(patterns.values())])
 
 
 def _patterns(now: ReducedRecording, healthy: ReducedRecording) -> Iterator[NamedValue]:
-    """Yield the tooth features of the difference of the averages, turned so that the same teeth meet."""
+    """Yield the tooth features of the difference of the averages, rotated so that the same teeth coincide."""
     differences = [turned_difference(now, healthy, side) for side in (DRIVER, DRIVEN)]
     bursts = []
     for side, (turned, agreement) in enumerate(differences):
@@ -309,21 +310,21 @@ def _patterns(now: ReducedRecording, healthy: ReducedRecording) -> Iterator[Name
 
 
 def turned_difference(now: ReducedRecording, healthy: ReducedRecording, side: int) -> tuple[ShaftLines, float]:
-    """Return a shaft's lines less the healthy ones, turned so that the same teeth meet, and how well they agreed."""
+    """Return a shaft's lines less the healthy ones, rotated so that the same teeth coincide, and their agreement."""
     return difference_lines(
         lines_of_shaft(now, side), lines_of_shaft(healthy, side), whole_teeth=now.marks[DRIVER] or now.marks[DRIVEN]
     )
 
 
 def as_mounted(now: ReducedRecording, healthy: ReducedRecording) -> tuple[ReducedRecording, tuple[str, ...]]:
-    """Return a reference whose channels read the way round that the recording's do, and which were turned about."""
+    """Return a reference whose channels have the signs of the recording's, and the names of those inverted."""
     lines_now, lines_healthy = (lines_of_shaft(reduced, DRIVER) for reduced in (now, healthy))
     names = reversed_channels(lines_now, lines_healthy, whole_teeth=now.marks[DRIVER] or now.marks[DRIVEN])
     return healthy.turned_about(names) if names else healthy, names
 
 
 def difference_residuals(now: ReducedRecording, turned: ShaftLines, side: int) -> list[ComplexArray]:
-    """Return each channel's difference without its smooth lines, over the mesh's amplitude."""
+    """Return each channel's difference without its smooth lines, relative to the mesh amplitude."""
     return [
         average.residual(_filled(row, average)) / np.sqrt(average.mesh_power)
         for row, average in zip(turned.lines, now.averages(side), strict=True)
@@ -331,18 +332,18 @@ def difference_residuals(now: ReducedRecording, turned: ShaftLines, side: int) -
 
 
 def _filled(row: ComplexArray, average: ShaftAverage) -> ComplexArray:
-    """Return lines with zeros up to the average's last one."""
+    """Return lines padded with zeros to the average's length."""
     return np.pad(row, (0, len(average.lines) - len(row)))
 
 
 def normalised_differences(
     now: ReducedRecording, healthy: ReducedRecording, turned: ShaftLines, side: int
 ) -> list[ComplexArray]:
-    """Return each channel's difference, line by line over what noise and a mounting of its own would make of it.
+    """Return each channel's difference, line by line relative to its expected size from noise and remounting.
 
-    w[n] = d[n] / √(σ²[n] + (s |r[n]|)²), with σ² the power that noise leaves in both averages, |r|² the healthy
-    pattern's power about that order, s = `REPEATS`; scaled so that a healthy machine's energy is about 1 all round,
-    whatever the machine. A change counts where it is sure, and not where the vibration is loud.
+    w[n] = d[n] / √(σ²[n] + (s |r[n]|)²), with σ² the noise power in both averages, |r|² the healthy pattern's power
+    around that order, s = `REPEATS`; scaled so that a healthy machine's energy is about 1 everywhere, whatever the
+    machine. Changes thus count by their certainty, not by the level of vibration.
     """
     by_channel = []
     n = turned.lines.shape[1]
@@ -357,7 +358,7 @@ def normalised_differences(
 
 
 def lines_of_shaft(reduced: ReducedRecording, side: int) -> ShaftLines:
-    """Return the averages' lines in the form that the alignment takes."""
+    """Return the averages' lines in the form required for alignment."""
     averages, frame = reduced.averages(side), reduced.frame
     highest = averages[0].highest
     return ShaftLines(
@@ -374,15 +375,16 @@ def lines_of_shaft(reduced: ReducedRecording, side: int) -> ShaftLines:
 
 
 # --------------------
-# Levels that are counted relative to the mesh harmonics, and what of their change is their own.
+# Levels relative to the mesh harmonics, and the part of their change that is their own.
 # --------------------
 
 
 def change_relative_to_mesh(names: Sequence[str], distances: FloatArray) -> FloatArray:
     """Return changes of levels as far as they hold both relative to the mesh harmonics and by themselves.
 
-    If the mesh alone falls by 6 dB, all that is counted relative to it rises by as much, and none of it has changed; if
-    a sensor's gain rises, everything does but the ratios. The smaller of both changes counts, none where signs differ.
+    If the mesh alone falls by 6 dB, all levels relative to it rise by as much although none of them has changed; if a
+    sensor's gain rises, everything except the ratios does. The smaller of the two changes counts, or 0 where their
+    signs differ.
 
     Parameters
     ----------
@@ -401,13 +403,13 @@ def change_relative_to_mesh(names: Sequence[str], distances: FloatArray) -> Floa
 
 
 def counted_from_the_mesh(names: Sequence[str]) -> FloatArray:
-    """Return +1 for levels relative to the mesh, which added to them gives a level; −1 for levels; 0 for all else."""
+    """Return +1 for levels relative to the mesh, which plus the mesh give a level; −1 for levels; 0 for all else."""
     features = [Feature.of(name) for name in names]
     return np.array([1.0 if f.is_relative else -1.0 if f.is_shaft_level else 0.0 for f in features])
 
 
 # --------------------
-# What a forest sees of a change: sizes, directions, and which of two places changed more.
+# Input of a forest from a change: sizes, directions, and which of two places changed more.
 # --------------------
 
 
@@ -447,17 +449,18 @@ _OF_ALL = (
 
 
 def contrast_rows(names: Sequence[str], distances: FloatArray) -> FloatArray:
-    """Return part of the rows that a forest is fitted to.
+    """Return part of the rows to which a forest is fitted.
 
-    Simulators and machines agree on which lines an effect moves and in which direction, not on how far: beside the
-    compressed sizes stand shares of the largest change, and differences of what tells one effect from another.
+    Simulators and machines agree on which lines an effect changes and in which direction, but not on how much. Besides
+    the compressed sizes, the rows therefore contain their ratios to the largest change, and differences that
+    distinguish one effect from another.
 
     Parameters
     ----------
     names : sequence of str
-        Of changes, see `change_features` and `difference_features`.
+        Names of changes, see `change_features` and `difference_features`.
     distances : array, (n_rows, n)
-        Changes in units that healthy machines reach.
+        Changes in units of those that healthy machines reach.
 
     Returns
     -------
@@ -482,9 +485,9 @@ def _pairs(place: dict[str, int]) -> list[tuple[str, str]]:
 
 
 def columns_with_shafts_swapped(names: Sequence[str]) -> np.ndarray:
-    """Return the places of the features with driver and driven gear exchanged.
+    """Return the columns of the features with driver and driven gear exchanged.
 
-    What a fault of the driver does to the driver's features, one of the driven gear does to that gear's.
+    A fault of the driven gear changes that gear's features as the same fault of the driver changes the driver's.
     """
     place = {name: i for i, name in enumerate(names)}
     return np.array([place[str(Feature.of(name).mirrored)] for name in names])

@@ -1,4 +1,4 @@
-"""Which causes changed features look like: decision trees, and a linear rule, learned from the population."""
+"""Which causes changed features resemble: decision trees and a linear rule, learned from the population."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from gearsig.gap._simulator import GapEffect
 from gearsig.rig import SIDES
 
 # --------------------
-# Decision trees as plain arrays, packed for a file that comes with the library.
+# Decision trees as plain arrays, packed for a file shipped with the library.
 # --------------------
 
 
@@ -32,17 +32,17 @@ LEAF = -1
 
 @dataclass(frozen=True)
 class ForestNodes:
-    """Trees one after another, their nodes numbered throughout, depth first: a node's left branch follows it.
+    """Trees stored one after another with consecutive node numbers, depth first: a node's left branch follows it.
 
     Parameters
     ----------
     columns : int16 array, (n_nodes,)
-        Of the input, by which a node splits; `LEAF` for a leaf.
+        Input column by which a node splits; `LEAF` for a leaf.
     thresholds : float16 array, (n_nodes,)
-        At or below which it goes on to the left.
+        Values at or below the threshold go to the left branch.
     roots : int32 array, (n_trees,)
     shares : uint8 array, (n_leaves, n_causes)
-        Of the causes in each leaf, in `WHOLE`ths.
+        Shares of the causes in each leaf, in units of 1/`WHOLE`.
     """
 
     columns: NDArray[np.int16]
@@ -52,7 +52,7 @@ class ForestNodes:
 
     @classmethod
     def of(cls, forest: Any) -> ForestNodes:
-        """Return those of a fitted forest of scikit-learn, whose trees are numbered depth first, left before right."""
+        """Return the nodes of a fitted scikit-learn forest, whose trees are numbered depth first, left before right."""
         trees = [estimator.tree_ for estimator in forest.estimators_]
         roots = np.cumsum([0, *(tree.node_count for tree in trees[:-1])]).astype(np.int32)
         columns = np.concatenate([tree.feature for tree in trees]).astype(np.int16)
@@ -71,7 +71,7 @@ class ForestNodes:
 
     @cached_property
     def _right(self) -> NDArray[np.intp]:
-        """Where the right branch of each node begins: after a leaf comes that of the last node that waits for it."""
+        """Start of each node's right branch: after a leaf comes that of the last node that still waits for it."""
         right, waiting = np.zeros(len(self.columns), dtype=np.intp), list[int]()
         for node, is_leaf in enumerate((self.columns == LEAF).tolist()):
             if not is_leaf:
@@ -96,12 +96,12 @@ class ForestNodes:
 
 
 WHOLE = 15
-"""What shares are counted in: the mean over hundreds of trees is finer by far."""
+"""Unit of stored shares is 1/`WHOLE`: the mean over hundreds of trees is much finer."""
 
 
 @dataclass(frozen=True)
 class LinearRule:
-    """Probabilities from weights: softmax of W x + b.
+    """A linear classifier: probabilities are the softmax of W x + b.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ class LinearRule:
     offsets: FloatArray
 
     def probabilities(self, row: FloatArray) -> FloatArray:
-        """Return those of the causes, (n_causes,), for one row of input."""
+        """Return the probabilities of the causes, (n_causes,), for one row of input."""
         levels = self.weights @ row + self.offsets
         weights = np.exp(levels - levels.max())
         probabilities: FloatArray = weights / weights.sum()
@@ -121,39 +121,40 @@ class LinearRule:
 
 
 # --------------------
-# Where effects of one machine lie: learned from machines with several recordings of each effect.
+# Clusters of one machine's effects: learned from machines with several recordings of each effect.
 # --------------------
 
 
 N_DIRECTIONS = 40
-"""In which recordings are compared: of 20, 40, 80 no worse than the others on simulators left out."""
+"""Number of directions in which recordings are compared: of 20, 40 and 80 no worse than the others on simulators left
+out."""
 
 WITHIN_SHRINKAGE = 0.3
-"""How far the covariance within a machine's effect is drawn towards a diagonal one."""
+"""Shrinkage of the covariance within a machine's effect towards its diagonal."""
 
 MIN_BETWEEN = 0.05
 
 
 @dataclass(frozen=True)
 class LabelSpace:
-    """Directions in which a machine's effects lie apart, x = Dᵀ z; one effect's recordings scatter by 1 in each.
+    """Directions that separate a machine's effects, x = Dᵀ z; recordings of one effect scatter by 1 in each.
 
-    x ~ (μ, 1), μ ~ (m_c, b): cause c of one machine lies at μ, of all machines about m_c. With a labelled recording x_1
-    of it, μ ~ ((m_c + b x_1)/(1 + b), b/(1 + b)), and a further one is as likely as that and the unit scatter together
-    make it, with Student's tails.
+    x ~ (μ, 1), μ ~ (m_c, b): cause c is at μ on one machine, and around m_c on all machines. Given a labelled recording
+    x_1 of it, μ ~ ((m_c + b x_1)/(1 + b), b/(1 + b)). The likelihood of a further recording follows from this and the
+    unit scatter, with Student's tails.
 
     Source: S. Ioffe, "Probabilistic linear discriminant analysis", ECCV 2006.
 
     Parameters
     ----------
     directions : array, (n_columns, k)
-        Of a classifier's input.
+        Applied to a classifier's input.
     causes : tuple of str
     means : array, (n_causes, k)
     between : array, (k,)
-        Variance of machines about them.
+        Variance of machines around the means.
     whole : arrays, (2, k)
-        Mean and variance over all causes and machines: of an effect that nothing was learned of.
+        Mean and variance over all causes and machines, for an effect that is not in the population.
     """
 
     directions: FloatArray
@@ -163,16 +164,16 @@ class LabelSpace:
     whole: FloatArray
 
     def log_ratios(self, row: FloatArray, rows: FloatArray, cause: str) -> FloatArray:
-        """Return ln p(x | cause, a labelled recording of it) − ln p(x | cause) by each of the labelled ones, (n,).
+        """Return ln p(x | cause, labelled recording of it) − ln p(x | cause) for each labelled recording, (n,).
 
         Parameters
         ----------
         row : array, (n_columns,)
-            Of a recording.
+            Input of the recording.
         rows : array, (n, n_columns)
-            Of labelled ones.
+            Inputs of the labelled recordings.
         cause : str
-            Label of those.
+            Their label.
         """
         known = cause in self.causes and cause != UNKNOWN
         mean = self.means[self.causes.index(cause)] if known else self.whole[0]
@@ -186,17 +187,18 @@ class LabelSpace:
 
 
 DEGREES = 3.0
-"""Of freedom: place and severity differ between recordings, which is no normal scatter. On a simulator left out
-a normal one is too sure from the first labelled recording on (log loss 1.21 → 1.58), Student's is not (0.95)."""
+"""Degrees of freedom: place and severity differ between recordings, which is not normal scatter. On a simulator left
+out, a normal density is overconfident from the first labelled recording on (log loss 1.21 → 1.58), Student's is not
+(0.95)."""
 
 
 def _log_student(away: FloatArray, variance: FloatArray) -> FloatArray:
-    """Return the logarithm of Student's density but for a constant, with a normal one's variance as squared scale."""
+    """Return the logarithm of Student's density, without its constant, with the given variance as squared scale."""
     return np.asarray(-0.5 * ((DEGREES + 1.0) * np.log1p(away**2 / variance / DEGREES) + np.log(variance)))
 
 
 def fit_label_space(rows: FloatArray, causes: NDArray[np.str_], machines: NDArray[np.int64]) -> LabelSpace:
-    """Return the directions of the largest variance between machines' effects over that within one.
+    """Return the directions with the largest ratio of variance between machines' effects to that within one.
 
     Parameters
     ----------
@@ -216,7 +218,7 @@ def fit_label_space(rows: FloatArray, causes: NDArray[np.str_], machines: NDArra
     several = counts[group] > 1
     apart = rows[several] - centres[group[several]]
     within = apart.T @ apart / max(int((counts[counts > 1] - 1).sum()), 1)
-    diagonal = np.diag(within) + 1e-3 / WITHIN_SHRINKAGE  # features that never moved still may
+    diagonal = np.diag(within) + 1e-3 / WITHIN_SHRINKAGE  # also for features that never changed
     regular = (1.0 - WITHIN_SHRINKAGE) * within + WITHIN_SHRINKAGE * np.diag(diagonal)
     _, vectors = eigh(np.cov(centres.T), regular)
     directions = vectors[:, ::-1][:, :N_DIRECTIONS]
@@ -228,33 +230,33 @@ def fit_label_space(rows: FloatArray, causes: NDArray[np.str_], machines: NDArra
 
 
 # --------------------
-# The textbook's rules: effects bring their signs along, as features of `feature_values` and `change_feature_values`; of
-# several rules for a cause the strongest counts.
+# Textbook rules: effects define their signs as features of `feature_values` and `change_feature_values`; of several
+# rules for a cause the strongest counts.
 # --------------------
 
 
 Signs = tuple[tuple[str, int], ...]
 
 NEUTRAL_STRENGTH = 1.0
-"""Strength that counts for no gap, of which there is no rule: healthy machines are one spread from usual."""
+"""Strength assumed for no gap, which has no rule: healthy machines deviate by one spread."""
 
 MAX_OF_A_SIGN = 8.0
-"""In spreads: one sign alone shall not carry a rule of three."""
+"""In spreads: a single sign must not dominate a rule of three."""
 
 
 def textbook_rules(effects: Iterable[GapEffect]) -> list[tuple[str, Signs]]:
-    """Return cause and signs of each rule: of the effects, and of lines and modulations that belong to no part."""
+    """Return cause and signs of each rule: of the effects, and for lines and modulations of unknown origin."""
     of_effects = [(effect.name, effect.signs) for effect in effects if effect.signs]
     return [*of_effects, (UNKNOWN, (("envelope.strange", 1),)), (UNKNOWN, (("line.strange", 1),))]
 
 
 def rule_strengths(signs: Signs, deviations: Mapping[str, float]) -> dict[str, float]:
-    """Return the mean of a rule's signs, each over its spread, by side; by an empty one where it asks for none.
+    """Return side → mean of a rule's signs in units of their spreads; the key is "" for a rule without sides.
 
     Raises
     ------
     InputError
-        If a sign is of no feature.
+        If a sign names an unknown feature.
     """
     names = {name.format(side=side) for name, _ in signs for side in SIDES}
     for name in names - deviations.keys():
@@ -269,14 +271,14 @@ def rule_strengths(signs: Signs, deviations: Mapping[str, float]) -> dict[str, f
 
 
 def textbook_strengths(rules: Iterable[tuple[str, Signs]], deviations: Mapping[str, float]) -> dict[str, float]:
-    """Return cause → how strongly its rules speak for it, in spreads: the strongest rule, at either side.
+    """Return cause → strength of its strongest rule on either side, in spreads.
 
     Parameters
     ----------
     rules : iterable of (str, signs)
         See `textbook_rules`.
     deviations : mapping
-        Feature → distance from usual, in spreads of healthy machines.
+        Feature → deviation from the usual value, in spreads of healthy machines.
     """
     strongest: dict[str, float] = {}
     for cause, signs in rules:
@@ -286,37 +288,38 @@ def textbook_strengths(rules: Iterable[tuple[str, Signs]], deviations: Mapping[s
 
 
 LINEAR_SHARE, LINEAR_REACH = 0.5, 8.0
-"""Of the probabilities without a reference that a linear discriminant gives; where its input is cut. Without a
-reference nearly all that is seen is what one machine differs from another by: trees cut along single features and miss
-a small change across it, a pooled covariance takes it out."""
+"""Weight of a linear discriminant in the probabilities without a reference, and the limit of its input. Without a
+reference, most of what is seen is the difference between machines: trees split along single features and miss a small
+change across it, while a pooled covariance removes it."""
 
 RULES_WEIGHT = 0.3
-"""Of what the textbook's rules say without a reference, p ∝ p_learned exp(w strength): the population's balance of a
-machine's lines is its own, and where nothing cancels what is usual, the rules' few signs hold on any machine."""
+"""Weight w of the textbook rules without a reference, p ∝ p_learned exp(w strength): the balance of lines differs
+between the population's machines and others. Where nothing cancels that baseline, the few signs of the rules hold on
+any machine."""
 
 MIN_PROBABILITY = 2e-3
-"""That a forest gives any cause: no tree having voted for it is no proof."""
+"""Minimum probability that a forest gives any cause: that no tree voted for it is no proof."""
 
 MIN_LOAD_N_PER_MM = 0.01
-"""Of the teeth: less is none."""
+"""Minimum tooth load; smaller loads count as this."""
 
 
 @dataclass(frozen=True)
 class EffectClassifier:
-    """A fitted forest with the floors that its input is measured in.
+    """A fitted forest with the floors by which its input is scaled.
 
     Parameters
     ----------
     causes : tuple of str
-        Of the probabilities.
+        Causes to which the probabilities belong.
     floor : StructuralFloor
     trees : ForestNodes
     usual_load_n_per_mm : float
-        Of the teeth, where a rig does not say.
+        Tooth load assumed where the rig does not determine it.
     labels : LabelSpace
-        Where effects of one machine lie, for what is labelled.
+        Clusters of one machine's effects, for labelled recordings.
     linear : LinearRule or None
-        What is heard besides the forest, by `LINEAR_SHARE`.
+        Used in addition to the forest, with the weight `LINEAR_SHARE`.
     """
 
     causes: tuple[str, ...]
@@ -334,11 +337,11 @@ class EffectClassifier:
         Parameters
         ----------
         change : Features
-            Against the reference or against the twin, as the forest was fitted.
+            Against the reference or the twin, whichever the forest was fitted to.
         tooth_load_n_per_mm : float
-            See `tooth_load_n_per_mm`; nan where it is not known.
+            See `tooth_load_n_per_mm`; nan where not known.
         effects : iterable of GapEffect
-            Whose textbook signs are asked, without a reference.
+            Effects whose textbook signs are used without a reference.
         """
         row = self.input_row(change, tooth_load_n_per_mm)
         shares = self.trees.probabilities(row)
@@ -350,7 +353,7 @@ class EffectClassifier:
         return dict(zip(self.causes, (shares / shares.sum()).tolist(), strict=True))
 
     def input_row(self, change: Features, tooth_load_n_per_mm: float = nan) -> FloatArray:
-        """Return what trees and rules see of a change, see `probabilities`."""
+        """Return the input of trees and rules for a change, see `input_rows`."""
         if change.names != self.floor.names:
             raise InputError(
                 "what was learned belongs to other features than this version computes",
@@ -361,7 +364,7 @@ class EffectClassifier:
         return row
 
     def _rule_factors(self, change: Features, rules: Iterable[tuple[str, Signs]]) -> FloatArray:
-        """Return the factors of the causes, by how far features are from usual, in standard deviations."""
+        """Return the factors of the causes, from the deviations of features in standard deviations."""
         names = self.floor.names
         spreads = self.floor.of(names) / FLOOR_IN_DEVIATIONS
         deviations = self.floor.from_centre(names, change.values) / spreads
@@ -373,19 +376,20 @@ class EffectClassifier:
 
 
 BURST_UNIT_DB = 10.0
-"""Of a burst's shares: counted in it, they are within `LINEAR_REACH`."""
+"""Unit of a burst's shares, which keeps them within `LINEAR_REACH`."""
 
 
 def input_rows(
     floor: StructuralFloor, changes: FloatArray, scatter: FloatArray, loads_n_per_mm: FloatArray
 ) -> FloatArray:
-    """Return what the forest sees: changes over both floors, and what sets them apart from each other.
+    """Return the forest's input: changes over both floors, and the contrasts between them.
 
-    Not the features themselves: a tachometer that jitters more than any in the population is no hunting speed. Levels
-    come twice, as they changed and as far as that holds both relative to the mesh and by itself. Where two averages
-    can be subtracted, what a tooth did is in the difference: the change of either average's own figures is left out.
-    Against a simulation, of the speed only how much it swings counts: how steadily it does, beside the tachometer's
-    jitter, says more of the tachometer. A burst's shares are a shape, and no size that noise adds to: they stand alone.
+    Features themselves are not used: a tachometer with more jitter than any in the population does not mean a hunting
+    speed. Levels are included twice: as they changed, and as far as the change holds both relative to the mesh and by
+    itself. Where two averages can be subtracted, the difference shows the change of a tooth, so changes in either
+    average's own tooth features are omitted. Against a simulation, only the swing of the speed counts: beside the
+    tachometer's jitter, its steadiness says more about the tachometer. A burst's shares describe a shape and are not
+    scaled by floors.
     """
     patterns = any(name.startswith("surprise.") for name in floor.names)
     left_out = ("tooth.", "burst.") if patterns else ("speed.drift", "speed.swing_line")
@@ -395,7 +399,7 @@ def input_rows(
     scatters = np.hypot(floor.of(names) / FLOOR_IN_DEVIATIONS, scatter[:, kept])
     held = contrast_rows(names, change_relative_to_mesh(names, distances) / scatters)
     further = np.ones(held.shape[1], dtype=bool)
-    further[: 2 * len(names)] = np.tile(counted_from_the_mesh(names) != 0.0, 2)  # the others are as they were
+    further[: 2 * len(names)] = np.tile(counted_from_the_mesh(names) != 0.0, 2)  # the others are unchanged
     return np.column_stack(
         [
             contrast_rows(names, distances / scatters),
@@ -407,19 +411,19 @@ def input_rows(
 
 
 def clipped_discriminant_input(rows: FloatArray) -> FloatArray:
-    """Return input of the linear discriminant, cut where it would count for too much."""
+    """Return the input of the linear discriminant, clipped so that no column dominates."""
     reached: FloatArray = np.clip(rows, -LINEAR_REACH, LINEAR_REACH)
     return reached
 
 
 # --------------------
-# All that a diagnosis asks of the population, in one file that comes with the library: plain arrays.
+# Everything that a diagnosis uses of the population, as plain arrays in one file shipped with the library.
 # --------------------
 
 
 LEARNED_FILE = Path(__file__).with_name("learned.npz")
 MAX_BYTES = 100_000_000
-"""Of its arrays; a real one has a tenth."""
+"""Limit of its arrays; a real file has a tenth."""
 _TREES = ("columns", "thresholds", "roots", "shares")
 _LINEAR = ("weights", "offsets")
 _LABELS = ("directions", "means", "between", "whole")
@@ -428,13 +432,13 @@ _WAYS = {True: "with_reference", False: "without_reference"}
 
 @dataclass(frozen=True)
 class Learned:
-    """What the population teaches.
+    """What was learned from the population.
 
     Parameters
     ----------
     feature_names : tuple of str
     credibility : array, (n_features,)
-        How much of what the simulation says of each feature holds for healthy machines, 0 to 1.
+        Fraction of the simulated value of each feature that holds for healthy machines, 0 to 1.
     classifiers : mapping
         With a reference (True) and without (False).
     """
@@ -445,21 +449,21 @@ class Learned:
 
     @property
     def change_names(self) -> tuple[str, ...]:
-        """Of changes against a reference; the features' names come first."""
+        """Names of changes against a reference; those of the features come first."""
         return self.classifiers[True].floor.names
 
     @property
     def causes(self) -> tuple[str, ...]:
-        """That can be recognised, those of no effect among them."""
+        """Causes that can be recognised, including "none" and "unknown"."""
         return self.classifiers[True].causes
 
     def floor(self, *, with_reference: bool) -> StructuralFloor:
-        """Return how far healthy machines lie from themselves on another day, or from their simulation."""
+        """Return the distances of healthy machines from themselves on another day, or from their simulation."""
         return self.classifiers[with_reference].floor
 
 
 def write_learned(learned: Learned, path: Path) -> None:
-    """Write it as plain arrays, rounded as far as no answer notices; whole or not at all.
+    """Write it atomically as plain arrays, rounded without effect on any result.
 
     Raises
     ------
@@ -489,7 +493,7 @@ def write_learned(learned: Learned, path: Path) -> None:
 
 
 def read_learned(path: Path) -> Learned | None:
-    """Return what a file holds; None where there is none, or it is damaged."""
+    """Return the contents of a file; None where it is missing or damaged."""
     arrays = read_arrays(path, MAX_BYTES)
     if arrays is None:
         return None

@@ -1,4 +1,4 @@
-"""Recordings, references and the twin, reduced and set beside each other."""
+"""Recordings, references and the twin, reduced and paired for comparison."""
 
 from __future__ import annotations
 
@@ -52,38 +52,38 @@ from gearsig.severity import (
 )
 
 # --------------------
-# The recordings of a gap diagnosis, reduced, each beside what it is compared with.
+# The recordings of a gap diagnosis, reduced, each with its baseline.
 # --------------------
 
 
 SEED = 0
-"""Of the twin's specimen: its flanks and housing are not the machine's in any case."""
+"""Seed of the twin's specimen, whose flanks and housing differ from the machine's in any case."""
 
 LARGEST_TORQUE_DIFFERENCE = 0.25
-"""Stated torques of a recording and its reference, relative."""
+"""Relative difference between the stated torques of a recording and its reference."""
 
 LONGEST_RUN_S, MAX_REVOLUTIONS = 5.0, 24.0
-"""Of a simulation: longer ones say no more; but so many revolutions of the slower shaft at least."""
+"""Length of a simulation: longer ones add nothing, but the slower shaft must make at least this many revolutions."""
 LEAD = 2.0
-"""Revolutions that a record loses before its first and after its last pulse."""
+"""Revolutions that a record loses before its first pulse and after its last."""
 TRIAL_S, TRIAL_REVOLUTIONS = 1.0, 10.0
-"""The same of a run that tries an effect: it differs from the healthy run by that effect only, not by noise."""
+"""Length of a trial run: it differs from the healthy run by the effect alone, not by noise."""
 
 
 @dataclass(frozen=True)
 class Condition:
-    """One recording, and what it is compared with.
+    """One recording and its baseline.
 
     Parameters
     ----------
     facts : ConditionFacts
     now, simulated : ReducedRecording
-        The recording, and the healthy twin at its point.
+        The recording, and the healthy twin at its operating point.
     reference : ReducedRecording or None
     learned : Learned
-        By which distances are judged.
+        What was learned from known machines, by which distances are judged.
     path : MeasuredPath or None
-        To the sensors, where a run-up of the healthy machine was recorded.
+        Path to the sensors, where a run-up of the healthy machine was recorded.
     """
 
     facts: ConditionFacts
@@ -95,19 +95,19 @@ class Condition:
 
     @property
     def has_reference(self) -> bool:
-        """Whether it is compared with a healthy recording of the same machine, and not with the twin."""
+        """Whether the baseline is a healthy recording of the same machine, not the twin."""
         return self.reference is not None
 
     @property
     def baseline(self) -> ReducedRecording:
-        """What it is compared with."""
+        """The reference, or the healthy twin where there is none."""
         return self.simulated if self.reference is None else self.reference
 
     def change_of(self, part: ReducedRecording) -> Features:
-        """Return the change of the recording, or of some of its blocks, against what it is compared with.
+        """Return the change of the recording, or of some of its blocks, against the baseline.
 
-        That is the reference; without one it is x − c y: x the features, y the healthy twin's, c the credibility of
-        each feature, 0 to 1, learned from machines whose twin is known.
+        The baseline is the reference. Without one the change is x − c y: x the features, y those of the healthy twin, c
+        the credibility of each feature, 0 to 1, learned from machines whose twin is known.
         """
         if self.reference is not None:
             return change_features(part, self.reference)
@@ -115,22 +115,22 @@ class Condition:
 
     @cached_property
     def change(self) -> Features:
-        """Against the reference, or else against the twin as far as it is credible."""
+        """Change against the reference, otherwise against the twin as far as it is credible."""
         return self.change_of(self.now)
 
     @cached_property
     def floor(self) -> StructuralFloor:
-        """How far healthy machines lie from what it is compared with."""
+        """Distances of healthy machines from the baseline."""
         return self.classifier.floor
 
     @cached_property
     def size(self) -> GapSize:
-        """How large the whole gap is."""
+        """Size of the whole gap."""
         return gap_size(self.change, self.floor)
 
     @property
     def classifier(self) -> EffectClassifier:
-        """By which its change is recognised."""
+        """The classifier for this kind of baseline."""
         return self.learned.classifiers[self.has_reference]
 
     @property
@@ -145,15 +145,15 @@ class Condition:
 
     @property
     def gain_scatter(self) -> float:
-        """α, by how much the twin's mesh harmonics miss the reference's, beside each other; see `_waveform`."""
+        """α, the error of the twin's mesh harmonics relative to each other, against the reference; see `_waveform`."""
         unknown = gain_scatter(self.baseline, self.simulated)
         return unknown if self.path is None else self.path.gain_scatter(unknown)
 
     @cached_property
     def change_db(self) -> dict[str, float]:
-        """Feature → distance from healthy machines', in dB.
+        """Feature → distance from that of healthy machines, in dB.
 
-        With a reference, a level relative to the mesh counts as far as it changed by itself.
+        With a reference, a level relative to the mesh counts only as far as it changed by itself.
         """
         names, distances = self.change.names, self.floor.from_centre(self.change.names, self.change.values)
         held = change_relative_to_mesh(names, distances) if self.has_reference else distances
@@ -161,18 +161,18 @@ class Condition:
 
     @cached_property
     def floors(self) -> tuple[FloatArray, FloatArray]:
-        """Structural and repeatability floor of each feature, in dB, both (n,)."""
+        """Structural and repeatability floor of each feature in dB, (n,) each."""
         return self.floor.of(self.change.names), FLOOR_IN_DEVIATIONS * pooled_scatter(self.change)
 
     @cached_property
     def over_floors(self) -> dict[str, float]:
-        """Feature → distance over the larger of both floors, with its sign."""
-        # Healthy machines' differences hold their scatter already; a shorter record's may be larger.
+        """Feature → signed distance over the larger of the two floors."""
+        # Differences between healthy machines include their scatter; that of a shorter record may be larger.
         ratios = np.array([*self.change_db.values()]) / np.maximum(*self.floors)
         return dict(zip(self.change.names, ratios.tolist(), strict=True))
 
     def strongest(self, *beginnings: str) -> str:
-        """Return the feature with the largest change over the floors among those whose names begin so."""
+        """Return the feature with the largest change over the floors, of those whose names begin with `beginnings`."""
         sizes = self.over_floors
         return max((name for name in sizes if name.startswith(beginnings)), key=lambda name: abs(sizes[name]))
 
@@ -180,17 +180,18 @@ class Condition:
 USUAL_PRESSURE_ANGLE_DEG = 20.0
 
 LIGHT_LOAD_N_PER_MM = 50.0
-"""Up to which flanks may part and the backlash shows: where dynamic loads can reach the static one, by order."""
+"""Tooth load up to which flanks may separate and backlash shows: dynamic loads are then of the order of the static
+one."""
 
 
 def tooth_load_n_per_mm(pair: GearPair, torque_nm: float) -> float:
-    """Return the tooth force over the face width, T/(r_b b), N/mm; nan where module or width are not known.
+    """Return the tooth force per face width, T/(r_b b), in N/mm; nan where module or width is not known.
 
     Parameters
     ----------
     pair : GearPair
     torque_nm : float
-        Of the driver.
+        Torque of the driver.
     """
     if pair.driver_teeth is None or pair.module_mm is None or pair.face_width_mm is None:
         return float("nan")
@@ -205,15 +206,15 @@ def trial_length_s(now: ReducedRecording) -> float:
 
 
 def run_length_s(now: ReducedRecording) -> float:
-    """Return the length in s of a simulation that the features can be read from.
+    """Return the length in s of a simulation from which features are computed.
 
-    Long enough for `MAX_REVOLUTIONS` of the slower shaft; of a recording that has fewer, as many as that, and `LEAD`
-    for the run to settle.
+    It covers `MAX_REVOLUTIONS` of the slower shaft; if the recording has fewer, as many as it has, plus `LEAD` for the
+    run to settle.
 
     Parameters
     ----------
     now : ReducedRecording
-        The recording that the simulation is compared with.
+        The recording with which the simulation is compared.
     """
     if now.fewest_revolutions < MAX_REVOLUTIONS:
         return (now.fewest_revolutions + LEAD) / _slower_hz(now)
@@ -227,7 +228,7 @@ def _slower_hz(now: ReducedRecording) -> float:
 def simulated(
     twin: Twin, facts: ConditionFacts, now: ReducedRecording, added: Sequence[AddedEffect] = ()
 ) -> ReducedRecording:
-    """Return the twin's run at a recording's point, reduced."""
+    """Return the twin's run at a recording's operating point, reduced."""
     recording = twin.run(
         facts.point,
         added,
@@ -241,7 +242,7 @@ def simulated(
 
 
 def with_channels_of(simulation: ReducedRecording, now: ReducedRecording) -> ReducedRecording:
-    """Return a simulation with the recording's channels: those of equal name, or else in their order."""
+    """Return a simulation with the recording's channels: those of the same name, otherwise in order."""
     if set(now.channels) <= set(simulation.channels):
         return simulation.of_channels(now.channels)
     simulated_channels = list(simulation.channels.values())
@@ -251,7 +252,7 @@ def with_channels_of(simulation: ReducedRecording, now: ReducedRecording) -> Red
 
 
 def facts_of(prepared: PreparedRecording, now: ReducedRecording, twin: Twin) -> ConditionFacts:
-    """Return what is known of a recording's operating point: measured speed, stated torque of the driver.
+    """Return a recording's operating point and length: measured speed, stated (or usual) torque.
 
     Raises
     ------
@@ -262,8 +263,8 @@ def facts_of(prepared: PreparedRecording, now: ReducedRecording, twin: Twin) -> 
     if stated_nm == 0.0:
         raise RefusalError(
             "the rig file states a torque of 0, at which nothing presses the simulated teeth together",
-            remedy="give the drag of the driven side, some percent of the rated torque; without torque_nm a usual one "
-            "is assumed",
+            remedy="give the drag torque of the driven side, a few percent of the rated torque; without torque_nm a "
+            "usual torque is assumed",
         )
     return ConditionFacts(
         recording.name,
@@ -276,21 +277,21 @@ def facts_of(prepared: PreparedRecording, now: ReducedRecording, twin: Twin) -> 
 
 @dataclass(frozen=True)
 class HealthyReference:
-    """A healthy machine's recording, and what it is reduced to: with those channels that are compared."""
+    """A recording of the healthy machine, and its reduction to the channels that are compared."""
 
     reduced: ReducedRecording
     recording: PreparedRecording = field(compare=False, repr=False)
 
     @property
     def name(self) -> str:
-        """Of the recording."""
+        """Name of the recording."""
         return self.recording.recording.name
 
 
 def matching_reference(
     now: ReducedRecording, rig: Rig, references: Sequence[HealthyReference]
 ) -> tuple[HealthyReference | None, str]:
-    """Return the reference at the recording's point, with the channels of both, or none and why."""
+    """Return the reference at the recording's operating point, reduced to common channels, or None and the reason."""
     if not references:
         return None, ""
     nearest = min(references, key=lambda candidate: _distance(now, rig, candidate))
@@ -309,15 +310,15 @@ def matching_reference(
 
 
 MUCH_LONGER = 1.25
-"""Times the revolutions of the other recording."""
+"""Ratio of the revolutions of two recordings from which one counts as longer."""
 
 
 def as_long_as(recording: PreparedRecording, reduced: ReducedRecording, shorter: ReducedRecording) -> ReducedRecording:
     """Return a recording reduced over as many revolutions as another one has, where those are few.
 
-    An average over few revolutions holds more of the other shaft and of noise, and its lines are wider: of a healthy
-    machine 8 revolutions beside 60 differ by 1.0 structural floors, beside 8 by 0.5. `ShaftAverage.power` sees to that
-    from `NOMINAL_REVOLUTIONS` on.
+    An average over few revolutions contains more of the other shaft and of noise, and its lines are wider: for a
+    healthy machine, 8 revolutions differ from 60 by 1.0 structural floors and from 8 by 0.5. From `NOMINAL_REVOLUTIONS`
+    on, `ShaftAverage.power` corrects for this.
     """
     fewest = shorter.fewest_revolutions
     if fewest >= NOMINAL_REVOLUTIONS or reduced.fewest_revolutions <= MUCH_LONGER * fewest:
@@ -327,7 +328,7 @@ def as_long_as(recording: PreparedRecording, reduced: ReducedRecording, shorter:
 
 
 def _with_names_of(reference: ReducedRecording, now: ReducedRecording) -> ReducedRecording | None:
-    """Return the reference with those of the recording's channels that it has, or the only one of each; else None."""
+    """Return the reference with the channels it has in common with the recording, or the only one of each, or None."""
     if common := [name for name in now.channels if name in reference.channels]:
         return reference.of_channels(common)
     if len(reference.channels) == len(now.channels) == 1:
@@ -341,7 +342,7 @@ def _distance(now: ReducedRecording, rig: Rig, reference: HealthyReference) -> f
 
 
 def _torque_difference(rig: Rig, reference: Rig) -> float:
-    """Return by which part of the reference's torque the recording's differs from it; 0 where one is not stated."""
+    """Return the torque difference relative to the reference's torque; 0 where either is not stated."""
     recording_nm, reference_nm = _torque_nm(rig), _torque_nm(reference)
     if recording_nm is None or reference_nm is None:
         return 0.0
@@ -353,7 +354,7 @@ def _torque_nm(rig: Rig) -> float | None:
 
 
 def observed(condition: Condition, index: int, n: int, change: Features | None = None) -> ObservedChange:
-    """Return a condition's distances and floors of the first `n` features; `change` instead of its own."""
+    """Return distances and floors of a condition's first `n` features; `change` replaces its own change."""
     used = change or condition.change
     structural = condition.floor
     floors = (structural.of(used.names) ** 2 + (FLOOR_IN_DEVIATIONS * pooled_scatter(used)) ** 2) ** 0.5
@@ -361,43 +362,43 @@ def observed(condition: Condition, index: int, n: int, change: Features | None =
 
 
 # --------------------
-# What can be noticed when recordings are not of the machine that they are said to be of.
+# Signs that recordings are not of the machine that they are said to be of.
 # --------------------
 
 
 NEAR_MESH, SLOW = 2, 5
-"""Orders of a shaft beside a mesh harmonic that belong to it, and orders from 0 that are the shaft's own."""
+"""Orders of a shaft on either side of a mesh harmonic that belong to it; low orders that belong to the shaft itself."""
 
 MIN_MESH_SHARE = 0.5
-"""Of what repeats with either shaft. Machines of the simulator have 0.7 and more, the heaviest damage included; a pair
-of 55/75 teeth taken for one of 29/47 has 0.45."""
+"""Share of the power synchronous with either shaft that lies near mesh harmonics. Simulated machines have 0.7 and more,
+even with the heaviest damage; a pair of 55/75 teeth taken for one of 29/47 has 0.45."""
 
 MIN_PATTERN = 3.0
-"""Power of the lines that tell teeth apart over that of the noise in them: with less, any two patterns differ."""
+"""Power of the lines in which teeth differ relative to the noise in them: below it any two patterns differ."""
 
 MIN_AGREEMENT = 0.6
-"""Of both gears' patterns. One damaged gear lowers its own to 0.2, and leaves the other's at 0.8 and more; another
-specimen of the same drawing has 0.2 and 0.5, and so have two gears that have worn heavily."""
+"""Agreement of both gears' patterns. One damaged gear lowers its own agreement to 0.2, and leaves the other's at 0.8
+and more; another specimen of the same drawing has 0.2 and 0.5, and so have two heavily worn gears."""
 
 
 WELL_EXPLAINED, HARDLY_EXPLAINED = 0.5, 0.15
-"""Share, over that by chance, of what repeats with a shaft that mesh harmonics hold. Of the sample recordings, damaged
-ones included, the right number of teeth has 0.35 and more (0.08 with the heaviest damage, and then no other number has
-much); most wrong ones have less than 0, a few 0.2 to 0.6."""
+"""Share of the shaft-synchronous power near mesh harmonics, beyond that by chance. In the sample recordings, including
+damaged ones, the right number of teeth has 0.35 and more (0.08 with the heaviest damage, when no other number has
+much); most wrong numbers have less than 0, a few 0.2 to 0.6."""
 
 MIN_TEETH, MAX_TEETH = 12, 200
 
 LOST_DB, OWN_DB = 10.0, 6.0
-"""By how much one tooth's burst has become less since the reference, and by how much it stands above the reference's
-median tooth: healthy teeth that differ by chance have up to 7 dB, and lose nothing from one day to the next."""
+"""Decrease of one tooth's burst since the reference, and its level above the reference's median tooth: healthy teeth
+reach up to 7 dB by chance, and lose nothing from one day to the next."""
 
 CLEAR_CHANGE, ALONE = 10.0, 4.0
-"""Energy of the change at one tooth over that at the median tooth, and over the largest more than a tooth away: worn
-flanks and another path to the sensor change all teeth, some of them much."""
+"""Energy of the change at one tooth relative to the median tooth, and to the largest value more than a tooth away: worn
+flanks and a different path to the sensor change all teeth, some of them much."""
 
 
 def warnings_of(condition: Condition) -> list[str]:
-    """Return what speaks strongly for a wrong rig file, or for recording and reference exchanged."""
+    """Return strong evidence of a wrong rig file, or of recording and reference exchanged."""
     name, reference = condition.facts.name, condition.reference
     texts = tooth_count_mismatch_text(condition.now, name, reference)
     if reference is None or texts:
@@ -408,12 +409,12 @@ def warnings_of(condition: Condition) -> list[str]:
 
 
 def tooth_count_mismatch_text(now: ReducedRecording, name: str, reference: ReducedRecording | None = None) -> list[str]:
-    """Say so where a shaft's own mark shows that its gear has not the rig's teeth but another number.
+    """Return a message if a shaft's own mark shows that its gear has another number of teeth than the rig file states.
 
-    Where angle counts from a mark on the very shaft, its average holds for any teeth. Next to nothing of it must lie at
-    the mesh harmonics of the rig's number of teeth, and most of it at those of another one; multiples and divisors of
-    the right number are not noticed. Where the healthy reference fits the rig's teeth, a damaged tooth is what repeats
-    otherwise, and nothing is said.
+    With a mark on the shaft itself, its average is valid for any number of teeth. Hardly any of its power must lie at
+    the mesh harmonics of the stated number, and most of it at those of another; multiples and divisors of the right
+    number are not detected. Where the healthy reference fits the stated number, the difference is due to a damaged
+    tooth, and nothing is returned.
     """
     for side in (DRIVER, DRIVEN):
         if not now.marks[side] or (reference is not None and _fits(reference, side)):
@@ -423,23 +424,23 @@ def tooth_count_mismatch_text(now: ReducedRecording, name: str, reference: Reduc
         if shares.get(stated, 1.0) < HARDLY_EXPLAINED and shares.get(best, 0.0) > WELL_EXPLAINED:
             shaft = shaft_text(now.frame, side)
             message = (
-                f"{name}: the teeth do not fit. What repeats with {shaft} does so {best} times a revolution, and the "
-                f"rig file gives its gear {stated} teeth. Unless it is a recording of another machine, the rig file is "
-                "wrong; until that is settled nothing here can be relied on."
+                f"{name}: the teeth do not fit. What repeats with {shaft} does so {best} times per revolution, but the "
+                f"rig file gives its gear {stated} teeth. Unless the recording is of another machine, the rig file is "
+                "wrong; until this is settled, nothing here is reliable."
             )
             return [message]
     return []
 
 
 def _fits(now: ReducedRecording, side: int) -> bool:
-    """Return whether a gear's mesh harmonics hold as much of its average as those of the right number do."""
+    """Return whether a gear's mesh harmonics account for as much of its average as with the right number of teeth."""
     return _explained(now, side).get(now.frame.teeth[side], 0.0) >= HARDLY_EXPLAINED
 
 
 def _explained(now: ReducedRecording, side: int) -> dict[int, float]:
-    """Return number of teeth → share of a shaft's average near its mesh harmonics over that by chance, (s − c)/(1 − c).
+    """Return number of teeth → (s − c)/(1 − c), s: share of a shaft's average near mesh harmonics, c: that by chance.
 
-    Two harmonics must be visible.
+    Only numbers with at least two visible harmonics are included.
     """
     whole = []
     for average in now.averages(side):
@@ -457,9 +458,9 @@ def _explained(now: ReducedRecording, side: int) -> dict[int, float]:
 
 
 def swapped_recordings_text(now: ReducedRecording, reference: ReducedRecording, name: str) -> list[str]:
-    """Say so where one tooth stands out in the reference and is ordinary in the recording.
+    """Return a message if one tooth stands out in the reference, but not in the recording.
 
-    Damage adds a burst to one tooth and takes none away. What the change alone cannot tell, its sign does.
+    Damage adds a burst to one tooth and never removes one, so the sign of the change is evidence where its size is not.
     """
     for side in (DRIVER, DRIVEN):
         try:
@@ -483,15 +484,15 @@ def swapped_recordings_text(now: ReducedRecording, reference: ReducedRecording, 
             message = (
                 f"{name}: recording and reference may have been exchanged. {tooth} of {shaft_text(now.frame, side)} "
                 f"(at {360.0 * place:.0f}°) stands {prominence_db:.0f} dB above the median tooth in the reference, "
-                f"and is {lost_db:.0f} dB weaker in the recording; damage adds such a burst and takes none away. If "
-                "so, what is named is what the reference has: give the two the other way round."
+                f"and is {lost_db:.0f} dB weaker in the recording; damage adds such a burst but never removes "
+                "one. If so, the answer describes the reference: swap the two."
             )
             return [message]
     return []
 
 
 def _energy(now: ReducedRecording, side: int, difference: ShaftLines, lines: NDArray[np.complex128]) -> FloatArray:
-    """Return the energy within one pitch of what tells the teeth apart, mean over channels."""
+    """Return the energy within one pitch of the part that differs between teeth, mean over channels."""
     rows = [
         tooth_energy(average.residual(row) / np.sqrt(average.mesh_power), difference.teeth)
         for row, average in zip(lines, now.averages(side), strict=True)
@@ -501,22 +502,22 @@ def _energy(now: ReducedRecording, side: int, difference: ShaftLines, lines: NDA
 
 
 def teeth_mismatch_text(now: ReducedRecording, name: str) -> list[str]:
-    """Say so where little of what repeats with the shafts lies at the mesh harmonics of the rig's teeth.
+    """Return a message if little of the shaft-synchronous power lies at the mesh harmonics of the stated teeth.
 
-    Gears of less than some 15 teeth are not noticed: any order lies near one of their harmonics.
+    Gears of fewer than about 15 teeth escape detection, since any order is near one of their harmonics.
     """
     share = max(_mesh_share(now, side) for side in (DRIVER, DRIVEN))
-    if share >= MIN_MESH_SHARE or tooth_count_mismatch_text(now, name):  # that is said by itself
+    if share >= MIN_MESH_SHARE or tooth_count_mismatch_text(now, name):  # which has its own message
         return []
     message = (
-        f"{name}: only {percent(share)} of what repeats with a shaft lies at mesh harmonics of the rig's "
+        f"{name}: only {percent(share)} of what repeats with a shaft is at mesh harmonics of the rig's "
         f"{'/'.join(map(str, now.frame.teeth))} teeth. Is it a recording of this machine?"
     )
     return [message]
 
 
 def pattern_mismatch_text(now: ReducedRecording, reference: ReducedRecording, name: str) -> list[str]:
-    """Say so where neither gear's pattern of teeth is that of the reference; flawless gears have none to compare."""
+    """Return a message if neither gear's tooth pattern matches the reference; flawless gears have none."""
     if not all(_has_pattern(recording, side) for recording in (now, reference) for side in (DRIVER, DRIVEN)):
         return []
     try:
@@ -527,14 +528,14 @@ def pattern_mismatch_text(now: ReducedRecording, reference: ReducedRecording, na
         return []
     by = " and ".join(f"{max(a, 0.0):.2f}" for a in agreements)
     message = (
-        f"{name}: the patterns of the teeth of both gears agree with the reference by {by} only, where 1 is the same "
-        "gears. The reference is of another machine, all teeth have changed since, or flanks part at a light load."
+        f"{name}: the tooth patterns of the two gears agree with the reference by only {by}, where 1 means the same "
+        "gears. The reference is of another machine, all teeth have changed since, or flanks separate at a light load."
     )
     return [message]
 
 
 def _has_pattern(reduced: ReducedRecording, side: int) -> bool:
-    """Return whether what tells a gear's teeth apart stands clear of noise in the channel where it is clearest."""
+    """Return whether the part that differs between a gear's teeth exceeds the noise in its clearest channel."""
     clearest = 0.0
     for average in reduced.averages(side):
         used = tooth_distinguishing_orders(np.arange(len(average.lines)), average.teeth)
@@ -558,10 +559,10 @@ def _mesh_share(now: ReducedRecording, side: int) -> float:
 
 
 CLEAR_WITHOUT = 3.0
-"""Structural floors from which a reference that far from the simulator is worth a remark."""
+"""Structural floors between reference and simulator from which a message is given."""
 
 LARGEST_DRIFT = 0.4
-"""Of the speed over a record, relative: more is a run-up; effects that let the speed wander stay far below."""
+"""Relative change of speed over a record: more is a run-up; effects that make the speed wander remain far below."""
 
 Stage = Callable[[str, float], object]
 
@@ -576,29 +577,29 @@ def conditions_of(
     learned: Learned | None = None,
     on_read: Callable[[ConditionFacts, ReducedRecording], object] = lambda _facts, _now: None,
 ) -> tuple[list[Condition], list[str]]:
-    """Return the conditions, and what is worth a remark.
+    """Return the conditions, and messages about them.
 
     Parameters
     ----------
     recordings, references : sequence of PreparedRecording
-        Each carries its rig, and the name that it is called by.
+        Each carries its rig and its display name.
     twin : Twin
     run_up : PreparedRecording or None
-        Of the healthy machine, which measures the path to the sensors.
+        Run-up of the healthy machine, which measures the path to the sensors.
     tell : callable
-        Is told what is being done, and which share of the whole is complete.
+        Called with the current stage and the fraction completed.
     learned : Learned or None
-        Default: what comes with this version.
+        Default: the data shipped with this version.
     on_read : callable
-        Is given what a recording shows before its healthy twin is simulated.
+        Called with a recording's facts and reduction before its healthy twin is simulated.
 
     Raises
     ------
     InputError
         If the speed of the run-up hardly varies.
     RefusalError
-        If in no recording, or in no reference, the speed can be known and there are enough revolutions; or if the
-        run-up measures no path, see `measured_path`.
+        If no recording, or no reference, has a known speed and enough revolutions; or if the run-up measures no path,
+        see `measured_path`.
     """
     learned = load_learned() if learned is None else learned
     messages: list[str] = []
@@ -617,27 +618,27 @@ def conditions_of(
     conditions = readable(recordings, condition_of, "recording", messages)
     if not references:
         messages.append(
-            "No healthy reference: a recording of the same rig when it was healthy would make it much surer."
+            "No healthy reference: a recording of the same rig when it was healthy would make it much more certain."
         )
     return conditions, messages
 
 
 MAX_MISSED_DB = 2.0
-"""Of mesh harmonics beside each other, between two healthy runs of a machine at one speed and load: another day's are
-within a decibel or so, another machine's some decibels apart."""
+"""Difference of mesh harmonics, relative to each other, between two healthy runs at one speed and load: about 1 dB
+between days, several decibels between machines."""
 
 
 def _path_of(
     run_up: PreparedRecording, healthy: Sequence[HealthyReference], twin: Twin, messages: list[str]
 ) -> MeasuredPath | None:
-    """Return the path that a run-up measures; None, and say so, where it is not of the references' machine."""
+    """Return the path that a run-up measures; None, with a message, where it is not of the references' machine."""
     path = measured_path(run_up, as_tried(twin), seed=SEED)
     missed_db = [db for reference in healthy if np.isfinite(db := path.missed_db(reference.reduced))]
     if min(missed_db, default=0.0) <= MAX_MISSED_DB:
         return path
     messages.append(
-        f"{path.name} is not used: beside each other, its mesh harmonics miss those of the healthy reference at the "
-        f"same speed by {min(missed_db):.1f} dB. Is it of the same machine, sensors and load?"
+        f"{path.name} is not used: relative to each other, its mesh harmonics differ from those of the healthy "
+        f"reference at the same speed by {min(missed_db):.1f} dB. Is it of the same machine, sensors and load?"
     )
     return None
 
@@ -651,22 +652,22 @@ def readable(
     kind: str,
     messages: list[str],
 ) -> list[ReadT]:
-    """Return what can be read of each recording; one of several that is refused, as too short, is left out and said.
+    """Return the result of `read` for each recording; if some of several are refused, they are omitted with a message.
 
     Parameters
     ----------
     recordings : sequence of PreparedRecording
     read : callable
-        Returns what is wanted of a recording, and notes.
+        Returns the result for a recording, and messages.
     kind : str
-        What the recordings are called.
+        Name for the kind of recordings in messages.
     messages : list of str
-        Remarks and refusals are added to it.
+        Messages and refusals are appended to it.
 
     Raises
     ------
     RefusalError
-        If none can be read: why not the first.
+        If none can be read; it states the reason of the first.
     """
     read_recordings, refused = [], list[RefusalError]()
     for recording in recordings:
@@ -684,7 +685,7 @@ def readable(
 
 
 def read_healthy(recording: PreparedRecording) -> tuple[HealthyReference, list[str]]:
-    """Return a healthy recording reduced, and what is worth a remark."""
+    """Return a healthy recording reduced, and messages about it."""
     reduced, messages = _reduced(recording)
     return HealthyReference(reduced, recording), [*messages, *teeth_mismatch_text(reduced, recording.recording.name)]
 
@@ -697,14 +698,12 @@ def _condition(
     path: MeasuredPath | None,
     on_read: Callable[[ConditionFacts, ReducedRecording], object],
 ) -> tuple[Condition, list[str]]:
-    """Return a recording beside its reference and the healthy twin at its point, and what is worth a remark."""
+    """Return a recording with its reference and the healthy twin at its operating point, and messages."""
     name, (now, messages) = recording.recording.name, _reduced(recording)
     facts = facts_of(recording, now, twin)
     messages += _messages_of_recording(recording, facts)
     match, why = matching_reference(now, recording.rig, healthy)
-    if match is None or teeth_mismatch_text(
-        match.reduced, match.name
-    ):  # a healthy one that fits: damage repeats otherwise
+    if match is None or teeth_mismatch_text(match.reduced, match.name):  # if a healthy one fits, the cause is damage
         messages += teeth_mismatch_text(now, name)
     if why:
         messages.append(f"{name} is compared with the simulation: {why}.")
@@ -732,17 +731,17 @@ def with_common_channels(
     name: str,
     messages: list[str],
 ) -> ReducedRecording:
-    """Return a recording with the channels that its reference has as well, and say what was made of the others."""
+    """Return a recording with the channels that its reference has as well, with messages about the others."""
     if not any(set(reference.channels) & set(candidate.reduced.channels) for candidate in healthy):
         messages.append(f"{name}: its only channel is taken for the reference's only one, which has another name.")
     left_out = [channel for channel in now.channels if channel not in reference.channels]
     if left_out:
-        messages.append(f"{name}: {', '.join(left_out)} is left out, for the reference has no such channel.")
+        messages.append(f"{name}: {', '.join(left_out)} is left out, because the reference has no such channel.")
     return now.of_channels(reference.channels)
 
 
 def check_steady(now: ReducedRecording, reference: ReducedRecording | None) -> None:
-    """Refuse a run-up, but beside one of the reference's: the simulation is at one speed."""
+    """Refuse a run-up, except with one as the reference: the simulation is at one speed."""
     drift, usual = now.speed.drift, 0.0 if reference is None else reference.speed.drift
     if abs(drift - usual) > LARGEST_DRIFT:
         start, end = (60.0 * now.speed_hz * (1.0 + half * drift) for half in (-0.5, 0.5))
@@ -755,7 +754,7 @@ def check_steady(now: ReducedRecording, reference: ReducedRecording | None) -> N
 
 
 def _reduced(prepared: PreparedRecording) -> tuple[ReducedRecording, list[str]]:
-    """Return a recording reduced without its dead channels, and notes."""
+    """Return a recording reduced without its dead channels, and messages."""
     recording, name, messages = prepared.recording, prepared.recording.name, list[str]()
     dead = {p.channel: p for p in prepared.problems if p.kind == "dead"}
     live = [channel for channel in recording.vibration_names() if channel not in dead]
@@ -765,18 +764,18 @@ def _reduced(prepared: PreparedRecording) -> tuple[ReducedRecording, list[str]]:
     unknown = [c.name for c in recording.channels if c.name in live and metres_per_second_squared(c) is None]
     if unknown:
         messages.append(
-            f"{name}: {', '.join(unknown)} is no acceleration in a known unit; it is compared as if it were m/s², so "
-            "that without a reference its level says nothing."
+            f"{name}: {', '.join(unknown)} is not an acceleration in a known unit; it is compared as if it were in "
+            "m/s², so without a reference its level means nothing."
         )
     reduced = reduce_recording(prepared, channels=live)
     messages += [f"{name}: channel {p.channel} is dead ({p.evidence}) and left out." for p in dead.values()]
     grave = prepared.grave_problems(live)
-    messages += [f"{name}: {p.text}; what differs may be no more than that." for p in grave]
+    messages += [f"{name}: {p.text}; this alone may explain the difference." for p in grave]
     return reduced, messages
 
 
 def _messages_of_recording(prepared: PreparedRecording, facts: ConditionFacts) -> list[str]:
-    """Say what is doubtful of a recording, and what of its operating point was not given."""
+    """Return warnings about a recording, and which parts of its operating point were not given."""
     recording = prepared.recording
     texts = [f"{facts.name}: {warning}." for warning in recording.warnings]
     if recording.speed_source is None:
@@ -786,19 +785,19 @@ def _messages_of_recording(prepared: PreparedRecording, facts: ConditionFacts) -
         )
     if _torque_nm(prepared.rig) is None:
         texts.append(
-            f"{facts.name}: the torque is not given; {facts.point.torque_nm:.3g} N·m are usual for the gears' size."
+            f"{facts.name}: the torque is not given; {facts.point.torque_nm:.3g} N·m, usual for such gears, is assumed."
         )
     return texts
 
 
 def _mismatched_reference(condition: Condition) -> list[str]:
-    """Say so where the reference itself is far from the simulation of a healthy machine."""
+    """Return a message if the reference itself is far from the simulation of a healthy machine."""
     change = difference_features(condition.baseline, condition.simulated, condition.learned.credibility)
     size = gap_size(change, condition.learned.floor(with_reference=False)).structural.value
     if size < CLEAR_WITHOUT:
         return []
     message = (
         f"The reference of {condition.facts.name} is itself {size:.1f} structural floors from the simulation of a "
-        "healthy machine: if it was not healthy, only what changed since is seen."
+        "healthy machine: if it was not healthy, only changes since then are seen."
     )
     return [message]

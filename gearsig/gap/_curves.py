@@ -20,13 +20,13 @@ from gearsig.rig import SIDES
 from gearsig.severity import load_calibration
 
 BEYOND = 0.5
-"""Of a mesh order, past the last harmonic that is shown."""
+"""Fraction of a mesh order beyond the last harmonic shown."""
 
 _RARE = 3.0
-"""Of the noise's power: one line of noise in twenty is stronger (exp(−3) = 0.05)."""
+"""Threshold relative to the noise power: one line of noise in twenty is stronger (exp(−3) = 0.05)."""
 
 CLOSER_THAN_A_SHAFTS = 0.1
-"""Orders of the driver between lines of a residual; slower driven shafts than this are not built in one stage."""
+"""Spacing of a residual's lines in orders of the driver; slower driven shafts are not built in a single stage."""
 
 NOTHING: FloatArray = np.zeros(0)
 
@@ -41,22 +41,22 @@ def spectrum_curves(
     reference_structural: StructuralFloor | None = None,
     unit: str = "m/s^2",
 ) -> tuple[SpectrumCurves, ...]:
-    """Return the order spectra of both shafts' averages and of what neither repeats, rms over all channels.
+    """Return the order spectra of both shafts' averages and of the residual, RMS over all channels.
 
     Parameters
     ----------
     now, before : ReducedRecording
-        Measured, and what it is compared with.
+        The recording, and its baseline.
     after : ReducedRecording or None
-        The simulation with the likeliest effect.
+        The simulation with the most probable effect.
     structural : StructuralFloor or None
-        Of the same comparison; each line gets the floor of the feature that it belongs to.
+        Floor of the same comparison; each line gets the floor of the feature that it belongs to.
     reference : ReducedRecording or None
         The healthy recording, with the same channels.
     reference_structural : StructuralFloor or None
-        Of the comparison with it.
+        Floor of the comparison with the reference.
     unit : str
-        Of the channels.
+        Unit of the channels.
     """
     runs = {"before": before, "after": after, "reference": reference}
     beside = {name: run for name, run in runs.items() if run is not None}
@@ -99,7 +99,7 @@ def residual_features(now: ReducedRecording, orders: FloatArray) -> list[str]:
 
 
 def _of_average(side: int, now: ReducedRecording, beside: Mapping[str, ReducedRecording], unit: str) -> SpectrumCurves:
-    """Return a shaft's average of a recording, and of what is drawn beside it, by the name of its curve."""
+    """Return a shaft's average of a recording, and of the runs drawn beside it, keyed by the name of their curve."""
     power, noise = _average_power(now, side, now.channels)
     levels = {name: _average_power(run, side, now.channels) for name, run in beside.items()}
     last = int((N_MESH_HARMONICS + BEYOND) * now.frame.teeth[side])
@@ -118,7 +118,7 @@ def _of_average(side: int, now: ReducedRecording, beside: Mapping[str, ReducedRe
 
 
 def _average_power(reduced: ReducedRecording, side: int, names: Iterable[str]) -> tuple[FloatArray, FloatArray]:
-    """Return lines' power, as squares of peaks, and that of their noise: means over channels."""
+    """Return the lines' power, as squared peaks, and that of their noise: means over channels."""
     averages = [reduced.average(name, side) for name in names]
     n = averages[0].highest + 1
     power: FloatArray = np.mean([np.abs(average.lines[:n]) ** 2 for average in averages], axis=0)
@@ -133,7 +133,7 @@ def _of_residual(now: ReducedRecording, beside: Mapping[str, ReducedRecording], 
     orders = np.arange(min(len(power), int(top / now.order_step) + 1)) * now.order_step
     measured = power[: len(orders)]
     residuals = {name: (run.order_step, _residual_power(run, now.channels)) for name, run in beside.items()}
-    # 2: squares of peaks from mean squares.
+    # The factor 2 turns mean squares into squared peaks.
     amplitudes = {
         name: np.sqrt(2.0 * np.interp(orders, np.arange(len(values)) * step, values))
         for name, (step, values) in residuals.items()
@@ -156,7 +156,7 @@ def _residual_power(reduced: ReducedRecording, names: Iterable[str]) -> FloatArr
 
 
 def against_reference(curves: SpectrumCurves) -> SpectrumCurves:
-    """Return the curves with the healthy reference, and its floors, in the place of the simulation."""
+    """Return the curves with the healthy reference and its floors in place of the simulation."""
     return replace(
         curves,
         before=curves.reference,
@@ -173,16 +173,17 @@ def lines_beyond(curves: SpectrumCurves) -> tuple[int, int]:
 
 
 def is_beyond(curves: SpectrumCurves, gap: FloatArray) -> NDArray[np.bool_]:
-    """Return which lines' gaps, in dB, exceed their structural floor; where that is not known, all that have one."""
+    """Return which lines' gaps, in dB, exceed their structural floor; where that is not known, all lines with a gap."""
     structural = curves.structural_db if len(curves.structural_db) else np.zeros(len(gap))
     beyond: NDArray[np.bool_] = np.abs(np.nan_to_num(gap)) > structural
     return beyond
 
 
 def gap_by_order(curves: SpectrumCurves, simulated: FloatArray) -> FloatArray:
-    """Return 20 lg of measured over simulated amplitudes, each lifted to the floor; nan where neither exceeds it.
+    """Return 20 lg of measured over simulated amplitudes, each at least at the floor; nan where neither exceeds it.
 
-    In the residual, whose lines lie closer than a shaft's, a line that moved to its neighbour is the same line.
+    In the residual, whose lines are closer than a shaft's, a line that moved to the neighbouring bin counts as the
+    same.
     """
     floor = np.maximum(curves.floor, 1e-300)
     a, b = (20.0 * np.log10(np.maximum(values, floor)) for values in (curves.measured, simulated))
@@ -202,17 +203,17 @@ def angle_curves(
     *,
     healthy: ReducedRecording | None = None,
 ) -> tuple[AngleCurves, ...]:
-    """Return, for both shafts, the energy within one pitch over that of the measured median tooth.
+    """Return, for both shafts, the energy within one pitch relative to the measured median tooth.
 
-    The angle is that at which a tooth engages: the answer's usual lag is taken off. Simulated curves are turned to
-    where they agree best, unless both have a mark on that shaft.
+    The angle is that at which a tooth engages: the typical lag of the response is subtracted. Simulated curves are
+    rotated for best agreement, unless both have a mark on that shaft.
 
     Parameters
     ----------
     now, before, after : ReducedRecording
-        Measured, simulated without and with the likeliest effect.
+        Measured, and simulated without and with the most probable effect.
     healthy : ReducedRecording or None
-        Where it is given, the curves are those of the differences: of the recording from it, of the simulations from
+        If given, the curves are those of the differences: of the recording from it, and of the simulations from
         `before`, whose own curve is 0.
     """
     simulated_healthy = None if healthy is None else before
@@ -245,7 +246,7 @@ def _energy(run: ReducedRecording, healthy: ReducedRecording | None, side: int) 
 
 
 def _turned(simulated: FloatArray, measured: FloatArray, *marks: bool) -> FloatArray:
-    """Return the curve turned to its best agreement, unless marks fix it."""
+    """Return the curve rotated for best agreement, unless marks fix it."""
     if all(marks):
         return simulated
     turned: FloatArray = np.roll(simulated, int(np.argmax(circular_correlation(measured, simulated))))
@@ -253,9 +254,9 @@ def _turned(simulated: FloatArray, measured: FloatArray, *marks: bool) -> FloatA
 
 
 def _angles(teeth: int) -> tuple[FloatArray, int]:
-    """Return ascending angles in degrees from 0 to 360, and which place is the first.
+    """Return ascending angles in degrees from 0 to 360, and the index of the first.
 
-    A window that starts at θ has its middle half a pitch on; the tooth engaged `lag_pitches` before.
+    A window that starts at θ has its centre half a pitch later; the tooth engaged `lag_pitches` before that.
     """
     n = teeth * STEPS_PER_TOOTH
     middle = (np.arange(n) / STEPS_PER_TOOTH + 0.5 - load_calibration().lag_pitches) / teeth
@@ -265,31 +266,31 @@ def _angles(teeth: int) -> tuple[FloatArray, int]:
 
 
 # --------------------
-# The teeth's patterns of a recording and of the healthy reference, for a picture of both.
+# Tooth patterns of a recording and of the healthy reference, for plotting both.
 # --------------------
 
 
 POINTS_PER_PERIOD = 4
-"""Of the highest order: the picture's lines are then smooth."""
+"""Points per period of the highest order, for smooth curves."""
 
 
 def average_curves(now: ReducedRecording, reference: ReducedRecording, *, unit: str = "") -> tuple[AverageCurves, ...]:
-    """Return what tells the teeth apart in both shafts' averages, of a recording and of its reference.
+    """Return the tooth-to-tooth part of both shafts' averages, of a recording and of its reference.
 
-    Of the channel on which most has changed, over its mesh harmonics. The angle is that at which a tooth engages: the
-    answer's usual lag is taken off, as in `gearsig.gap.angle_curves`.
+    It is taken from the channel with the largest change relative to its mesh harmonics. The angle is that at which a
+    tooth engages: the typical lag of the response is subtracted, as in `gearsig.gap.angle_curves`.
 
     Parameters
     ----------
     now, reference : ReducedRecording
-        With the same channels.
+        Both with the same channels.
     unit : str
-        Of the channels.
+        Unit of the channels.
 
     Raises
     ------
     RefusalError
-        If the reference was taken at another speed.
+        If the reference was taken at a different speed.
     """
     return tuple(_of_side(now, reference, side, unit) for side in (DRIVER, DRIVEN))
 
@@ -318,7 +319,7 @@ def _of_side(now: ReducedRecording, reference: ReducedRecording, side: int, unit
 
 
 def _wave(lines: NDArray[np.complex128], lag_rev: float) -> FloatArray:
-    """Return one revolution of peak amplitudes, moved back by the answer's lag."""
+    """Return one revolution of peak amplitudes, shifted back by the lag of the response."""
     n = POINTS_PER_PERIOD * (len(lines) - 1)
     turned = lines * np.exp(2j * np.pi * np.arange(len(lines)) * lag_rev)
     wave: FloatArray = np.fft.irfft(turned, n) * (n / 2.0)

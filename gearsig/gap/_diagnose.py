@@ -1,4 +1,4 @@
-"""The gap diagnosis: where recordings differ from their simulation, which effect causes it, how far it shrinks then."""
+"""The gap diagnosis: where recordings differ from their simulation, which effect causes it, how far it then shrinks."""
 
 from __future__ import annotations
 
@@ -72,41 +72,42 @@ from gearsig.rig import Rig
 from gearsig.severity import TEETH_COUNT, CrackEstimate, NoCrackSeen, estimate_crack
 
 USER_EFFECT_MESSAGE = (
-    "The recognition has never seen “{title}”: it was simulated, fitted and scored on held-out data like the likeliest "
+    "Recognition was not trained on “{title}”: it was simulated, fitted and scored on held-out data like the likeliest "
     "effects. Its probability is the share of “unknown” that its held-out shrink beyond placebos explains, and is not "
     "calibrated."
 )
 NOT_SIMULATED = (
-    "The recognition has never seen “{title}”, and it could not be simulated on this rig: nothing is said of it."
+    "Recognition was not trained on “{title}”, and it could not be simulated on this rig: nothing is known about it."
 )
 
 OF_THE_TWIN = (
     "The severity is the one with which the twin comes nearest, and its interval is the fit's. The path to a sensor is "
-    "not known: on 19 development cases of another rig the true severity was 1 to 58 times the fitted one, in the "
-    "middle 5 times, and within the interval in 12. Take it for an order of magnitude, rather too small."
+    "not known: on 19 development cases of another rig the true severity was 1 to 58 times the fitted one, with a "
+    "median of 5, and within the interval in 12. Take it as an order of magnitude, more likely too small."
 )
-"""By `tests/benchmarks/gap_severity.py 70`."""
+"""Measured by `tests/benchmarks/gap_severity.py 70`."""
 
 OF_THE_WAVEFORM = (
-    "The severity is the one with which the twin's waveform comes nearest; its interval holds nine in ten where the "
-    "simulator is as like the machine as one of its own specimens is to another."
+    "The severity is the one with which the twin's waveform comes nearest; its interval is right nine times in ten "
+    "where the simulator resembles the machine as closely as its own specimens resemble each other."
 )
 
 BY_THE_CRACK_ESTIMATE = (
-    "The crack estimate (`gearsig crack`) says of {name}: {text} {depth}It rests on the shape of one tooth's event, "
-    "the probability here on all features and on trials on the twin, so that the two can differ."
+    "The crack estimate (`gearsig crack`) says about {name}: {text} {depth}It rests on the shape of one tooth's event, "
+    "the probability here on all features and on trials on the twin, so the two can differ."
 )
 NO_CRACK_ESTIMATE = (
-    "The crack estimate (`gearsig crack`) says nothing of a crack in {name}: {reason}. The probability here rests on "
-    "all features and on trials on the twin."
+    "The crack estimate (`gearsig crack`) says nothing about a crack in {name}: {reason}. The probability here rests "
+    "on all features and on trials on the twin."
 )
 OF_THE_DEPTH = (
-    "A crack's depth here is that one; its interval held nine in ten of the machines that it was calibrated on. "
+    "That depth is also the crack's severity here; its interval held for nine in ten of the machines it was calibrated "
+    "on. "
 )
 
 NOT_NEARER = (
     "With {title} the twin comes no nearer to data that it was not fitted to: no severity is given, and no twin with "
-    "the effect. What speaks for it is how the recordings changed, by recognition alone."
+    "the effect. The only evidence for it is recognition, from how the recordings changed."
 )
 
 
@@ -126,36 +127,38 @@ def diagnose_gap(
 ) -> GapReport:
     """Diagnose the gap between recordings of one machine and its simulation.
 
-    A rig with bearings and no gear pair cannot be simulated: what stands out of its recordings is named where it is a
+    A rig with bearings but no gear pair cannot be simulated: anomalies in its recordings are named if they match a
     damaged race.
 
     Parameters
     ----------
     recordings : sequence of Recording
-        Of one rig, which each carries with its operating point; several operating conditions tell more.
+        Of one rig, which each recording carries together with its operating point; several operating conditions give
+        more evidence.
     simulator : GapSimulator or DriveSimulator
-        Of running that goes on, or of starts and stops: what is compared is told in `gearsig.gap.start_stop`.
+        For continuous running, or for starts and stops; `gearsig.gap.start_stop` describes what is then compared.
     references : sequence of Recording
-        Of the same rig when it was healthy; each recording is compared with the one at its speed and torque.
+        Of the same rig when healthy; each recording is compared with the one at its speed and torque.
     run_up : Recording or None
-        A run-up or run-down of the same rig when it was healthy, with a tachometer or an encoder, through the speeds
-        of the recordings; beside a reference. It measures the path that the change by a tooth's fault takes to the
+        A run-up or run-down of the same rig when healthy, with a tachometer or an encoder, through the speeds of the
+        recordings; requires a reference. It measures the path that the change caused by a tooth fault takes to the
         sensors, see `gearsig.gap._path`.
     effects : sequence of str
-        Which effects may be named; empty: all that the simulator has, those of the user's own files included, see
+        Effects that may be named; empty: all of the simulator's, including those from the user's own files, see
         `sims.effects.add_effect`.
     learn : sequence of LabelledRecording
         Recordings of this rig whose cause is known, or of your own simulation of it; `gearsig.gap.read_labelled` reads
-        a folder of them. They join what is known of other machines: two of each effect are worth more than all else.
+        a folder of them. They add to what is known of other machines: two per effect are worth more than all other
+        evidence.
     stage : str
-        Of a rig with several gear pairs the one that is diagnosed, by its name or that of a shaft that only it sits
-        on; the others are background.
+        For a rig with several gear pairs: the pair to diagnose, by its name or that of a shaft that no other pair uses;
+        the other pairs are treated as background.
     cache : Path or None
-        Folder that keeps simulations, and what labelled recordings show; None: nothing is kept.
+        Folder that keeps simulations and the features of labelled recordings; None: nothing is kept.
     fresh : bool
-        Simulate anew what the folder holds already.
+        Simulate again what the folder already holds.
     on_stage : callable or None
-        Is told what is being done, and which share of the whole is complete.
+        Called with the current stage and the fraction completed.
 
     Returns
     -------
@@ -164,16 +167,15 @@ def diagnose_gap(
     Raises
     ------
     InputError
-        If a recording carries no rig or is given twice, an effect does not exist, or the speed of the run-up hardly
-        varies.
+        If a recording carries no rig or is given twice, an effect does not exist, or the run-up's speed hardly varies.
     RefusalError
-        If the rig's data do not suffice, there is no speed, or too few revolutions; or if nothing tells the angle along
-        the run-up.
+        If the rig's data are insufficient, there is no speed, or there are too few revolutions; or if nothing gives the
+        angle along the run-up.
     """
     tell = on_stage or (lambda _what, _done: None)
     known = _effects_of(simulator)
 
-    # 1. What is given must fit together, and each recording count once.
+    # 1. The inputs must be consistent, and each recording must count once.
     run_ups: Sequence[Recording] = () if run_up is None else (run_up,)
     _check(recordings, references, run_ups, effects, known)
     recordings, references = _named_apart(recordings), _named_apart(references)
@@ -205,7 +207,7 @@ def diagnose_gap(
         _refuse_further(learn, run_up, "a rig without gears")
         return diagnose_gearless(prepared, healthy, allowed, tell)
 
-    # 3. Each recording is reduced to features, beside the healthy twin at its point and the reference.
+    # 3. Each recording is reduced to features, alongside the healthy twin at its operating point and the reference.
     alone, assumed = twin_rig(rig)
     twin, learned = simulator.twin_of(alone), load_learned()
     start_early(run_for_a_moment, twin)
@@ -224,11 +226,11 @@ def diagnose_gap(
     recording = next(item for item in prepared if item.recording.name == clearest.facts.name)
     reference = {item.recording.name: item for item in healthy}.get(clearest.facts.reference)
 
-    # 4. Which effect: what the forests and labelled recordings say, and of the likeliest what trials on the twin say.
+    # 4. Which effect: evidence from the forests and labelled recordings, then trials of the most probable on the twin.
     tell("recognising", 0.2)
     labelled, left_out = labelled_changes(learn, healthy, conditions, twin, cache, fresh=fresh)
     tooth_errors, no_tooth_errors = _tooth_error_evidences(conditions, recordings, references)
-    with ThreadPoolExecutor(1) as executor:  # step 5 has time while other processes simulate
+    with ThreadPoolExecutor(1) as executor:  # step 5 runs while other processes simulate
         unexpected_job = executor.submit(unexpected_findings, recording, healthy)
         crack_job = executor.submit(_crack_answer, recording, reference)
         attribution = attribute(
@@ -245,14 +247,14 @@ def diagnose_gap(
     tried, gap = attribution.tried, _places(clearest)
     probabilities = _posterior(attribution, conditions, clearest, known, gap)
 
-    # 5. What stands out of the clearest recording by itself, whatever the features say.
+    # 5. What stands out in the clearest recording by itself, whatever the features indicate.
     tell("placing it", 0.82)
     unexpected, unexpected_messages, faults = unexpected_job.result()
     outcome, unseen = with_unexpected(attribution.calibration.outcome(probabilities, known), unexpected)
     labels = _labelled_facts(attribution, conditions, clearest, known, gap)
     warnings = (*unseen, *(text for condition in conditions for text in warnings_of(condition)), *faults)
 
-    # 6. Where, and of each cause where it sits, how severe it is and what speaks for it.
+    # 6. Where the gap is; for each cause its place, severity and evidence.
     places = ranked_places(gap, [place_of_unexpected(item, recording.rig) for item in unexpected])
     crack = crack_job.result()
     causes = in_order(
@@ -265,7 +267,7 @@ def diagnose_gap(
     named = causes[0] if outcome in NAMING else None
     fitted = None if named is None else named.fitted
 
-    # 7. The twin with the effect, and what would tell more.
+    # 7. The twin with the effect, and which recordings would give more evidence.
     tell("looking for what would tell more", 0.88)
     after, next_ones = (
         (None, ()) if named is None else _after_and_next(causes, known, tried, twin, conditions, clearest)
@@ -362,7 +364,7 @@ def _check(
         raise InputError("no recording is given", remedy="give one, or better several operating conditions of one rig")
     if run_ups and not references:
         raise InputError(
-            "a run-up is given, and no healthy reference",
+            "a run-up is given, but no healthy reference",
             where="run_up",
             remedy="give a healthy recording at the recordings' speed as well: the run-up tells which path that takes "
             "to the sensors which has changed since",
@@ -384,7 +386,7 @@ def _effects_of(simulator: GapSimulator | DriveSimulator) -> Mapping[str, GapEff
 
 
 def _check_user_effects(twin: Twin, names: Iterable[str]) -> None:
-    """Run effects that are somebody's own for a moment, before the long work: their files may fail."""
+    """Run user-defined effects briefly before the long work: their files may fail."""
     for name in sorted(names):
         for added in twin.candidates(name)[-1:]:
             run_for_a_moment(twin, (added,))
@@ -396,7 +398,7 @@ def _unit(recording: Recording) -> str:
 
 
 def _named_apart(recordings: Sequence[Recording]) -> list[Recording]:
-    """Number the recordings of one name."""
+    """Number the recordings where names are repeated."""
     names = [recording.name for recording in recordings]
     if len(set(names)) == len(names):
         return list(recordings)
@@ -404,7 +406,7 @@ def _named_apart(recordings: Sequence[Recording]) -> list[Recording]:
 
 
 def _check_distinct(recordings: Sequence[Recording]) -> None:
-    """Refuse copies: they tell nothing more, and a recording does not differ from itself."""
+    """Refuse copies: they add no evidence, and a recording does not differ from itself."""
     by_digest: dict[bytes, str] = {}
     for recording in recordings:
         digest = sha256(np.ascontiguousarray(recording.samples).tobytes()).digest()
@@ -418,7 +420,7 @@ def _check_distinct(recordings: Sequence[Recording]) -> None:
 
 
 def _on_stage(recording: Recording, stage: str) -> Recording:
-    """Return a recording with the pair that is asked for as its rig's first."""
+    """Return a recording whose rig has the requested pair first."""
     return replace(recording, rig=recording.rig and with_stage(recording.rig, stage))
 
 
@@ -429,7 +431,7 @@ def _labelled_facts(
     known: Mapping[str, GapEffect],
     gap: Sequence[GapPlace],
 ) -> LabelledFacts | None:
-    """Return what labelled recordings changed; None where there are none."""
+    """Return how labelled recordings changed the result; None where there are none."""
     if attribution.labelled is None:
         return None
     without = _posterior(replace(attribution, labelled=None), conditions, clearest, known, gap)
@@ -438,17 +440,17 @@ def _labelled_facts(
 
 def _refuse_further(learn: Sequence[LabelledRecording], run_up: Recording | None, machines: str) -> None:
     if run_up is not None:
-        raise InputError(f"a run-up of {machines} tells nothing", where="run_up", remedy="leave it out")
+        raise InputError(f"a run-up of {machines} cannot be used", where="run_up", remedy="leave it out")
     if learn:
         raise InputError(
-            f"labelled recordings of {machines} tell nothing yet",
+            f"labelled recordings of {machines} cannot be used yet",
             where="learn",
             remedy="give a healthy reference instead",
         )
 
 
 def _check_rigs(recordings: Sequence[Recording]) -> Rig:
-    """Return the rig of the first recording; refuse one that has none."""
+    """Return the rig of the first recording; raise if any recording has none."""
     for recording in recordings:
         if recording.rig is None:
             raise InputError(
@@ -458,7 +460,7 @@ def _check_rigs(recordings: Sequence[Recording]) -> Rig:
 
 
 def effects_without_setting(twin: Twin, allowed: Mapping[str, GapEffect]) -> list[str]:
-    """Name the effects that the rig has no place for, a bearing, say."""
+    """Return a message with the effects that have no place in the rig, such as a bearing's."""
     titles = [effect.title for name, effect in allowed.items() if not twin.candidates(name)]
     if not titles:
         return []
@@ -472,19 +474,19 @@ def effects_without_setting(twin: Twin, allowed: Mapping[str, GapEffect]) -> lis
 def _waveform_messages(
     tried: Mapping[str, TriedEffect], known: Mapping[str, GapEffect], condition: Condition
 ) -> list[str]:
-    """Say how well the twin shows the faults of a tooth and the healthy machine, and what follows from it."""
+    """Return how well the twin reproduces tooth faults and the healthy machine, and what follows from that."""
     matches = {known[name].title: trial.match.correlation for name, trial in tried.items() if trial.match is not None}
     if not matches or condition.reference is None:
         return []
     missed_db = 20.0 / np.log(10.0) * condition.gain_scatter
     values = ", ".join(f"{title} {correlation:.2f}" for title, correlation in likeliest_first(matches).items())
     is_decided = any(trial.match is not None and trial.match.is_good for trial in tried.values())
-    meant = "the highest is likeliest" if is_decided else "too little to part them: the twin is not like this machine"
+    meant = "the highest is likeliest" if is_decided else "too low to separate them: the twin is not like this machine"
     message = (
         f"Correlation of the recorded change, without mesh harmonics, with that of the twin: {values}; {meant}. "
         f"Relative to each other, the mesh harmonics of the healthy twin miss those of the reference by "
-        f"{missed_db:.0f} dB. Each harmonic of a fault is allowed as much, so that its waveform tells "
-        "less where this is large."
+        f"{missed_db:.0f} dB. Each harmonic of a fault is allowed the same error, so its waveform is "
+        "weaker evidence where this is large."
     )
     return [message]
 
@@ -492,7 +494,7 @@ def _waveform_messages(
 def _tooth_error_evidences(
     conditions: Sequence[Condition], recordings: Sequence[Recording], references: Sequence[Recording]
 ) -> tuple[list[ToothErrorEvidence], list[str]]:
-    """Return what encoders say, of conditions with a reference and encoders in both; and why some say nothing."""
+    """Return the encoder evidence of conditions with a reference and encoders in both, and the reasons for refusals."""
     of = {recording.name: recording for recording in (*references, *recordings)}
     refusals: list[str] = []
     evidences = [
@@ -501,27 +503,27 @@ def _tooth_error_evidences(
         if c.facts.reference
     ]
     known = [evidence for evidence in evidences if evidence is not None]
-    return known, [f"No transmission error, in spite of encoders, of {refusal}." for refusal in refusals]
+    return known, [f"No transmission error despite encoders: {refusal}." for refusal in refusals]
 
 
 def _encoder_messages(evidences: Sequence[ToothErrorEvidence], known: Mapping[str, GapEffect]) -> list[str]:
-    """Say what the transmission error tells, and where it tells nothing, what would."""
+    """Return what the transmission error indicates or, where that is nothing, what would help."""
     if not evidences:
         return []
     clearest = max(evidences, key=lambda evidence: evidence.rms_um)
-    changed = f"The transmission error by the encoders changed by {clearest.rms_um:.2g} µm rms where it changed most"
+    changed = f"The transmission error from the encoders changed by {clearest.rms_um:.2g} µm rms where it changed most"
     if all(evidence.is_unlike_any for evidence in evidences):
-        slower = "At a few revolutions per second or less its profile tells crack, spall and chip apart."
-        return [f"{changed}, which at this speed tells no fault from another: the drive swings along. {slower}"]
+        slower = "At a few revolutions per second or less its profile distinguishes crack, spall and chip."
+        return [f"{changed}, which at this speed does not distinguish faults: the drive oscillates too. {slower}"]
     levels = ToothErrorEvidence(mean_log_likelihoods(evidences), clearest.rms_um, clearest.gear).probabilities
     shown = {known[name].title: p for name, p in levels.items() if p >= 0.05 and name in known}
     likely = ", ".join(f"{title} {odds_text(p)}" for title, p in shown.items())
     where = {"driver": ", on the driver", "driven": ", on the driven gear"}.get(clearest.gear, "")
-    return [f"{changed}{where}; by its profile alone, all faults of teeth as likely before: {likely}."]
+    return [f"{changed}{where}; by its profile alone, with all tooth faults equally likely before: {likely}."]
 
 
 def _fit_messages(named: GapCause | None, tried: Mapping[str, TriedEffect], crack: CrackAnswer) -> list[str]:
-    """Say what the stated severity is worth, or that there is none; nothing of a crack whose depth was estimated."""
+    """Return how reliable the stated severity is; nothing for a crack whose depth was estimated."""
     if named is None or (named.name == CRACK and _is_depth(crack)):
         return []
     if named.name in tried and tried[named.name].is_shown:
@@ -537,7 +539,7 @@ def _posterior(
     known: Mapping[str, GapEffect],
     gap: Sequence[GapPlace],
 ) -> dict[str, float]:
-    """Return cause → probability, with what the whole gap, its places and the lines of shafts and races say."""
+    """Return cause → probability, including evidence from the whole gap, its places and lines."""
     posterior = with_unknown_within_floor(attribution.probabilities(), clearest.size.structural)
     posterior = without_multiples(with_unchanged_races_lowered(posterior, conditions), known, conditions)
     return with_dominant_order_counted(posterior, known, gap, clearest.now.frame)
@@ -576,11 +578,11 @@ def _cause(
 
 
 CrackAnswer = CrackEstimate | NoCrackSeen | GearsigError
-"""What `gearsig crack` says, or why it says nothing."""
+"""The answer of `gearsig crack`, or the reason why there is none."""
 
 
 def _crack_answer(recording: PreparedRecording, reference: PreparedRecording | None) -> CrackAnswer:
-    """Return what `gearsig crack` says of the same files."""
+    """Return the answer of `gearsig crack` for the same files."""
     try:
         return estimate_crack(recording, reference=reference)
     except GearsigError as error:
@@ -592,9 +594,9 @@ def _is_depth(crack: CrackAnswer) -> TypeGuard[CrackEstimate]:
 
 
 def _with_depth(cause: GapCause, crack: CrackAnswer, tried: Mapping[str, TriedEffect]) -> GapCause:
-    """Return a cause, that of a crack with the depth as `estimate_crack` measures it.
+    """Return a cause; for a crack, with the depth that `estimate_crack` measures.
 
-    A fit to the twin hangs on the path to a sensor; the estimate takes the cracked tooth relative to the mesh.
+    A fit to the twin depends on the path to a sensor; the estimate compares the cracked tooth with the mesh.
     """
     if cause.name != CRACK or CRACK not in tried or not _is_depth(crack):
         return cause
@@ -606,9 +608,9 @@ def _with_depth(cause: GapCause, crack: CrackAnswer, tried: Mapping[str, TriedEf
 
 
 def _crack_messages(crack: CrackAnswer, name: str, causes: Sequence[GapCause], outcome: GapOutcome) -> list[str]:
-    """Say what `gearsig crack` says of the same files: where it sees damage, or where a crack is named and it does not.
+    """Return the answer of `gearsig crack` for the same files, if it sees damage or if a crack is named here.
 
-    Whoever asks both is told why they differ.
+    Users of both commands learn why the two differ.
     """
     if not isinstance(crack, CrackEstimate) and CRACK not in named_effects(causes, outcome):
         return []
@@ -628,7 +630,7 @@ def _tried_beside(
     *,
     fresh: bool,
 ) -> TriedEffect | None:
-    """Try one effect more; None where the rig has no place for it, or it cannot be simulated there."""
+    """Try one more effect; None where the rig has no place for it or it cannot be simulated there."""
     try:
         return try_effects([known[name]], twin, conditions, cache, lambda *_: None, fresh=fresh).get(name)
     except RefusalError:
@@ -643,7 +645,7 @@ def _after_and_next(
     conditions: Sequence[Condition],
     clearest: Condition,
 ) -> tuple[ReducedRecording | None, tuple[NextRecording, ...]]:
-    """Return the twin with the likeliest effect, as it was fitted, and what would tell more: both at once."""
+    """Compute the twin with the most probable effect as fitted, and the next recordings, at the same time."""
     fitted, pair = causes[0].fitted, most_probable_two(causes)
     next_ones: tuple[NextRecording, ...] = ()
     with ThreadPoolExecutor(1) as executor:

@@ -15,21 +15,21 @@ from gearsig.rig import SIDES
 
 MAX_SHOWN, MAX_OF_A_FAMILY = 10, 3
 CLEAR = 1.0
-"""Floors from which a change, predicted or observed, says something."""
+"""Floors from which a change, predicted or observed, is evidence."""
 
 MIN_SIGN_FLOORS = 0.3
-"""Floors from which the sign of a prediction says something, and a predicted start–stop change is worth a line."""
+"""Floors from which the sign of a prediction is evidence, and a predicted start–stop change is worth a line."""
 
 OWN_FEATURE_WEIGHT = 2.0
 
 MIN_AGREEING_RATIO = 0.5
-"""Observed over predicted, from here to its inverse, speaks for the effect."""
+"""Ratio of observed to predicted from which, up to its inverse, a change speaks for the effect."""
 
 
 def evidence_of(fit: Fit, observed: Sequence[ObservedChange], frame: GearFrame) -> tuple[Evidence, ...]:
-    """Return the most telling features of each family, clearest first; of the condition that shows most.
+    """Return the strongest features of each family, clearest first, at the condition with the largest change.
 
-    What the effect would change counts twice as much as what it would not: its own features must be among them.
+    Changes that the effect predicts count twice as much as others, so that its own features are among them.
 
     Parameters
     ----------
@@ -62,12 +62,13 @@ def evidence_of(fit: Fit, observed: Sequence[ObservedChange], frame: GearFrame) 
 def evidence_of_feature(
     feature: str, predicted_db: float, observed_db: float, floor_db: float, *, min_floors: float = CLEAR
 ) -> Evidence:
-    """Return a predicted change beside the observed one, with what it says of the effect.
+    """Return a predicted change beside the observed one, with the resulting evidence on the effect.
 
-    It speaks for the effect where both are of one sign and one size; or, where the prediction is beyond the floor,
-    differ by less than that. What moved the predicted way and further is no evidence against it where the prediction is
-    beyond the floor, or what it leaves is within: the simulator's size of the effect is uncertain, and something else
-    may have moved it, too. What was not predicted, did not come, or moved the other way is.
+    It speaks for the effect where both have the same sign and similar size, or where the prediction exceeds the floor
+    and the two differ by less than the floor. A larger change in the predicted direction is no evidence against it
+    where the prediction exceeds the floor or the excess is within it: the simulated size of the effect is uncertain,
+    and something else may contribute. A change that was not predicted, did not occur, or has the opposite sign is
+    evidence against it.
 
     Parameters
     ----------
@@ -88,11 +89,10 @@ def evidence_of_feature(
 
 
 # --------------------
-# Which of the two shafts a cause sits on, by what changed on either; or that it cannot be told.
+# Identification of a cause's shaft, from the changes on both shafts, where possible.
 #
-# What turns with a shaft shows at that shaft's own orders and sidebands and in its own synchronous average. Each cause
-# has its signs there; those of both shafts are compared. It needs no simulation, so that it serves any way of naming
-# causes.
+# What turns with a shaft shows at that shaft's own orders and sidebands and in its own synchronous average. The signs
+# of each cause there are compared between the shafts. No simulation is needed, so this serves any way of naming causes.
 # --------------------
 
 
@@ -101,8 +101,8 @@ SINGLE_TOOTH_FAULTS = (CRACK, "tooth_spall", "chipped_tooth")
 """Causes on a single tooth."""
 
 TOOTH_FAULTS = (*SINGLE_TOOTH_FAULTS, "pitch_error")
-"""Causes that change one engagement each, with a profile of its own: waveforms and encoders tell them apart. A pitch
-error may be of one tooth or of all."""
+"""Causes that each change one engagement with a characteristic profile, which waveforms and encoders distinguish. A
+pitch error may affect one tooth or all."""
 
 _BURST = ("change.{}.peak", "change.{}.prominence", "tooth.{}.peak", "tooth.{}.prominence", "tooth.{}.kurtosis")
 _ALL_ROUND = ("change.{}.level", "change.{}.elsewhere", "tooth.{}.level", "tooth.{}.elsewhere", "shaft.{}.low")
@@ -117,21 +117,21 @@ SIGNS: Mapping[str, tuple[str, ...]] = {
 """Cause → features that rise on its shaft. Wear and friction change the mesh, which both shafts share."""
 
 FIRST_ORDER = {"misalignment": 2}
-"""Cause → the order of its shaft that it makes first, where it is not 1."""
+"""Cause → the first order of its shaft that it raises, where it is not 1."""
 
 
 MAX_RISE = 6.0
-"""Floors that one sign counts for."""
+"""Floors to which one sign is limited."""
 
 MIN_SHAFT_RATIO = 1.5
-"""The signs on the one shaft over those on the other."""
+"""Ratio of the signs on one shaft to those on the other."""
 
 
 def determined_options(cause: str, changes: Sequence[Mapping[str, float]], teeth: tuple[int, int]) -> dict[str, str]:
-    """Return the option of the effect that says which shaft it is on, {"gear": "driven"}, say; empty: cannot be told.
+    """Return the effect's option for its shaft, for example {"gear": "driven"}; empty: not known.
 
-    A cause's signs on both shafts are compared, r_s = √(mean over conditions and signs of min(max(u, 0), 6)²), u a
-    sign's change on shaft s in floors. A cause that no shaft has to itself has none.
+    A cause's signs on both shafts are compared, r_s = √(mean over conditions and signs of min(max(u, 0), 6)²), u the
+    change of a sign on shaft s in floors. A cause that does not belong to one shaft has no option.
 
     Parameters
     ----------
@@ -152,9 +152,10 @@ def determined_options(cause: str, changes: Sequence[Mapping[str, float]], teeth
 
 
 def _shaft(rises: Sequence[float], slow: int | None) -> int | None:
-    """Return the shaft on which a cause's signs rose: 0: driver, 1: driven, None: cannot be told.
+    """Return the shaft on which a cause's signs rose: 0: driver, 1: driven, None: not known.
 
-    `slow` is the shaft whose sign the other cannot make, while its own sign falls on an order of this one; see `_slow`.
+    `slow` is the shaft whose sign the other cannot produce, although the other's sign falls on an order of this one;
+    see `_slow`.
     """
     if slow is not None and MIN_SHAFT_RATIO * rises[slow] > rises[1 - slow]:
         return slow if rises[slow] >= CLEAR else None
@@ -164,9 +165,10 @@ def _shaft(rises: Sequence[float], slow: int | None) -> int | None:
 
 
 def _slow(cause: str, teeth: tuple[int, int]) -> int | None:
-    """Return the slower shaft where it turns once for a whole number of turns of the other; None elsewhere.
+    """Return the slower shaft if the other makes a whole number of revolutions for one of it; None otherwise.
 
-    The faster one's orders are orders of it, too; but its own first is none of the other's, nor is one tooth of it.
+    The faster shaft's orders then coincide with orders of the slower one, but not the other way round for its first
+    order or a single tooth of it.
     """
     slow = int(np.argmax(teeth))
     ratio, remainder = divmod(teeth[slow], teeth[1 - slow])
@@ -174,7 +176,7 @@ def _slow(cause: str, teeth: tuple[int, int]) -> int | None:
 
 
 # --------------------
-# What features are called in sentences.
+# Features in words.
 # --------------------
 
 
@@ -206,7 +208,7 @@ _TOOTH = {
     "kurtosis": "kurtosis",
     "width": "number of teeth within 3 dB of the strongest",
     "below_mesh": "part below the mesh order",
-    "centroid": "middle of the spectrum",
+    "centroid": "centroid of the spectrum",
     "agreement": "agreement with the reference",
 }
 _OF_A_SHAFT = {
@@ -222,11 +224,11 @@ _CYCLIC = {
     "ball": "rolling elements",
     "cage": "cages",
     "mesh": "mesh order",
-    "strange": "an order that belongs to nothing known",
+    "strange": "an order of unknown origin",
     "depth": "depth of modulation",
     "half_mesh": "half the mesh order",
 }
-_ALIKE_PARTS = {"mesh": "harmonics", "repeated": "what either gear repeats", "noise": "what nothing repeats"}
+_ALIKE_PARTS = {"mesh": "harmonics", "repeated": "part that either gear repeats", "noise": "part that neither repeats"}
 _ALIKE = {
     f"{key}{suffix}": f"{words}{', ' if said else ''}{said}"
     for key, words in _ALIKE_PARTS.items()
@@ -236,7 +238,7 @@ _ALIKE = {
     for a, b in (("mesh", "repeated"), ("repeated", "noise"), ("mesh", "noise"))
     for suffix, said in (("less", "the former over the latter"), ("apart", "apart"), ("together", "changed alike"))
 }
-_BURST_WAYS = {"plain": "as it is", "even": "magnitudes made even"}
+_BURST_WAYS = {"plain": "as it is", "even": "magnitudes flattened"}
 _BURST_WORDS = (
     {f"course.{i}": f"share of quarter pitch {i}" for i in range(N_QUARTERS)}
     | {f"echo.{i}": f"autocorrelation at lag {lag:.2f} pitches" for i, lag in enumerate(ECHO_LAGS_PITCHES)}

@@ -1,4 +1,4 @@
-"""A recording as named features with the scatter that its own blocks give."""
+"""A recording as named features, with the scatter estimated from its own blocks."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from gearsig.gap._reduction import (
 from gearsig.rig import SIDES
 
 # --------------------
-# Features of the two synchronous averages' lines: mesh harmonics, sidebands, shaft orders.
+# Features from the lines of the two synchronous averages: mesh harmonics, sidebands, shaft orders.
 # --------------------
 
 
@@ -35,14 +35,14 @@ NamedValue = tuple[str, float]
 
 @dataclass(frozen=True)
 class Feature:
-    """What a figure is of: the kind of lines or signal, the shaft, and which of its figures.
+    """The parts of a feature's name: the kind of lines or signal, the shaft, and the quantity.
 
     Parameters
     ----------
     family : str
         "mesh", "sideband", "shaft", "tooth", "change", "surprise", "envelope", "line", "floor", …
     side : str
-        "driver" or "driven"; empty for what is of no shaft.
+        "driver" or "driven"; empty where it belongs to no shaft.
     detail : str
         E.g. "3to5", "1.to_mesh", "level".
 
@@ -59,7 +59,7 @@ class Feature:
     @staticmethod
     @cache
     def of(name: str) -> Feature:
-        """Return the feature of a name, as tables keep it."""
+        """Return the feature with a name in the form used in tables."""
         family, _, remainder = name.partition(".")
         side, _, detail = remainder.partition(".")
         return Feature(family, side, detail) if side in SIDES else Feature(family, "", remainder)
@@ -78,18 +78,18 @@ class Feature:
 
     @property
     def is_shaft_level(self) -> bool:
-        """Whether it is the level of one of a shaft's first orders, by itself."""
+        """Whether it is the absolute level of one of a shaft's first orders."""
         return self.family == "shaft" and self.detail.isdigit()
 
     @property
     def is_of_the_body(self) -> bool:
-        """Whether it is of a shaft's first orders, at which a machine moves as a whole."""
+        """Whether it concerns a shaft's first orders, at which a machine moves as a whole."""
         return self.family == "shaft" and self.detail[:1].isdigit()
 
     @property
     def mirrored(self) -> Feature:
-        """The same of the other shaft."""
-        if self.family == "envelope" and self.detail.endswith("_shaft"):  # orders of a shaft in what neither repeats
+        """The same feature of the other shaft."""
+        if self.family == "envelope" and self.detail.endswith("_shaft"):  # shaft orders in the residual
             return replace(self, detail=f"{_OTHER_SIDE[self.detail.removesuffix('_shaft')]}_shaft")
         return replace(self, side=_OTHER_SIDE[self.side]) if self.side else self
 
@@ -98,7 +98,7 @@ _OTHER_SIDE = {"driver": "driven", "driven": "driver"}
 
 
 def line_features(reduced: ReducedRecording, channel: str) -> Iterator[NamedValue]:
-    """Yield name and value, in dB, of one channel's mesh, sideband and shaft-order features."""
+    """Yield name and value in dB of one channel's mesh, sideband and shaft-order features."""
     driver, driven = (reduced.average(channel, side) for side in (DRIVER, DRIVEN))
     total = driver.mesh_power
     yield from _mesh(driver.power, driver.teeth, driver.highest, total)
@@ -161,7 +161,7 @@ def _shaft_orders(power: FloatArray, teeth: int, highest: int, total: float, sid
 
 
 # --------------------
-# Features of single teeth: what a shaft's average holds besides mesh and smooth modulation.
+# Features of single teeth: the content of a shaft's average besides mesh and smooth modulation.
 # --------------------
 
 
@@ -169,7 +169,7 @@ STEPS_PER_TOOTH = 4
 
 
 def tooth_energy(lines: NDArray[np.complex128], teeth: int) -> FloatArray:
-    """Return the mean square within one pitch, at `STEPS_PER_TOOTH` places per tooth round the revolution."""
+    """Return the mean square within one pitch at `STEPS_PER_TOOTH` positions per tooth."""
     n = 2 * (len(lines) - 1)
     wave = np.fft.irfft(lines, n) * (n / 2.0)
     total = np.concatenate([[0.0], np.cumsum(np.tile(wave**2, 2))])
@@ -181,7 +181,7 @@ def tooth_energy(lines: NDArray[np.complex128], teeth: int) -> FloatArray:
 
 
 def tooth_features(reduced: ReducedRecording) -> Iterator[NamedValue]:
-    """Yield the tooth features of all channels together, since a tooth shows at one angle on all of them."""
+    """Yield the tooth features of all channels together, since a tooth appears at the same angle on all of them."""
     for side in (DRIVER, DRIVEN):
         averages = reduced.averages(side)
         noises = [np.where(a.pattern != 0, a.noise, 0.0).sum() / 2.0 / a.mesh_power for a in averages]
@@ -202,10 +202,10 @@ def pattern_features(
     longer: float,
     minimum: float = 1e-30,
 ) -> Iterator[NamedValue]:
-    """Yield size, prominence, kurtosis, width, centroid of residuals relative to their mesh.
+    """Yield size, prominence, kurtosis, width and centroid of residuals relative to their mesh.
 
-    `noise` is the energy that noise leaves in them; `longer` times it is put under what exceeds it. `minimum` is the
-    energy that is told apart from nothing.
+    `noise` is the energy that noise contributes to them; it is subtracted, and `longer` times it is added to the
+    excess. `minimum` is the smallest energy that can be distinguished from zero.
     """
     energy = np.mean([tooth_energy(lines, teeth) for lines in residuals], axis=0)
     energy = np.maximum(np.maximum(energy - noise, 0.0) + longer * noise, minimum)
@@ -235,33 +235,33 @@ def _kurtosis(lines: NDArray[np.complex128]) -> float:
 
 
 # --------------------
-# Features of what no shaft repeats: bearings' lines in envelope and spectrum, strange lines.
+# Features of the residual: bearing lines in envelope and spectrum, unrelated lines.
 # --------------------
 
 
 SLIP = 0.015
-"""Rolling elements slip: their orders are sought within this share of the kinematic ones."""
+"""Rolling elements slip: their orders are searched within this fraction of the kinematic ones."""
 MAX_SLIPS = 201
 
 Known = tuple[float, float]
-"""An order, and by how much it may slip."""
+"""An order, and its possible slip."""
 
 N_FAMILY = 4
 N_SHAFT_FAMILY = 6
 USED_OF_BAND = 0.7
-"""Of a band's width, the modulation that its envelope carries well."""
+"""Fraction of a band's width up to which its envelope reproduces modulation well."""
 FLOOR_WIDTH = 48
-"""Lines whose median is the floor."""
+"""Number of lines whose median is the floor."""
 LOWEST_STRANGE = 0.4
-"""Order of the driver below which a line may be the window's or the speed's."""
+"""Order of the driver below which a line may be due to the window or the speed."""
 BEARING_FAMILIES = ("outer", "inner", "ball", "cage")
 """See `BearingFrame.families`."""
 
 
 def floor_ratio(power: FloatArray) -> FloatArray:
-    """Return each line's power over its neighbourhood's median, lines of noise being exponentially distributed.
+    """Return each line's power relative to the noise floor, from the median of its segment (exponential distribution).
 
-    Medians of adjoining segments are joined by straight lines: a running median costs a hundred times as much.
+    Medians of adjoining segments are interpolated linearly: a running median takes a hundred times as long.
     """
     n_segments = max(1, power.shape[-1] // FLOOR_WIDTH)
     width = power.shape[-1] // n_segments
@@ -274,7 +274,7 @@ def floor_ratio(power: FloatArray) -> FloatArray:
 
 
 def cyclic_features(reduced: ReducedRecording, channels: Sequence[ChannelSums]) -> Iterator[NamedValue]:
-    """Yield excesses in dB of families of envelope lines and of residual lines: the largest over channels and bands."""
+    """Yield excesses in dB of families of envelope and residual lines: the largest over channels and bands."""
     frame = reduced.frame
     envelopes = np.concatenate([envelope_ratios(reduced, c) for c in channels])
     step, levels = reduced.cycle_step, excesses(envelopes)
@@ -294,7 +294,7 @@ def cyclic_features(reduced: ReducedRecording, channels: Sequence[ChannelSums]) 
 
 
 def envelope_ratios(reduced: ReducedRecording, sums: ChannelSums) -> FloatArray:
-    """Return the lines of each band's envelope over their floor; 1 beyond the band's width, where there is nothing."""
+    """Return the lines of each band's envelope relative to their floor; 1 beyond its usable width."""
     ratios = floor_ratio(sums.envelope_power.mean(axis=0))
     cycles = np.arange(ratios.shape[1]) * reduced.cycle_step
     for row, (low, high) in zip(ratios, reduced.bands_hz, strict=True):
@@ -314,9 +314,9 @@ def _families(
 def _family(
     levels: FloatArray, order: float, n_harmonics: int, step: float, known: Sequence[float], slip: float
 ) -> float:
-    """Return the mean excess in dB of a family's lines, in the spectrum and with the slip that show it best.
+    """Return the mean excess in dB of a family's lines, for the spectrum and slip at which it is largest.
 
-    `levels` are excesses in dB, not below 0; the larger of a line and its neighbours counts.
+    `levels` are excesses in dB of at least 0; each is the maximum over a line and its neighbours.
     """
     harmonics = np.arange(1, n_harmonics + 1) * order
     if known:
@@ -324,13 +324,13 @@ def _family(
     harmonics = harmonics[harmonics * (1.0 + slip) / step < levels.shape[1] - 1]
     if not len(harmonics):
         return 0.0
-    n_slips = min(MAX_SLIPS, 2 * int(np.ceil(slip * harmonics.max() / step)) + 1)  # a line apart at the highest
+    n_slips = min(MAX_SLIPS, 2 * int(np.ceil(slip * harmonics.max() / step)) + 1)  # one line per step at the highest
     places = np.rint(np.outer(1.0 + np.linspace(-slip, slip, n_slips), harmonics) / step).astype(np.intp)
     return float(levels[:, places].mean(axis=2).max())
 
 
 def excesses(ratios: FloatArray) -> FloatArray:
-    """Return excesses in dB, not below 0, each the largest of a line and its two neighbours."""
+    """Return excesses in dB, at least 0, each the maximum over a line and its two neighbours."""
     from scipy.ndimage import maximum_filter1d
 
     level: FloatArray = 10.0 * np.log10(np.maximum(maximum_filter1d(ratios, 3, axis=1), 1.0))
@@ -338,7 +338,7 @@ def excesses(ratios: FloatArray) -> FloatArray:
 
 
 def _unexplained_excess(ratios: FloatArray, step: float, known: Sequence[Known]) -> float:
-    """Return the excess in dB of the strongest line that belongs to nothing known; 0 where there is none."""
+    """Return the excess in dB of the strongest line of unknown origin; 0 where there is none."""
     positions = np.arange(ratios.shape[1]) * step
     free = positions > LOWEST_STRANGE
     for order, slip in known:
@@ -348,32 +348,32 @@ def _unexplained_excess(ratios: FloatArray, step: float, known: Sequence[Known])
 
 
 def residual_ratios(reduced: ReducedRecording, channels: Sequence[ChannelSums]) -> FloatArray:
-    """Return the residuals' lines over their floor, one row per channel."""
+    """Return the residuals' lines relative to their floor, one row per channel."""
     ratios = floor_ratio(np.stack([c.residual_power.mean(axis=0) for c in channels]))
     return ratios[:, : int(reduced.highest_order / reduced.order_step)]
 
 
 def gear_orders(frame: GearFrame) -> list[float]:
-    """Orders of both shafts' first harmonics, and of mesh harmonics with their first sidebands."""
+    """Return the first harmonics of both shafts' orders, and the mesh harmonics with their first sidebands."""
     shafts = [k * order for order in frame.shaft_orders for k in range(1, 13)]
     mesh = [k * frame.teeth[0] + j * order for k in range(1, 7) for order in frame.shaft_orders for j in range(-3, 4)]
     return shafts + mesh
 
 
 def known_modulation(frame: GearFrame) -> list[Known]:
-    """Return what modulates the residual: gears, whose orders are exact, and every bearing's families."""
+    """Return the orders that modulate the residual: those of gears, which are exact, and every bearing's families."""
     return [*((order, 0.0) for order in gear_orders(frame)), *_bearing_orders(frame)]
 
 
 def known_lines(frame: GearFrame) -> list[Known]:
-    """Return everything that the residual may hold: gears, bearings, and bearings about the mesh harmonics."""
+    """Return all expected orders of the residual: gears, bearings, and bearing sidebands of the mesh harmonics."""
     bearings = _bearing_orders(frame)
     mesh = [(k * frame.teeth[0] + s * o, slip) for k in range(1, 7) for o, slip in bearings[:24] for s in (-1, 1)]
     return [*known_modulation(frame), *mesh]
 
 
 def _bearing_orders(frame: GearFrame) -> list[Known]:
-    """Return the orders of every bearing's families with their sidebands; what rolls may slip."""
+    """Return the orders of every bearing's families with their sidebands, and their possible slip."""
     orders = []
     for bearing in frame.bearings:
         shaft = frame.shaft_orders[bearing.side]
@@ -390,16 +390,16 @@ def _bearing_orders(frame: GearFrame) -> list[Known]:
 
 
 # --------------------
-# Features of the floor and of the amplitudes' distribution.
+# Features of the noise floor and of the amplitude distribution.
 # --------------------
 
 
 MIN_NEAR_SHARE = 1e-6
-"""Below one sample of any record."""
+"""Less than one sample of any record."""
 
 
 def broadband_features(reduced: ReducedRecording, channels: Sequence[ChannelSums]) -> Iterator[NamedValue]:
-    """Yield band levels and kurtosis of the residual, tail figures of the raw signal, in dB; means over channels."""
+    """Yield band levels and kurtosis of the residual and tail figures of the raw signal, in dB."""
     moments = np.stack([c.moments.mean(axis=0) for c in channels])  # (channel, band, moment)
     squares = np.log10(np.maximum(moments[:, :, 0], 1e-300)).mean(axis=0) * 10.0
     kurtosis = np.log10(np.maximum(moments[:, :, 1] / np.maximum(moments[:, :, 0], 1e-300) ** 2, 1e-3)) * 10.0
@@ -411,12 +411,12 @@ def broadband_features(reduced: ReducedRecording, channels: Sequence[ChannelSums
     yield "floor.to_signal", float(squares[-1] - 10.0 * np.log10(raw[:, 0]).mean())
     yield "raw.level", float(10.0 * np.log10(raw[:, 0]).mean())
     yield "raw.kurtosis", float((10.0 * np.log10(raw[:, 1] / raw[:, 0] ** 2)).min())
-    # Without the block that holds the extreme, the share may be 0.
+    # Without the block that contains the extreme, the share may be 0.
     yield "raw.near_the_extreme", decibel(max(float(raw[:, 2].max()), MIN_NEAR_SHARE))
 
 
 def speed_features(reduced: ReducedRecording) -> Iterator[NamedValue]:
-    """Yield the figures of the speed and of the supply's hum."""
+    """Yield the features of the speed and of mains hum."""
     drift, swing, line, _ = reduced.speed
     yield "speed.drift", decibel(abs(drift) + 1e-5) * 2.0
     yield "speed.swing", decibel(swing + 1e-6) * 2.0
@@ -425,12 +425,12 @@ def speed_features(reduced: ReducedRecording) -> Iterator[NamedValue]:
 
 
 WHOLE_RECORD_DB = {"hum": 1.3, "speed.drift": 3.0, "speed.swing": 1.0, "speed.swing_line": 2.0}
-"""Standard errors of features that no block can be left out of, from repeated synthetic records."""
+"""Standard errors of features from which no block can be omitted, from repeated synthetic records."""
 
 
 @dataclass(frozen=True)
 class Features:
-    """Named figures of one recording.
+    """Named features of one recording.
 
     Parameters
     ----------
@@ -440,7 +440,7 @@ class Features:
     scatter : array, (n,)
         Standard error from leaving out blocks of revolutions, one at a time.
     left_out : tuple of arrays, (n_blocks, n)
-        The values without each block of the recording, and of what it was compared with.
+        Values without each block of the recording, and without each block of its baseline.
     """
 
     names: tuple[str, ...]
@@ -450,9 +450,9 @@ class Features:
 
 
 def jackknife_variance(rows: FloatArray) -> FloatArray:
-    """Return the variance of what is known from B blocks, (B − 1)/B Σ_b (f_(b) − mean)², f_(b) without block b, (B, …).
+    """Return the jackknife variance (B − 1)/B Σ_b (f_(b) − mean)² over B blocks, f_(b): without block b, (B, …).
 
-    0 where there is one block only.
+    It is 0 for a single block.
     """
     variance: FloatArray = (len(rows) - 1.0) * np.var(rows, axis=0)
     return variance
@@ -476,7 +476,7 @@ def features_of(reduced: ReducedRecording) -> Features:
 
 
 def whole_and_parts(reduced: ReducedRecording) -> tuple[tuple[str, ...], FloatArray]:
-    """Return names and values, (1 + n_blocks, n): of the whole, and without each of its blocks; computed once."""
+    """Return names and values, (1 + n_blocks, n): for all blocks, and with each block left out; computed once."""
     if "features" not in reduced.kept:
         names, values = feature_values(reduced)
         parts = [feature_values(part)[1] for part in reduced.leaving_one_out()]
@@ -486,7 +486,7 @@ def whole_and_parts(reduced: ReducedRecording) -> tuple[tuple[str, ...], FloatAr
 
 
 def whole_record_variance(names: Sequence[str]) -> FloatArray:
-    """Return the variance of what is taken from the whole record at once, and 0 for all else."""
+    """Return the variance of features computed from the whole record at once, and 0 for all others."""
     return np.array([WHOLE_RECORD_DB.get(name, 0.0) ** 2 for name in names])
 
 
@@ -510,72 +510,73 @@ def _read_once(reduced: ReducedRecording) -> tuple[tuple[str, ...], FloatArray]:
 
 
 # --------------------
-# The shape of what one tooth does: how its energy is spread over the pitches before and after.
+# The shape of one tooth's burst: how its energy is distributed over the pitches before and after.
 #
-# A crack changes the mesh as long as its tooth carries, a spall in the middle of that, a chipped tooth where it leaves
-# too early, a pitch error where it comes too early or too late. What of it reaches a sensor rings through the
-# machine's own resonances; the order in which energy comes survives that better than its spectrum does.
+# A crack changes the mesh while its tooth carries load, a spall in the middle of that, a chipped tooth where contact
+# ends too early, a pitch error where it starts too early or too late. On its way to a sensor this excites the machine's
+# resonances; the order in which energy arrives survives that better than its spectrum does.
 # --------------------
 
 
 STEPS_PER_PITCH = 64
 HIGHEST_MESH_ORDER = 10
-"""Above it sensors hear their own resonances; `STEPS_PER_PITCH` are three times what that many orders need."""
+"""Above it, sensors respond with their own resonances; `STEPS_PER_PITCH` is three times what so many orders need."""
 
 LOWEST_MESH_ORDER = 0.5
-"""At and below which a machine moves as a whole."""
+"""Orders up to this move the machine as a whole."""
 
 PEAK_PITCHES = 0.25
-"""Within which the loudest part of a burst is sought, and by which its profile is counted."""
+"""Width in which the loudest part of a burst is searched, and step of its profile."""
 
 PROFILE_PITCHES = (-1.5, 3.0)
-"""From the loudest part on; so are the ranges below. A tooth carries for one to two pitches, and what it strikes rings
-on."""
+"""Measured from the loudest part, as are the ranges below. A tooth carries load for one to two pitches, and what it
+excites rings on."""
 
 N_QUARTERS = round((PROFILE_PITCHES[1] - PROFILE_PITCHES[0]) / PEAK_PITCHES)
 
 ECHO_LAGS_PITCHES = np.arange(0.3, 2.15, 0.15)
 ECHO_PITCHES = (-2.2, 2.8)
-"""Range whose autocorrelation is taken, smoothed over `SMOOTH_STEPS`."""
+"""Range of the autocorrelation, which is smoothed over `SMOOTH_STEPS`."""
 
 SMOOTH_STEPS = 6
 NEAR_PITCHES = (-2.0, 3.5)
-"""Beyond which energy is elsewhere."""
+"""Range beyond which energy counts as elsewhere."""
 
 MIN_BURST_SHARE, MIN_ECHO = 1e-4, 1e-3
-"""Added before the logarithm: smaller ones are noise."""
+"""Added before taking the logarithm: smaller values are noise."""
 
 WAYS = ("plain", "even")
-"""As the lines are, or with their magnitudes made even over a mesh order: the path's resonances weigh less then."""
+"""Lines as they are, or with their magnitudes flattened over a mesh order, which reduces the weight of the path's
+resonances."""
 
 
 def burst_lines(highest: int, teeth: int) -> np.ndarray:
-    """Return the orders of a shaft that single teeth show in: neither the mesh's own nor the lowest ones."""
+    """Return the orders of a shaft at which single teeth show: neither the mesh's own nor the lowest ones."""
     orders = np.arange(min(highest, HIGHEST_MESH_ORDER * teeth))
     kept: np.ndarray = orders[(orders > LOWEST_MESH_ORDER * teeth) & (orders % teeth != 0)]
     return kept
 
 
 def clearness(lines: ComplexArray, noise: FloatArray, teeth: int) -> float:
-    """Return the power of the lines that single teeth show in over the noise on them."""
+    """Return the power of the lines at which single teeth show, relative to their noise."""
     kept = burst_lines(lines.shape[1], teeth)
     return float(np.sum(np.abs(lines[:, kept]) ** 2) / max(float(noise[:, kept].sum()), 1e-300))
 
 
 def burst_features(lines: ComplexArray, noise: FloatArray, teeth: int) -> Iterator[NamedValue]:
-    """Yield shares of a burst's energy, in ten times their decadic logarithm.
+    """Yield shares of a burst's energy, as ten times their decadic logarithm.
 
-    With the envelope's square e(φ) = |Σ_n D_n exp(i n φ)|² over one revolution, mean of the channels, each scaled to 1,
-    about its loudest quarter of a pitch: the share of each quarter from 1.5 pitches before to 3 after; the
-    autocorrelation of e at lags from 0.3 to 2.1 pitches; the share further away. All of it twice: with D as it is, and
-    with D/√(mean of |D|² over a mesh order + noise).
+    The squared envelope is e(φ) = |Σ_n D_n exp(i n φ)|² over one revolution, scaled to a sum of 1 for each channel and
+    averaged over channels. Measured from its loudest quarter of a pitch, the features are: the share of each quarter
+    from 1.5 pitches before to 3 after; the autocorrelation of e at lags from 0.3 to 2.1 pitches; the share further
+    away. They are computed twice: from D itself, and from D/√(mean of |D|² over a mesh order + noise).
 
     Parameters
     ----------
     lines : complex array, (n_channels, n)
         Difference of a shaft's averages, by orders of the shaft from 0 on.
     noise : array, (n_channels, n)
-        Power of the noise on them.
+        Noise power in them.
     teeth : int
     """
     from scipy.ndimage import convolve1d, uniform_filter1d
@@ -599,7 +600,7 @@ def burst_features(lines: ComplexArray, noise: FloatArray, teeth: int) -> Iterat
 
 
 def _energy(lines: ComplexArray, noise: FloatArray, teeth: int, *, even: bool) -> FloatArray:
-    """Return the envelope's square over one revolution, `STEPS_PER_PITCH` steps per pitch; its sum is 1."""
+    """Return the squared envelope over one revolution, `STEPS_PER_PITCH` steps per pitch; its sum is 1."""
     from scipy.fft import ifft
     from scipy.ndimage import convolve1d
 
@@ -621,6 +622,6 @@ def _window(n_points: int) -> FloatArray:
 
 
 def _cut(energy: FloatArray, pitches: tuple[float, float]) -> FloatArray:
-    """Return what lies between two angles from the first step, counted round."""
+    """Return the part between two angles, counted cyclically from the first step."""
     first, end = (int(pitch * STEPS_PER_PITCH) for pitch in pitches)
     return energy[np.arange(first, end) % len(energy)]

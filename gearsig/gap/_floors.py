@@ -1,4 +1,4 @@
-"""How large a gap is: against what repeats, and against what even healthy machines and their simulation differ by."""
+"""The size of a gap relative to repeatability, and to differences between healthy machines and their simulation."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from gearsig.gap._features import Feature, Features, jackknife_variance
 from gearsig.gap._report import Interval, PlaceKind
 
 # --------------------
-# Which features say the same thing about which place of the spectrum, angle or signal.
+# Families of features that describe the same place of the spectrum, angle or signal.
 # --------------------
 
 
 Family = tuple[PlaceKind, str]
-"""The kind of place and "driver", "driven" or nothing."""
+"""The kind of place, and "driver", "driven" or ""."""
 
 _KIND = {
     "mesh": PlaceKind.MESH,
@@ -40,10 +40,11 @@ _KIND = {
     "speed": PlaceKind.SPEED,
     "raw": PlaceKind.TAIL,
 }
-"""Family of features, or a single feature → the kind of place that it speaks of."""
+"""Family of features, or a single feature → the kind of place that it describes."""
 
 UNPREDICTED = ("surprise.", "apart.", "alike.", "burst.")
-"""Features, the last ones, that hang on noise and sensors: no simulation predicts them, no size is made of them."""
+"""Features, at the end, that depend on noise and sensors: no simulation predicts them, and they do not count in
+sizes."""
 
 _KINDS = {
     "mesh_harmonics": (PlaceKind.MESH,),
@@ -56,16 +57,16 @@ _KINDS = {
     "amplitude_tail": (PlaceKind.TAIL,),
     "speed": (PlaceKind.SPEED,),
 }
-"""What an effect says it shows in (`gearsig.gap.GapEffect.shows_in`), as kinds of places."""
+"""Where an effect shows (`gearsig.gap.GapEffect.shows_in`), as kinds of places."""
 
 
 def kinds_of(shows_in: Sequence[str]) -> set[PlaceKind]:
-    """Return the kinds of places that an effect says it shows in."""
+    """Return the kinds of places in which an effect shows."""
     return {kind for shown in shows_in for kind in _KINDS.get(shown, ())}
 
 
 def shown_in(names: Sequence[str], shows_in: Sequence[str]) -> np.ndarray:
-    """Return which features are of the kinds that an effect says it shows in; all, if it says none that is known.
+    """Return which features are of the kinds in which an effect shows; all of them if it states no known kind.
 
     Parameters
     ----------
@@ -87,7 +88,7 @@ def _is_shown(name: str, kinds: set[PlaceKind], shows_in: Sequence[str]) -> bool
         return "mains_lines" in shows_in
     kind = family_of(name)[0]
     if kind is PlaceKind.TOOTH and "shaft_orders" in shows_in and Feature.of(name).detail in ("level", "elsewhere"):
-        return True  # they speak of all orders of the shaft, and not of one tooth
+        return True  # they describe all orders of the shaft, not one tooth
     return kind in kinds
 
 
@@ -106,7 +107,7 @@ def family_of(name: str) -> Family:
 
 @cache
 def family_members(names: tuple[str, ...]) -> dict[Family, np.ndarray]:
-    """Return for each family the positions of its features."""
+    """Return for each family the indices of its features."""
     members_of: dict[Family, list[int]] = {}
     for i, name in enumerate(names):
         members_of.setdefault(family_of(name), []).append(i)
@@ -115,7 +116,7 @@ def family_members(names: tuple[str, ...]) -> dict[Family, np.ndarray]:
 
 @cache
 def sized_members(names: tuple[str, ...]) -> dict[Family, np.ndarray]:
-    """Return for each family the positions of those of its features that the size of a gap is made of."""
+    """Return for each family the indices of its features that count in the size of a gap."""
     kept = {
         family: np.array([i for i in rows if not names[i].startswith(UNPREDICTED)], dtype=np.intp)
         for family, rows in family_members(names).items()
@@ -124,13 +125,13 @@ def sized_members(names: tuple[str, ...]) -> dict[Family, np.ndarray]:
 
 
 FLOOR_IN_DEVIATIONS = 1.96
-"""A floor holds 19 of 20: so many standard deviations."""
+"""A floor is the limit for 19 of 20 values, in standard deviations."""
 
 WITHIN, ACROSS = 8, 4
 """Orders of the means within a family of features, and of the sum over families."""
 
 PRIOR_WEIGHT = 4.0
-"""Degrees of freedom that a family's median scatter counts for beside a feature's own."""
+"""Degrees of freedom with which a family's median scatter is pooled with a feature's own."""
 
 MIN_SCATTER_DB = 0.05
 
@@ -139,19 +140,19 @@ _TAIL = 0.05
 
 @dataclass(frozen=True)
 class StructuralFloor:
-    """How far healthy machines' features lie from what they are compared with.
+    """Distances of healthy machines' features from their baseline.
 
     Parameters
     ----------
     names : tuple of str
-        Of features, see `feature_values` and `change_feature_values`.
+        Names of features, see `feature_values` and `change_feature_values`.
     values : array, (n,), above 0
-        dB: 19 of 20 healthy machines lie within `centres` ± `values`.
+        dB: 19 of 20 healthy machines are within `centres` ± `values`.
     centres : array, (n,)
-        dB, the healthy machines' median; default 0. Differences have it at 0; features of a difference of patterns,
-        `change.…`, have not: noise alone has a level and a kurtosis.
+        dB, the healthy machines' median; default 0. It is 0 for differences, but not for features of a difference of
+        patterns, `change.…`: noise alone has a level and a kurtosis.
     whole : float or None
-        `soft_size` that one healthy machine in twenty exceeds; None: what independent features would make of it.
+        `soft_size` that one healthy machine in twenty exceeds; None: that of independent features.
     """
 
     names: tuple[str, ...]
@@ -176,15 +177,15 @@ class StructuralFloor:
 
     @classmethod
     def of_healthy(cls, names: Sequence[str], rows: FloatArray, *, min_db: float = 0.2) -> StructuralFloor:
-        """Return the floor of a table of healthy changes, (n_machines, n): medians, 95 % of distances, and the whole.
+        """Return the floor from a table of healthy changes: medians, 95 % of distances, and the size of the whole.
 
         Parameters
         ----------
         names : sequence of str
         rows : array, (n_machines, n)
-            At least 20 of them say something.
+            At least 20 machines are needed for a meaningful result.
         min_db : float
-            A feature that never moved in the table still may.
+            Minimum floor, as features that never changed in the table may still do so.
         """
         table = np.asarray(rows, dtype=np.float64)
         centres = np.median(table, axis=0)
@@ -193,12 +194,12 @@ class StructuralFloor:
         return cls(tuple(names), values, centres, float(np.quantile(sizes, 1.0 - _TAIL)))
 
     def rows_of(self, names: Sequence[str]) -> np.ndarray:
-        """Return the places of features in the table.
+        """Return the rows of features in the table.
 
         Raises
         ------
         InputError
-            If one is not there.
+            If one is missing.
         """
         missing = [name for name in names if name not in self._row]
         if missing:
@@ -214,23 +215,23 @@ class StructuralFloor:
         return floors
 
     def from_centre(self, names: Sequence[str], values: FloatArray) -> FloatArray:
-        """Return how far changes lie from the healthy machines' median, in dB."""
+        """Return the distances of changes from the healthy machines' median, in dB."""
         assert self.centres is not None  # noqa: S101 - set above, said to the type checker
         distances: FloatArray = values - self.centres[self.rows_of(names)]
         return distances
 
     def over(self, change: Features) -> FloatArray:
-        """Return changes in structural floors, with their sign."""
+        """Return signed changes in structural floors."""
         return self.from_centre(change.names, change.values) / self.of(change.names)
 
     def floor_size(self, names: Sequence[str]) -> float:
-        """Return the `soft_size` that is one structural floor."""
+        """Return the `soft_size` that equals one structural floor."""
         return independent_floor_size(tuple(names)) if self.whole is None else self.whole
 
 
 @dataclass(frozen=True)
 class GapSize:
-    """How large the whole gap is; 1: one healthy machine, or one repeated record, in twenty is that far.
+    """The size of the whole gap; one healthy machine, or one repeated record, in twenty exceeds 1.
 
     Parameters
     ----------
@@ -244,19 +245,19 @@ class GapSize:
 def gap_size(change: Features, structural: StructuralFloor) -> GapSize:
     """Return the size of the whole gap in both floors, with 90 % intervals from the blocks of revolutions.
 
-    s = [Σ_f (mean_{i∈f} |d_i/e_i|⁸)^(4/8)]^(1/4)/s_0, families f, changes d, floors e, s_0 the size that is one floor.
+    s = [Σ_f (mean_{i∈f} |d_i/e_i|⁸)^(4/8)]^(1/4)/s_0, families f, changes d, floors e, s_0 the size of one floor.
 
-    Root mean squares over all features drown a handful of large changes among a hundred that stayed; the largest alone
-    hangs on one number and its jackknife on chance. Means of high order lie between, and are smooth. Features of one
-    family say nearly the same: their mean counts once however many they are; families add.
+    An RMS over all features would hide a few large changes among a hundred small ones; the maximum would depend on a
+    single number, and its jackknife on chance. Means of high order are in between, and smooth. Features of one family
+    are redundant: their mean counts once however many there are; families add.
 
-    The interval is ± t SE, by the jackknife over the sizes without each block: correlated features change together in
-    it, so that nothing is assumed of them.
+    The interval is ± t SE, from the jackknife over the sizes without each block. Correlated features change together in
+    it, so no assumption about them is needed.
 
     Parameters
     ----------
     change : Features
-        With `left_out`.
+        With its `left_out` values.
     structural : StructuralFloor
     """
     scatter = FLOOR_IN_DEVIATIONS * pooled_scatter(change)
@@ -284,7 +285,7 @@ def _degrees(change: Features) -> int:
 
 
 def t_quantile(degrees: int) -> float:
-    """Return what bounds 90 % on both sides with so few degrees of freedom."""
+    """Return the two-sided 90 % quantile of Student's t."""
     from scipy.special import stdtrit
 
     return float(stdtrit(degrees, 0.95))
@@ -293,12 +294,12 @@ def t_quantile(degrees: int) -> float:
 def soft_size(names: Sequence[str], normalised: FloatArray) -> float:
     """Return the size of a gap, [Σ_f (mean_{i∈f} |u_i|⁸)^(4/8)]^(1/4), over families f of features.
 
-    It is nearly the largest family's size, and a little more where several changed. See `family_size`.
+    It is close to the largest family's size, and slightly larger where several changed. See `family_size`.
 
     Parameters
     ----------
     names : sequence of str
-        Of the n features.
+        Names of the n features.
     normalised : array, (n,)
         Changes over their floors.
     """
@@ -308,7 +309,7 @@ def soft_size(names: Sequence[str], normalised: FloatArray) -> float:
 
 
 def family_size(normalised: FloatArray) -> float:
-    """Return (mean |u_i|⁸)^(1/8): nearly the largest; three quarters of it where one of nine moved and no other.
+    """Return (mean |u_i|⁸)^(1/8): close to the maximum, and three quarters of it where only one of nine changed.
 
     Parameters
     ----------
@@ -322,7 +323,7 @@ def family_size(normalised: FloatArray) -> float:
 
 
 def pooled_scatter(change: Features) -> FloatArray:
-    """Return standard errors drawn towards their family's median, as a jackknife over few blocks has some by chance.
+    """Return standard errors shrunk towards their family's median, since a jackknife over few blocks is uncertain.
 
     s² = (ν0 s0² + ν s²)/(ν0 + ν), s0 the family's median, ν the degrees of freedom, ν0 = `PRIOR_WEIGHT`.
 
@@ -336,7 +337,7 @@ def pooled_scatter(change: Features) -> FloatArray:
     Returns
     -------
     array, (n,)
-        dB, `MIN_SCATTER_DB` at least before pooling.
+        dB, at least `MIN_SCATTER_DB` before pooling.
     """
     variance = np.maximum(change.scatter, MIN_SCATTER_DB) ** 2
     degrees = _degrees(change)
@@ -355,12 +356,12 @@ _N_DRAWS = 2000
 def independent_floor_size(names: tuple[str, ...]) -> float:
     """Return the `soft_size` that one in twenty exceeds if features are independent and normal, each at its floor.
 
-    A constant of the features' names, found by counting, so the same numbers are drawn each time.
+    It depends on the features' names only and is found by simulation with a fixed seed.
 
     Parameters
     ----------
     names : tuple of str
-        Of the features.
+        Names of the features.
     """
     draws = np.random.default_rng(0).standard_normal((_N_DRAWS, len(names))) / FLOOR_IN_DEVIATIONS
     total = np.zeros(_N_DRAWS)
@@ -370,10 +371,10 @@ def independent_floor_size(names: tuple[str, ...]) -> float:
 
 
 def credibility_of(features: FloatArray, simulated: FloatArray) -> FloatArray:
-    """Return the slope of healthy machines' features over those of their simulations, cut to 0 … 1.
+    """Return the slope of healthy machines' features over those of their simulations, limited to 0 … 1.
 
-    A simulation knows how a figure goes with geometry, speed and load, and little of how impulsive or how uneven a
-    machine is: subtracting all of what it says adds its own scatter there. The slope is what leaves least.
+    A simulation knows how a feature depends on geometry, speed and load, but little about how impulsive or irregular a
+    machine is; there, subtracting its full value would add its own scatter. The slope leaves the smallest remainder.
 
     Source: the credibility factor of H. Bühlmann, "Experience rating and credibility", ASTIN Bulletin 4 (1967).
 

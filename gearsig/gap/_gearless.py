@@ -1,4 +1,4 @@
-"""The gap of a rig with bearings and no gear pair: no simulator can be set to it, so only what stands out is named."""
+"""The gap of a rig with bearings but no gear pair: it cannot be simulated, so only anomalies are named."""
 
 from __future__ import annotations
 
@@ -46,27 +46,27 @@ from gearsig.severity import LARGEST_SPEED_DIFFERENCE
 from gearsig.spectra import noise_floor
 
 # --------------------
-# What stands out of a recording without any simulation: damaged races, other impacts, lines of nothing known.
+# What stands out in a recording without a simulation: damaged races, other impacts, lines of unknown origin.
 # --------------------
 
 
 RACE_EFFECTS = {"bearing-outer-race": "bearing_outer_race", "bearing-inner-race": "bearing_inner_race"}
-"""Code of a finding → the effect of the catalogue that it means."""
+"""Code of a finding → the corresponding effect of the catalogue."""
 
 IMPACTS = ("non-synchronous-impacts", "bearing-rolling-element", "bearing-cage")
-"""Codes of families of impacts that no effect of the catalogue makes."""
+"""Codes of families of impacts that no effect of the catalogue causes."""
 
 LINE = "unexplained-line"
 
 PARTS = {f"bearing-{part.replace(' ', '-')}": (part, name) for name, (part, _) in BEARING_PARTS.items()}
-"""Code of a finding → part of a bearing, and its order's name."""
+"""Code of a finding → part of a bearing, and the name of its order."""
 
 SAME_EDGE = 0.1
-"""Relative, of a band's edges."""
-GROWTH_NOT_KNOWN = "Whether it has grown cannot be told."
+"""Relative tolerance of a band's edges."""
+GROWTH_NOT_KNOWN = "Whether it has grown is not known."
 
 MIN_RISE_DB = 6.0
-"""Twice the reference's level: less is between two recordings of the same machine."""
+"""Twice the reference's level: smaller differences occur between two recordings of the same machine."""
 
 
 @dataclass(frozen=True)
@@ -77,9 +77,9 @@ class UnexpectedFinding:
     ----------
     finding : Finding
     recording : str
-        Its name.
+        Name of the recording.
     rise_db : float or None
-        Over the reference, which shows it as well in the same band; None: it does not, or there is none.
+        Level over the reference, if that shows it as well in the same band; None: it does not, or there is none.
     """
 
     finding: Finding
@@ -88,13 +88,13 @@ class UnexpectedFinding:
 
     @property
     def over_floor_db(self) -> float:
-        """Strongest line over the noise beside it."""
+        """Level of the strongest line over the noise around it."""
         strength = self.finding.strength
         return float("nan") if strength is None or strength.ratio_db is None else strength.ratio_db
 
     @property
     def sureness(self) -> tuple[float, float]:
-        """By which the recording is chosen that shows it surest."""
+        """Key by which the recording with the most certain finding is chosen."""
         return self.finding.confidence, self.over_floor_db
 
 
@@ -106,7 +106,7 @@ class ExaminedRecording:
     ----------
     analysis : Analysis
     reference : Analysis or None
-        Of the healthy machine at its speed.
+        Analysis of the healthy machine at that speed.
     unexpected : tuple of UnexpectedFinding
         Most important first.
     notes : tuple of str
@@ -119,18 +119,18 @@ class ExaminedRecording:
 
     @property
     def name(self) -> str:
-        """Of the recording."""
+        """Name of the recording."""
         return self.analysis.recording.name
 
     @property
     def is_healthy(self) -> bool:
-        """Whether the bearings were examined, and would have shown a damage."""
+        """Whether the bearings were examined, and damage would have been detected."""
         codes = {f.code for f in self.analysis.findings}
         return "no-bearing-damage" in codes and self.analysis.outcome is Outcome.NO_FAULT
 
 
 def _angle(analysis: Analysis) -> ShaftAngle:
-    """Return the angle that an analysis found, which must be known.
+    """Return the angle that an analysis found.
 
     Raises
     ------
@@ -144,7 +144,7 @@ def _angle(analysis: Analysis) -> ShaftAngle:
 
 
 def _with_bearings(recording: PreparedRecording) -> Analysis:
-    """Analyse a recording, once, whose speed must be known and whose bearings examined, as there is nothing else."""
+    """Analyse a recording, once; its speed must be known and its bearings examined, as there is nothing else."""
     analysis = recording.keep(("gap", "analysed"), lambda: analyze(recording))
     _angle(analysis)
     for finding in analysis.findings:
@@ -154,9 +154,9 @@ def _with_bearings(recording: PreparedRecording) -> Analysis:
 
 
 def examined(analysis: Analysis, references: Sequence[Analysis], *, damaged_too: bool = False) -> ExaminedRecording:
-    """Return what stands out of a recording, beyond the reference at its speed where there is one.
+    """Return what stands out in a recording, beyond the reference at its speed where there is one.
 
-    A reference that shows a fault by itself is none, unless `damaged_too`.
+    A reference that itself shows a fault is not used, unless `damaged_too`.
     """
     name = analysis.recording.name
     reference, messages = _reference(analysis, references, damaged_too=damaged_too)
@@ -177,7 +177,7 @@ def examined(analysis: Analysis, references: Sequence[Analysis], *, damaged_too:
 
 
 def surest(every: Sequence[ExaminedRecording]) -> list[UnexpectedFinding]:
-    """Return what stands out, each part once, from the recording that shows it surest; single lines last."""
+    """Return the findings, each part once, from the recording where it is most certain; single lines last."""
     surest_of: dict[tuple[str, str], UnexpectedFinding] = {}
     for part in (unexpected for recording in every for unexpected in recording.unexpected):
         key = (part.finding.code, part.finding.where.bearing)
@@ -191,7 +191,7 @@ def surest(every: Sequence[ExaminedRecording]) -> list[UnexpectedFinding]:
 
 
 def bearings_text(finding: Finding, rig: Rig) -> str:
-    """Name the bearing of a finding, and those whose same part has the same order; empty where there is none."""
+    """Return the bearing of a finding, and others whose same part has the same order; empty where there is none."""
     name = PARTS.get(finding.code, ("", ""))[1]
     orders = {b.name: b.orders().get(name, 0.0) * (rig.ratio(b.shaft) or 0.0) for b in rig.bearings}
     bearing_order = orders.get(finding.where.bearing)
@@ -202,12 +202,12 @@ def bearings_text(finding: Finding, rig: Rig) -> str:
 
 
 def shafts_of_unknown_speed(rig: Rig) -> str:
-    """Name the shafts whose speed the rig file does not tell, as those of a gear pair left out; empty: none."""
+    """Return the shafts whose speed the rig file does not determine, as where a gear pair is missing; empty: none."""
     return named("shaft", " and ".join(shaft.name for shaft in rig.shafts if rig.ratio(shaft.name) is None))
 
 
 def _rise_db(finding: Finding, earlier: ReferenceFinding) -> float | None:
-    """Return the rise since then; None where the bands differ, since the level in a band grows with its width."""
+    """Return the rise since the reference; None where the bands differ, since the level grows with a band's width."""
     bands = finding.where.band_hz or (), earlier.finding.where.band_hz or ()
     differ = any(abs(now - then) > SAME_EDGE * max(now, then) for now, then in zip(*bands, strict=False))
     return None if differ else earlier.change_db
@@ -216,7 +216,7 @@ def _rise_db(finding: Finding, earlier: ReferenceFinding) -> float | None:
 def _reference(
     analysis: Analysis, references: Sequence[Analysis], *, damaged_too: bool
 ) -> tuple[Analysis | None, list[str]]:
-    """Return the healthy reference at the recording's speed, and what it cannot be asked; or none and why."""
+    """Return the healthy reference at the recording's speed, and what it lacks; or None and the reason."""
     if not references:
         return None, []
     name, speed = analysis.recording.name, _angle(analysis).mean_speed_rpm
@@ -237,17 +237,17 @@ def _reference(
 
 
 # --------------------
-# Which cause what stands out has, where no simulation could be compared with: probabilities and the outcome.
+# Causes of what stands out without a simulation to compare with: probabilities and the outcome.
 # --------------------
 
 
 MISSED_FAULT = 0.2
-"""Probability of something that does not show, where damage of a race would have shown."""
+"""Probability that something is wrong although nothing shows, where damage of a race would have shown."""
 UNDECIDED = 0.5
-"""Share of unknown in what is left over, where nothing tells it from none."""
+"""Fraction of the remaining probability for "unknown", where there is no evidence for it or for "none"."""
 
 Races = Mapping[str, UnexpectedFinding]
-"""Name of an effect → the surest finding of it."""
+"""Name of an effect → its most certain finding."""
 
 
 def causes_of(
@@ -256,11 +256,12 @@ def causes_of(
     rig: Rig,
     effects: Mapping[str, GapEffect],
 ) -> tuple[tuple[GapCause, ...], GapOutcome]:
-    """Return the causes, that of the outcome first, and the outcome.
+    """Return the causes, with that of the outcome first, and the outcome.
 
-    A race has the confidence c of its finding; of the rest 1 − Σc a share u goes to unknown and 1 − u to none. u is
-    the confidence of other impacts or lines where they stand out alone, 1/2 beside a race, and where nothing stands
-    out 1/5 if a damage would have shown, else 1/2. An effect is named only if the finding is a fault.
+    A race has the confidence c of its finding. Of the remainder 1 − Σc, a fraction u goes to "unknown" and 1 − u to
+    "none". u is the confidence of other impacts or lines where they stand out alone, and 1/2 beside a race. Where
+    nothing stands out, it is 1/5 if damage would have shown, else 1/2. An effect is named only if the finding is a
+    fault.
 
     Parameters
     ----------
@@ -269,7 +270,7 @@ def causes_of(
     every : sequence of ExaminedRecording
     rig : Rig
     effects : mapping
-        Those that may be named.
+        Effects that may be named.
     """
     races = {
         name: part for part in reversed(unexpected) if (name := RACE_EFFECTS.get(part.finding.code, "")) in effects
@@ -301,7 +302,7 @@ def causes_of(
 
 
 def _significant_races(races: Races) -> list[UnexpectedFinding]:
-    """Return the races whose damage the search is sure of, surest first."""
+    """Return the races that are certain to be damaged, most certain first."""
     faults = [race for race in races.values() if race.finding.kind is Kind.FAULT]
     return sorted(faults, key=lambda race: -race.finding.confidence)
 
@@ -332,14 +333,14 @@ def _why_unknown(part: UnexpectedFinding, races: Races, rig: Rig) -> str:
         return f"damage of a {PARTS[code][0]} is not in the catalogue"
     why = "what makes the line is not known" if code == LINE else "what makes the impacts is not known"
     loose = shafts_of_unknown_speed(rig)
-    return f"{why}; it may turn with {loose}, whose speed the rig file does not tell" if loose else why
+    return f"{why}; it may turn with {loose}, whose speed the rig file does not give" if loose else why
 
 
 def _share_of_unknown(
     unexpected: Sequence[UnexpectedFinding], races: Races, every: Sequence[ExaminedRecording]
 ) -> float:
     impacts = [part.finding.confidence for part in unexpected if part.finding.code in IMPACTS]
-    if races:  # a line may be the ringing of the race's impacts, and says nothing beside them
+    if races:  # beside a race, a line may be the ringing of its impacts
         return max([UNDECIDED, *impacts])
     if unexpected:
         return max(part.finding.confidence for part in unexpected)
@@ -360,7 +361,7 @@ def _messages(finding: Finding) -> tuple[str, ...]:
 
 
 # --------------------
-# What stands out of a recording by itself, as places of a gap.
+# What stands out in a recording by itself, as places of a gap.
 # --------------------
 
 
@@ -368,14 +369,14 @@ NAN = float("nan")
 
 
 def place_of_unexpected(part: UnexpectedFinding, rig: Rig, *, name: str = "") -> GapPlace:
-    """Return the place of what stands out, without sizes in floors, for nothing is simulated to find it.
+    """Return the place of a finding, without sizes in floors, since it is found without a simulation.
 
     Parameters
     ----------
     part : UnexpectedFinding
     rig : Rig
     name : str
-        The recording's where there are several.
+        Name of the recording, where there are several.
     """
     where = part.finding.where
     order = where.order or NAN
@@ -411,18 +412,18 @@ def _part_text(part: UnexpectedFinding, rig: Rig) -> str:
 
 
 NO_GEAR_PAIR = (
-    "The rig has no gear pair, so that no simulator could be set to it: nothing was simulated, and no effect of gears "
-    "is tried. How large the gap is, how severe its cause and how far it shrinks cannot be told; there is no twin. "
-    "Damaged races of the bearings were looked for; unbalance, misalignment, clearance, drive and load were not."
+    "The rig has no gear pair, so no simulator can model it: nothing was simulated, and no effect of gears was tried. "
+    "How large the gap is, how severe its cause and how far it shrinks are not known; there is no twin. Only damaged "
+    "races of the bearings were looked for, not unbalance, misalignment, clearance, drive or load."
 )
 HOW_SURE = (
     "The probabilities are not the calibrated ones of rigs with a gear pair. A race has the confidence of the bearing "
     "search: an upper limit, from how rarely noise makes such lines and how well other parts or a wrong speed explain "
-    "them. What is left over is shared between unknown and none."
+    "them. The remainder is shared between unknown and none."
 )
 NO_REFERENCE = "No healthy reference: what stands out may have been there when the machine was healthy."
 N_SHOWN = 6.5
-"""Multiples of the found order that a spectrum is shown for."""
+"""Range of a spectrum's plot, in multiples of the order found."""
 
 
 def diagnose_gearless(
@@ -431,16 +432,16 @@ def diagnose_gearless(
     effects: Mapping[str, GapEffect],
     tell: Stage,
 ) -> GapReport:
-    """Name the damaged race, or say that it is unknown what stands out, or that nothing does.
+    """Name a damaged race, or report that something unknown stands out, or nothing.
 
     Parameters
     ----------
     recordings, references : sequence of PreparedRecording
         Each with its rig.
     effects : mapping
-        Those that may be named; of them only damaged races can be.
+        Effects that may be named; only damaged races can be.
     tell : callable
-        Is told what is being done, and which share of the whole is complete.
+        Called with the current stage and the fraction completed.
 
     Returns
     -------
@@ -450,7 +451,7 @@ def diagnose_gearless(
     Raises
     ------
     RefusalError
-        If there is no speed, no live channel, or too few revolutions.
+        If there is no speed or no live channel, or there are too few revolutions.
     """
     tell("analysing the references", 0.05)
     left_out: list[str] = []
@@ -500,17 +501,17 @@ def diagnose_gearless(
 def _beyond_reference(
     recording: PreparedRecording, alone: ExaminedRecording, references: Sequence[PreparedRecording]
 ) -> ExaminedRecording:
-    """Leave out faults and suspicions that the reference gives as much reason for, measured in the same band of both.
+    """Omit faults and suspicions for which the reference gives as much reason, measured in the same band of both.
 
     What is barely suspected in one recording is often just missed in another of the same machine.
     """
 
     def is_asked(finding: Finding) -> bool:
-        return finding.is_claim or finding.code in RACE_EFFECTS  # alone, weak lines of a race are no more than a notice
+        return finding.is_claim or finding.code in RACE_EFFECTS  # weak lines of a race alone are only a notice
 
     if alone.reference is None or not any(is_asked(part.finding) for part in alone.unexpected):
         return alone
-    # The prepared one: what its own analysis has resampled and averaged is there.
+    # The prepared one, which holds what its own analysis has resampled and averaged.
     reference = next(prepared for prepared in references if prepared.recording is alone.reference.recording)
     beside = analyze(recording, reference=reference)
     now = {(f.code, f.where): f for f in beside.findings}
@@ -526,19 +527,19 @@ def _beyond_reference(
 
 
 def _loose_shafts(rig: Rig) -> list[str]:
-    """Say which shafts' orders, and those of their bearings, are not known."""
+    """Return a message with the shafts whose orders, and those of their bearings, are not known."""
     loose = shafts_of_unknown_speed(rig)
     if not loose:
         return []
     message = (
-        f"The rig file does not tell the speed of {loose}, as it names no gear pair: what turns with it is taken for "
-        "something strange, and its bearings were not looked for. Give the teeth of the pair."
+        f"The rig file does not give the speed of {loose}, as it names no gear pair: whatever turns with it counts as "
+        "unexplained, and its bearings were not examined. Give the teeth of the pair."
     )
     return [message]
 
 
 def _limits(unexpected: Sequence[UnexpectedFinding], every: Sequence[ExaminedRecording]) -> list[str]:
-    """Say where several races, or several recordings, do not agree on one answer."""
+    """Return messages where several races, or several recordings, contradict a single answer."""
     faults = [part for part in unexpected if part.finding.kind is Kind.FAULT]
     texts = []
     if len({part.finding.code for part in faults if part.finding.code in RACE_EFFECTS}) > 1:
@@ -570,13 +571,13 @@ def _facts(examined_recording: ExaminedRecording) -> ConditionFacts:
 
 
 def _spectra(unexpected: Sequence[UnexpectedFinding], every: Sequence[ExaminedRecording]) -> tuple[SpectrumCurves, ...]:
-    """Return the envelope spectrum that shows the first family; of the first channel where there is none."""
+    """Return the envelope spectrum that shows the first family, or that of the first channel where there is none."""
     families = [item for item in unexpected if item.finding.code != LINE]
     name = families[0].recording if families else every[0].name
     channels = next(item for item in every if item.name == name).analysis.channels
     shown_channels = families[0].finding.where.channels if families else ()
     if not channels:
-        return ()  # where the rate or speed is doubtful nothing was computed over orders
+        return ()  # with a doubtful rate or speed, nothing was computed over orders
     channel = next((c for c in channels if c.channel in shown_channels), channels[0])
     spectrum, band = channel.envelope_spectrum, channel.envelope_band_hz
     if spectrum is None or band is None:
@@ -599,22 +600,22 @@ def _spectra(unexpected: Sequence[UnexpectedFinding], every: Sequence[ExaminedRe
 
 
 # --------------------
-# What stands out of a recording of gears by itself, found by the analysis: impacts, and lines of nothing known.
+# What stands out in a recording of gears by itself, found by the analysis: impacts, and lines of unknown origin.
 # --------------------
 
 
 HIGHEST_HARMONIC, HARMONIC_TOLERANCE = 40, 1e-3
-"""Of a family of impacts, at which a line still belongs to it; relative."""
+"""Highest multiple of a family of impacts at which a line still belongs to it, and the relative tolerance."""
 
 
 def unexpected_findings(
     recording: PreparedRecording, references: Sequence[PreparedRecording]
 ) -> tuple[list[UnexpectedFinding], list[str], list[str]]:
-    """Return the families of impacts, beyond the reference's, that no shaft repeats, surest first; notes; warnings.
+    """Return families of impacts that no shaft repeats, beyond the reference's, most certain first; notes; warnings.
 
-    The catalogue's effects are compared by features of known places; a strange family is one feature among a hundred
-    there and easily lost. The analysis looks for it by itself. A strange line and a family that may well be chance are
-    notes; a fault of the reference is a doubt about everything else.
+    The catalogue's effects are compared by features of known places; there, an unknown family is one feature among a
+    hundred and easily lost. The analysis searches for it separately. A line of unknown origin, or a family that may
+    well be chance, becomes a note. A fault of the reference becomes a warning, as it casts doubt on everything else.
     """
     name, now = recording.recording.name, analyze(recording)
     if isinstance(now.shaft_angle, CannotTell):  # without a speed no family of impacts has an order
@@ -628,7 +629,7 @@ def unexpected_findings(
     nearest = min(speeds)[2] if speeds else references[0] if len(references) == 1 else None
     alike = [] if nearest is None else [with_matching_channel_names(recording.recording, nearest)]
     healthy = [analysis for analysis in map(analyze, alike) if isinstance(analysis.shaft_angle, ShaftAngle)]
-    alone = examined(now, healthy, damaged_too=True)  # what both have is no gap; that it is there, a warning says
+    alone = examined(now, healthy, damaged_too=True)  # shared findings are no gap, but give a warning
     now_examined = _beyond_reference(recording, alone, alike)
     warnings = _fault_of_reference(healthy[0], now, name) if healthy else []
     weak = [part for part in now_examined.unexpected if part.finding.code == LINE or part.finding.kind is Kind.NOTICE]
@@ -643,10 +644,10 @@ def unexpected_findings(
 
 
 def with_unexpected(outcome: GapOutcome, unexpected: Sequence[UnexpectedFinding]) -> tuple[GapOutcome, list[str]]:
-    """Return what a diagnosis that names no effect comes to where impacts stand out, and what is to be checked first.
+    """Return the outcome where impacts stand out although no effect is named, and what to check first.
 
-    Impacts that no shaft repeats are a gap, however few features see them: unknown. Those of a bearing's race are in
-    the catalogue; that the forests see too little of them leaves it undecided.
+    Impacts that no shaft repeats are a gap, however few features show them: unknown. Those of a bearing's race are in
+    the catalogue; the forests see too little of them, so the outcome is undecided.
     """
     if not unexpected or outcome not in (GapOutcome.NO_GAP, GapOutcome.UNDECIDED):
         return outcome, []
@@ -654,14 +655,14 @@ def with_unexpected(outcome: GapOutcome, unexpected: Sequence[UnexpectedFinding]
     if len(races) < len(unexpected):
         return GapOutcome.UNKNOWN, []
     return GapOutcome.UNDECIDED, [
-        f"{part.recording}: {part.finding.title.rstrip('.')}{_odds(part)}, by the search for bearing orders; few of "
-        "the features that are compared show it."
+        f"{part.recording}: {part.finding.title.rstrip('.')}{_odds(part)}, found by the search for bearing orders; "
+        "few of the compared features show it."
         for part in races
     ]
 
 
 def _is_harmonic(line: UnexpectedFinding, family: UnexpectedFinding) -> bool:
-    """Whether a line is a multiple of a family's order: the family explains it."""
+    """Whether a line is a multiple of a family's order, which then explains it."""
     order, base = line.finding.where.order, family.finding.where.order
     if not (order and base and line.finding.where.shaft == family.finding.where.shaft):
         return False
@@ -674,7 +675,7 @@ def _odds(part: UnexpectedFinding) -> str:
 
 
 def _fault_of_reference(reference: Analysis, now: Analysis, name: str) -> list[str]:
-    """Say so where the reference shows a fault by itself; most of all where the recording shows none."""
+    """Return a message if the reference shows a fault itself, in particular where the recording shows none."""
     if reference.outcome is not Outcome.FAULT:
         return []
     fault = reference.findings[0]
@@ -682,7 +683,7 @@ def _fault_of_reference(reference: Analysis, now: Analysis, name: str) -> list[s
     perhaps = "" if is_shown else " and the recording shows no fault: they may have been exchanged"
     title = fault.title.rstrip(".")
     message = (
-        f"The reference of {name} does not look healthy ({title}){perhaps}. What is named may be what the "
-        "reference has and the recording has not."
+        f"The reference of {name} does not look healthy ({title}){perhaps}. What is named may be in the "
+        "reference and not in the recording."
     )
     return [message]

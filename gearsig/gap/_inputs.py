@@ -1,4 +1,4 @@
-"""What a gap diagnosis is given: files of one machine, recordings with their operating points, references, a rig."""
+"""Inputs of a gap diagnosis: files of one machine, recordings with their operating points, references, a rig."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ from gearsig.rig import ConstantSpeed, Rig, read_rig, rig_file_beside
 
 @dataclass(frozen=True)
 class GapRequest:
-    """Files and what the user states of them.
+    """Files and what the user states about them.
 
     Parameters
     ----------
     recordings, references : tuple of Path
     rig : Path or None
-        For all of them; a rig file beside a recording overrides its speed and torque. None: only those beside.
+        For all files; a rig file beside a recording overrides its speed and torque. None: only those beside.
     torques_nm : tuple of float
-        None, one for all, or one for each recording.
+        Empty, one for all, or one for each recording.
     sampling_rate_hz : float or None
-        Of files that do not state it; of references unless a rig file beside them does.
+        For files that do not state it; for references unless a rig file beside them states it.
     names, reference_names : tuple of str
-        Of recordings and references, for people; empty: those of the files.
+        Display names of recordings and references; empty: those of the files.
     learn : Path or None
         Folder of labelled recordings of this rig, see `read_labelled`.
     stage : str
-        Gear pair that is diagnosed, of several, see `diagnose_gap`.
+        Gear pair to diagnose, of several, see `diagnose_gap`.
     speed_rpm : float or None
-        Constant speed of the reference shaft in all recordings and references, where nothing measures it.
+        Constant speed of the reference shaft in all recordings and references, where it is not measured.
     reference_rate_hz : float or None
         Sampling rate of the references, where it differs.
     run_up : Path or None
@@ -67,7 +67,7 @@ class GapRequest:
 
 @dataclass(frozen=True)
 class GapInputs:
-    """Recordings, references and run-up, each with its rig and its name for people, and what is labelled."""
+    """Recordings, references and run-up, each with its rig and display name, and the labelled recordings."""
 
     recordings: tuple[Recording, ...]
     references: tuple[Recording, ...] = ()
@@ -76,19 +76,19 @@ class GapInputs:
 
 
 def read_gap_inputs(request: GapRequest, on_file: Callable[[str], object] = lambda _: None) -> GapInputs:
-    """Read everything, rigs first.
+    """Read all files, rigs first.
 
     Parameters
     ----------
     request : GapRequest
     on_file : callable
-        Is told the name of each file before it is read.
+        Called with the name of each file before it is read.
 
     Raises
     ------
     InputError
         If a file cannot be read, a recording has no rig, the rigs are of different machines, a file is given twice, or
-        the number of torques fits none.
+        the number of torques does not fit.
     """
     _check_files(request)
     files = (*request.recordings, *request.healthy)
@@ -104,7 +104,7 @@ def read_gap_inputs(request: GapRequest, on_file: Callable[[str], object] = lamb
         if is_reference:
             _, rate_hz = rig_and_rate_of_reference(path, None, rate_hz, request.reference_rate_hz)
         with options_named(REFERENCE_OPTIONS if is_reference else {}):
-            stated = None if path == request.run_up else speed  # constant, as that of a run-up is not
+            stated = None if path == request.run_up else speed  # a run-up's speed is not constant
             recording = read_whole(path, rig, sampling_rate_hz=rate_hz, speed=stated)
         recordings.append(recording.with_name(name))
     if request.learn is not None:
@@ -147,7 +147,7 @@ def _rigs(request: GapRequest, files: Sequence[Path]) -> tuple[Rig, ...]:
         recording_rig = read_rig(rig_file) if rig_file is not None and has_rig_file else None
         if recording_rig is None and common is None:
             raise InputError(
-                "no rig file is given, and none lies beside it",
+                "no rig file is given, and there is none beside it",
                 where=str(path),
                 remedy="give --rig RIG.toml with the gears' teeth and module; `gearsig rig example` prints one",
             )
@@ -160,7 +160,7 @@ def _rigs(request: GapRequest, files: Sequence[Path]) -> tuple[Rig, ...]:
 
 
 def _merged(common: Rig | None, of_recording: Rig | None) -> Rig:
-    """Return the common rig at the operating point of the recording's own, and with its measurement."""
+    """Return the common rig at the operating point of the recording's own rig, with its measurement."""
     if common is None or of_recording is None:
         rig = common or of_recording
         assert rig is not None  # noqa: S101 - the caller has made sure of one
@@ -177,7 +177,7 @@ def _merged(common: Rig | None, of_recording: Rig | None) -> Rig:
 
 
 def _with_torque(rig: Rig, request: GapRequest, place: int) -> Rig:
-    """Return the rig at the torque that was stated: a single one is the references' as well."""
+    """Return the rig at the stated torque; a single torque applies to the references as well."""
     if not request.torques_nm or (len(request.torques_nm) > 1 and place >= len(request.torques_nm)):
         return rig
     torque_nm = request.torques_nm[0 if len(request.torques_nm) == 1 else place]
@@ -185,7 +185,7 @@ def _with_torque(rig: Rig, request: GapRequest, place: int) -> Rig:
 
 
 def _check_same(rig: Rig, of_recording: Rig, name: str) -> None:
-    """Compare what both rig files state of the machine."""
+    """Raise if the two rig files describe different machines."""
     for quantity, stated in _identity(of_recording).items():
         expected = _identity(rig).get(quantity)
         if expected is not None and expected != stated:
@@ -197,7 +197,7 @@ def _check_same(rig: Rig, of_recording: Rig, name: str) -> None:
 
 
 def _identity(rig: Rig) -> dict[str, str]:
-    """Return what makes a machine another one, as far as it is known."""
+    """Return the known properties that distinguish one machine from another."""
     facts: dict[str, str] = {}
     if rig.pairs and all(p.driver_teeth and p.driven_teeth for p in rig.pairs):
         facts["teeth"] = ", ".join(f"{p.driver_teeth}/{p.driven_teeth}" for p in rig.pairs)
@@ -214,13 +214,13 @@ def _identity(rig: Rig) -> dict[str, str]:
 
 
 def _names(paths: Sequence[Path]) -> tuple[str, ...]:
-    """Return the names of files; with their folders where names alone are not unique."""
+    """Return the names of files, with their folders where names alone are not unique."""
     plain = [path.name for path in paths]
     return tuple(plain) if len(set(plain)) == len(plain) else tuple(f"{p.parent.name}/{p.name}" for p in paths)
 
 
 # --------------------
-# A folder of labelled recordings: labels.csv and what it names.
+# A folder of labelled recordings: labels.csv and the files that it names.
 # --------------------
 
 
@@ -236,26 +236,26 @@ def read_labelled(
     sampling_rate_hz: float | None = None,
     on_file: Callable[[str], object] = lambda _: None,
 ) -> tuple[LabelledRecording, ...]:
-    """Read the recordings that a folder's `labels.csv` names.
+    """Read the recordings named in a folder's `labels.csv`.
 
-    The table has a line for each recording: `file`, `effect` (a name of the catalogue, "healthy", or a name of your
-    own), and, if there are any, `reference` (the file of the same rig when it was healthy) and `severity`.
+    The table has a line for each recording: `file`, `effect` (a name from the catalogue, "healthy", or a name of your
+    own), and optionally `reference` (a file of the same rig when it was healthy) and `severity`.
 
     Parameters
     ----------
     folder : Path
     rig : Rig or None
-        Of all recordings; NAME.toml beside a recording overrides its operating point and speed source.
+        For all recordings; NAME.toml beside a recording overrides its operating point and speed source.
     sampling_rate_hz : float or None
-        Of files that do not state it.
+        For files that do not state it.
     on_file : callable
-        Is told the name of each file before it is read.
+        Called with the name of each file before it is read.
 
     Raises
     ------
     InputError
-        With the table's name and line: if it cannot be read, a column is missing, or a file, a label or a number is
-        not what it must be.
+        With the table's name and line: if it cannot be read, a column is missing, or a file, a label or a number is not
+        valid.
     """
     references: dict[Path, Recording] = {}
 
@@ -266,7 +266,9 @@ def read_labelled(
         if recording_rig is not None and rig is not None:
             _check_same(rig, recording_rig, path.name)
         if recording_rig is None and rig is None:
-            raise InputError("no rig is given, and none lies beside it", where=path.name, remedy="give --rig RIG.toml")
+            raise InputError(
+                "no rig is given, and there is none beside it", where=path.name, remedy="give --rig RIG.toml"
+            )
         recording = read_whole(path, _merged(rig, recording_rig), sampling_rate_hz=sampling_rate_hz)
         return recording.with_name(f"{folder.name}/{path.name}")
 
@@ -285,7 +287,7 @@ def read_labelled(
 
 
 def _lines(path: Path) -> list[tuple[str, Mapping[str, str]]]:
-    """Return the lines of the table, each with where it stands."""
+    """Return the lines of the table, each with its location."""
     try:
         text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
@@ -294,7 +296,7 @@ def _lines(path: Path) -> list[tuple[str, Mapping[str, str]]]:
             f"cannot be read ({error.strerror})", where=str(path), remedy=f"put {TABLE} there: {example}"
         ) from None
     except UnicodeDecodeError:
-        raise InputError("is no text in UTF-8", where=str(path), remedy="save it as CSV UTF-8") from None
+        raise InputError("is not UTF-8 text", where=str(path), remedy="save it as CSV UTF-8") from None
     header = text.partition("\n")[0]
     rows = csv.reader(text.splitlines(), delimiter=";" if header.count(";") > header.count(",") else ",", strict=True)
     lines: list[tuple[str, Mapping[str, str]]] = []
@@ -310,10 +312,10 @@ def _lines(path: Path) -> list[tuple[str, Mapping[str, str]]]:
             if not any(cell.strip() for cell in row):
                 continue
             if len(row) > len(names):
-                raise InputError(f"{len(row)} cells stand under {len(names)} names", where=where, allowed="one each")
+                raise InputError(f"{len(row)} cells for {len(names)} column names", where=where, allowed="one each")
             lines.append((where, dict(zip(names, (cell.strip() for cell in row), strict=False))))
     except csv.Error as error:
-        raise InputError(f"is no table ({error})", where=f"{path.name}, line {rows.line_num}") from None
+        raise InputError(f"is not a table ({error})", where=f"{path.name}, line {rows.line_num}") from None
     if not 0 < len(lines) <= MAX_LABELLED:
         raise InputError(
             f"names {len(lines)} recordings", where=path.name, allowed=f"1 to {MAX_LABELLED}, a line for each"
@@ -322,19 +324,19 @@ def _lines(path: Path) -> list[tuple[str, Mapping[str, str]]]:
 
 
 def _named(folder: Path, name: str, where: str, column: str) -> Path:
-    """Return a file that the table names; it lies in the table's folder or below it."""
+    """Return a file named in the table; it must be in the table's folder or below it."""
     if not name:
         raise InputError(f"no {column} is named", where=where, allowed="the name of a file in the folder")
     path, root = (folder / name).resolve(), folder.resolve()
     if not path.is_relative_to(root):
-        raise InputError(f"{name!r} lies outside the folder", where=where, allowed="files in it, or in folders below")
+        raise InputError(f"{name!r} is outside the folder", where=where, allowed="files in it, or in folders below")
     if not path.is_file():
         raise InputError(f"there is no file {name!r}", where=where, remedy="check its name")
     return path
 
 
 def _label(text: str, where: str) -> str:
-    """Return a label as names of effects are written; "none" of a healthy machine."""
+    """Return a label in the form of effect names; "none" for a healthy machine."""
     label = "_".join(text.lower().replace("-", " ").split())
     if label in HEALTHY_LABELS:
         return NONE
@@ -360,7 +362,7 @@ def _severity(text: str, where: str) -> float | None:
 
 
 # --------------------
-# What a rig file must say: which way it can be diagnosed, which pair, what is assumed of it.
+# Requirements on a rig file: how it can be diagnosed, which pair, which assumptions.
 # --------------------
 
 
@@ -368,26 +370,27 @@ EXAMPLE = "`gearsig rig example` prints a file to start from"
 
 
 def is_gearless(rig: Rig) -> bool:
-    """Return whether the rig has bearings only, so that there is nothing to set a simulator to.
+    """Return whether the rig has bearings only, so that no simulator can model it.
 
     Raises
     ------
     RefusalError
-        If the rig's data suffice neither for a simulation nor for a search for the bearings, with all that is missing.
+        If the rig's data are sufficient neither for a simulation nor for a search for bearing damage, with what is
+        missing.
     """
     if rig.pairs:
         _check_teeth(rig)
         return False
     if not rig.bearings:
         raise RefusalError(
-            "the rig file describes neither a gear pair nor a bearing: there is nothing to set a simulator to, and "
+            "the rig file describes neither a gear pair nor a bearing: there is nothing to simulate and "
             "nothing to look for",
             remedy=f"describe the gear pair (teeth, module) or the bearings (geometry or orders); {EXAMPLE}",
         )
     if not any(bearing.orders() and rig.ratio(bearing.shaft) is not None for bearing in rig.bearings):
         names = ", ".join(repr(bearing.name) for bearing in rig.bearings)
         raise RefusalError(
-            f"the rig has no gear pair, and of no bearing ({names}) the orders and the speed of its shaft are known",
+            f"the rig has no gear pair, and for no bearing ({names}) are both orders and shaft speed known",
             remedy="give the bearings' geometry or orders, on the shaft whose speed is known",
         )
     return True
@@ -399,26 +402,26 @@ def _check_teeth(rig: Rig) -> None:
     if gears:
         gear_text = "both gears" if len(gears) == 2 else f"the {gears[0]} gear"
         raise RefusalError(
-            f"the rig data are missing that a simulation needs: teeth of {gear_text} of pair {pair.name!r}",
-            remedy="complete the rig file; `gearsig analyze` says what can be said without them",
+            f"data that a simulation needs are missing: teeth of {gear_text} of pair {pair.name!r}",
+            remedy="complete the rig file; `gearsig analyze` shows what can be found without them",
         )
 
 
 def with_stage(rig: Rig, stage: str = "") -> Rig:
-    """Return a rig with the gear pair that is asked for as its first, which is under study; the others are background.
+    """Return a rig with the requested gear pair first; that one is diagnosed, the others are background.
 
     Parameters
     ----------
     rig : Rig
     stage : str
-        Name of a pair, or of a shaft that only one pair sits on; empty: the only one.
+        Name of a pair, or of a shaft that belongs to only one pair; empty: the only pair.
 
     Raises
     ------
     InputError
         If there is no such pair.
     RefusalError
-        If there are several pairs and none is asked for.
+        If there are several pairs and none is requested.
     """
     names = [pair.name for pair in rig.pairs]
     chosen = [pair for pair in rig.pairs if pair.name == stage]
@@ -426,7 +429,7 @@ def with_stage(rig: Rig, stage: str = "") -> Rig:
     if not stage and len(names) > 1:
         raise RefusalError(
             f"the rig has {len(names)} gear pairs ({', '.join(names)}), and one is diagnosed at a time",
-            remedy="say which with --stage NAME (stage=… from Python); the others are taken for background",
+            remedy="say which with --stage NAME (stage=… from Python); the others are treated as background",
         )
     if stage and len(chosen) != 1:
         problem = f"{len(chosen)} pairs sit on shaft {stage!r}" if chosen else f"there is no gear pair {stage!r}"
@@ -437,14 +440,15 @@ def with_stage(rig: Rig, stage: str = "") -> Rig:
 USUAL_MODULE_MM, MODULES_MM = 2.5, (0.5, 12.0)
 WIDTH_MODULES = 10.0
 LOAD_N_PER_MM2 = 50.0
-"""Where a module is not known: of small gearboxes; between what can be cut and what sits on a bench; the face width
-over it; force per face width and module, from which it follows where the torque is stated."""
+"""Used where the module is not known: the usual one of small gearboxes; its plausible range; face width in modules;
+force per face width and module, from which the module follows where the torque is stated."""
 
 
 def twin_rig(rig: Rig) -> tuple[Rig, list[str]]:
-    """Return the rig of the first pair alone, as a simulator is set to it, and what was assumed of it.
+    """Return the rig reduced to its first pair, as required by a simulator, and the assumptions made.
 
-    Without a module, T = F b m (m z/2) with F = 50 N/mm² and b = 10 m lets it follow from the torque; or it is 2.5 mm.
+    Without a module, it follows from the torque, T = F b m (m z/2) with F = 50 N/mm² and b = 10 m; otherwise it is 2.5
+    mm.
     """
     pair, messages = rig.pairs[0], list[str]()
     torque_nm = rig.nominal_torque_nm(pair.driver)
@@ -455,14 +459,14 @@ def twin_rig(rig: Rig) -> tuple[Rig, list[str]]:
         module = float(f"{np.clip(module, *MODULES_MM):.2g}")
         width = pair.face_width_mm or WIDTH_MODULES * module
         pair = replace(pair, module_mm=module, face_width_mm=width)
-        why = f"that the torque of {torque_nm:.3g} N·m lets expect" if torque_nm else "as usual for small gearboxes"
+        why = f"as the torque of {torque_nm:.3g} N·m suggests" if torque_nm else "as usual for small gearboxes"
         messages.append(
-            f"Of the gears only teeth are known: the twin has a module of {module:g} mm, {why}, and a face width of "
-            f"{width:g} mm. A machine may have half or twice that: severities in mm and µm are orders of magnitude."
+            f"Only the gears' teeth are known: the twin has a module of {module:g} mm, {why}, and a face width of "
+            f"{width:g} mm. The machine may have half or twice that: severities in mm and µm are orders of magnitude."
         )
     if len(rig.pairs) > 1:
         further_names = ", ".join(further.name for further in rig.pairs[1:])
-        messages.append(f"Diagnosed is {pair.name}; what {further_names} is heard at is background, and taken out.")
+        messages.append(f"{pair.name} is diagnosed; the orders of {further_names} are background, and removed.")
     elif not messages:
         return rig, []
     point, on = rig.operating_point, (pair.driver, pair.driven)

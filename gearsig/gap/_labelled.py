@@ -1,4 +1,4 @@
-"""Labelled recordings of the very rig that is diagnosed: what they show, and what that adds to the answer."""
+"""Labelled recordings of the rig under diagnosis: the changes they show, and the evidence they add."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ from gearsig.recording import Recording
 
 @dataclass(frozen=True)
 class LabelledRecording:
-    """A recording of the rig, or of somebody's own simulation of it, of which the cause is known.
+    """A recording of the rig, or of your own simulation of it, whose cause is known.
 
     Parameters
     ----------
     recording : Recording
         Carries its rig, with speed and torque.
     effect : str
-        Name of an effect, "none" (healthy), or a name of one's own, which becomes a class of its own.
+        Name of an effect, "none" (healthy), or a name of your own, which becomes a separate class.
     reference : Recording or None
-        The same rig when it was healthy; None: the diagnosis's own reference at the same speed and torque, if any.
+        The same rig when healthy; None: the diagnosis's own reference at the same speed and torque, if any.
     severity : float or None
         In the effect's unit; kept for the report.
     """
@@ -48,22 +48,22 @@ class LabelledRecording:
 
 
 # --------------------
-# What they show: changes as those of the recordings that are diagnosed, kept on disk by content.
+# Their changes, computed as for the diagnosed recordings, and kept on disk by content.
 # --------------------
 
 
 @dataclass(frozen=True)
 class LabelledChange:
-    """What a labelled recording shows.
+    """The change in a labelled recording.
 
     Parameters
     ----------
     label : str
     point : OperatingCondition
     changes : mapping
-        Against a healthy reference (True), against the twin (False): the ways in which it can be compared.
+        Against a healthy reference (True) and against the twin (False), as far as available.
     key : str
-        By which it is kept on disk.
+        Key under which it is kept on disk.
     """
 
     label: str
@@ -73,7 +73,7 @@ class LabelledChange:
 
 
 MAX_BYTES = 10_000_000
-"""Of kept changes; real ones have some thousand."""
+"""Limit of kept changes; real ones have some thousand bytes."""
 
 
 def labelled_changes(
@@ -85,20 +85,20 @@ def labelled_changes(
     *,
     fresh: bool = False,
 ) -> tuple[list[LabelledChange], list[str]]:
-    """Return what each labelled recording shows, and what is worth a remark: those left out, and why.
+    """Return the change of each labelled recording, and messages about those left out.
 
     Parameters
     ----------
     labelled : sequence of LabelledRecording
     references : sequence of PreparedRecording
-        Of the diagnosis, for those that bring none.
+        Those of the diagnosis, for labelled recordings without a reference.
     conditions : sequence of Condition
-        That are diagnosed: compared in the same ways, on the same channels.
+        Conditions under diagnosis: labelled recordings are compared in the same ways, on the same channels.
     twin : Twin
     cache : Path or None
-        Folder that keeps what was computed, by the content of the files; None: nothing is kept.
+        Folder that keeps results by the content of the files; None: nothing is kept.
     fresh : bool
-        Compute anew what the folder holds.
+        Compute again what the folder holds.
     """
     ways = sorted({c.has_reference for c in conditions})
     channels = tuple(conditions[0].now.channels)
@@ -132,7 +132,7 @@ def _change(
     if kept is not None:
         return kept
     now = reduce_recording(prepared)
-    # The diagnosed recordings' channels; all its own where it has none of them.
+    # The diagnosed recordings' channels, or all of its own where it has none of them.
     now = now.of_channels([name for name in channels if name in now.channels] or now.channels)
     facts = facts_of(prepared, now, twin)
     healthy = list(shared) if labelled.reference is None else [read_healthy(PreparedRecording(labelled.reference))[0]]
@@ -193,40 +193,41 @@ def _read_kept(folder: Path, key: str, label: str) -> LabelledChange | None:
 
 
 # --------------------
-# What they add.
+# The evidence they add.
 # --------------------
 
 
 WEIGHT = 0.2
-"""Of a log-likelihood ratio: its directions are not independent. On a simulator left out log loss with two labelled
-recordings of each effect is 0.89, 0.81, 0.92 with 0.1, 0.2, 0.4 (58 cases), and 1.21 without."""
+"""Weight of a log-likelihood ratio, whose directions are not independent. On a simulator left out, the log loss with
+two labelled recordings of each effect is 0.89, 0.81 and 0.92 for weights of 0.1, 0.2 and 0.4 (58 cases), and 1.21
+without them."""
 
 
 def labelled_support(log_ratios: FloatArray) -> float:
-    """Return ln of the mean over a label's recordings of r^w: the nearest of them speaks loudest.
+    """Return ln of the mean of r^w over a label's recordings, which the nearest of them dominates.
 
-    They are kept apart, for one effect at two places, or of two severities, looks like neither in the middle.
+    They are kept separate, since one effect at two places, or with two severities, resembles neither on average.
     """
     weighted_logs = WEIGHT * log_ratios
     return float(np.logaddexp.reduce(weighted_logs)) - log(len(weighted_logs))
 
 
 MAX_SPEED_RATIO = 1.25
-"""Ratio of speeds up to which recordings of a label are compared first."""
+"""Ratio of speeds within which recordings of a label are preferred."""
 
 
 @dataclass(frozen=True)
 class LabelledEvidence:
-    """What labelled recordings say of those that are diagnosed.
+    """The evidence from labelled recordings on those under diagnosis.
 
     Parameters
     ----------
     counts : mapping
-        Label → recordings.
+        Label → number of recordings.
     ratios : mapping
         Label → `labelled_support`, mean over the operating conditions.
     alike : mapping
-        Label that nothing was learned of → how far recognition says the same of these recordings as of those, 0 to 1.
+        Label outside the learned population → agreement of recognition between both kinds of recordings, 0 to 1.
     """
 
     counts: Mapping[str, int]
@@ -235,7 +236,7 @@ class LabelledEvidence:
 
 
 def labelled_evidence(conditions: Sequence[Condition], labelled: Sequence[LabelledChange]) -> LabelledEvidence:
-    """Return what labelled recordings say of the conditions, see `LabelSpace`."""
+    """Return the evidence from labelled recordings on the conditions, see `LabelSpace`."""
     labels = list(dict.fromkeys(change.label for change in labelled))
     ratios: dict[str, list[float]] = {label: [] for label in labels}
     alike: dict[str, list[float]] = {}
@@ -268,10 +269,10 @@ def _speed_ratio(change: LabelledChange, condition: Condition) -> float:
 def with_labelled(
     probabilities: Mapping[str, float], ratios: Mapping[str, float], alike: Mapping[str, float]
 ) -> dict[str, float]:
-    """Return the probabilities with what labelled recordings say, likeliest first: p_c ∝ p_c exp(s_c).
+    """Return the probabilities updated with labelled recordings, most probable first: p_c ∝ p_c exp(s_c).
 
-    A label that nothing was learned of enters with p = max_c p_c times how much recognition says the same of the
-    recording as of those with that label.
+    A label outside the learned population enters with p = max_c p_c times the agreement of recognition's
+    probabilities between the recording and those with that label.
 
     Parameters
     ----------
@@ -280,7 +281,7 @@ def with_labelled(
     ratios : mapping
         Label → s, see `labelled_support`.
     alike : mapping
-        Label that nothing was learned of → 0 … 1.
+        Label outside the learned population → agreement, 0 to 1.
     """
     top = max(probabilities.values())
     prior = dict(probabilities) | {name: top * share for name, share in alike.items()}

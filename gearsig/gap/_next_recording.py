@@ -1,4 +1,4 @@
-"""Which further recording would tell the two likeliest effects apart, by the model."""
+"""Which further recording would separate the two most probable effects, according to the model."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ from gearsig.gap._simulator import HasFurtherPlaces, OperatingCondition, Twin, p
 from gearsig.gap._trials import PROCESSES, Reduced, Task, TriedEffect, TwinRun, finished_runs, n_compared, rounded
 
 FACTORS = ((1.0, 0.3), (1.0, 0.6), (0.6, 1.0), (1.4, 1.0))
-"""Speeds and torques that are looked at, over those of the first recording, beside the recordings' own."""
+"""Speeds and torques evaluated in addition to the recordings' own, relative to those of the first recording."""
 
 LENGTH_RATIO = 0.6
-"""Length of these runs over that of a trial: only how far two effects lie apart is asked, and a third of a diagnosis's
-time went into it."""
+"""Length of these runs relative to a trial: only the distance between two effects is needed, and a third of a
+diagnosis's time was spent on it."""
 
 MIN_DISTANCE_RATIO = 1.2
-"""Times the distance that there is now, from which a further point is worth naming."""
+"""Minimum ratio to the present distance for a further point to be worth naming."""
 
 PRESENT_SENSORS = ""
-"""Stands for the rig's own sensors together among names of channels."""
+"""Stands for all of the rig's own sensors among names of channels."""
 
 
 def next_recordings(
@@ -47,17 +47,18 @@ def next_recordings(
     *,
     simulate: Callable[..., Sequence[Reduced | str]] = finished_runs,
 ) -> tuple[NextRecording, ...]:
-    """Return points and places at which both effects lie further apart than in the recordings there are, best first.
+    """Return points and places at which both effects are further apart than in the present recordings, best first.
 
-    Both fitted effects are simulated at the recordings' own and at other speeds and torques, with a further sensor at
-    each place that the twin has. A sensor is named only if it shows more than any that there is. Its housing is a drawn
-    one: what is compared is how far from gears and bearings it sits. One channel is held against the floors of several.
+    Both fitted effects are simulated at the recordings' own and at other speeds and torques, with an additional sensor
+    at each place that the twin offers. A sensor is named only if it separates the effects better than any existing one.
+    Its simulated housing is hypothetical: the comparison reflects its distance from gears and bearings. One channel is
+    compared using the floors of several.
 
     Parameters
     ----------
-    first, second : Tried
+    first, second : TriedEffect
     titles : (str, str)
-        Of both effects, for people.
+        Titles of both effects.
     twin : Twin
     conditions : sequence of Condition
     simulate : callable
@@ -93,14 +94,14 @@ def next_recordings(
         for channel, apart in _informative_sensors(distances, places, now, best_sensor):
             place = places.get(channel, "")
             text = _text(
-                point, place, f"{titles[0]} and {titles[1]} lie {apart:.2g}", now, is_new=point not in present_points
+                point, place, f"{titles[0]} and {titles[1]} are {apart:.2g}", now, is_new=point not in present_points
             )
             recordings.append(NextRecording(point, (first.name, second.name), apart, now, text, place))
     return tuple(sorted(recordings, key=lambda of_first: -of_first.standard_deviations)[:5])
 
 
 def _distinct(points: Sequence[OperatingCondition]) -> list[OperatingCondition]:
-    """Return the points without those at nearly the speed and torque of one before them."""
+    """Return the points without those at nearly the same speed and torque as an earlier one."""
     distinct: list[OperatingCondition] = []
     for point in points:
         if not any(same_condition(point, before) for before in distinct):
@@ -109,7 +110,7 @@ def _distinct(points: Sequence[OperatingCondition]) -> list[OperatingCondition]:
 
 
 def _distances(conditions: Sequence[Condition], first: Reduced | str, second: Reduced | str) -> dict[str, float]:
-    """Return the distance of two simulations on the rig's own sensors together, and on each sensor alone."""
+    """Return the distance of two simulations on all of the rig's own sensors, and on each sensor alone."""
     if not (isinstance(first, Reduced) and isinstance(second, Reduced)):
         return {}
     alone = {name: _family_distance(conditions, change - second.alone[name]) for name, change in first.alone.items()}
@@ -119,7 +120,7 @@ def _distances(conditions: Sequence[Condition], first: Reduced | str, second: Re
 def _informative_sensors(
     distances: Mapping[str, float], places: Mapping[str, str], now: float, best_sensor: float
 ) -> Iterator[tuple[str, float]]:
-    """Yield the rig's own sensors, and the best further one if it shows more than they, where it is worth it."""
+    """Yield the rig's own sensors, and the best additional one if it is better, where the gain is worth it."""
     with_present_sensors = distances.get(PRESENT_SENSORS, 0.0)
     if with_present_sensors >= MIN_DISTANCE_RATIO * now:
         yield PRESENT_SENSORS, with_present_sensors
@@ -139,7 +140,7 @@ def _text(point: OperatingCondition, place: str, apart: str, now: float, *, is_n
 
 
 def _family_distance(conditions: Sequence[Condition], difference: FloatArray) -> float:
-    """Root of the sum over families of the mean squared difference in floors."""
+    """Return the root of the sum over families of the mean squared difference in floors."""
     n = n_compared(conditions)
     names = conditions[0].change.names[:n]
     squares = (difference[:n] / conditions[0].floor.of(names)) ** 2
@@ -147,16 +148,16 @@ def _family_distance(conditions: Sequence[Condition], difference: FloatArray) ->
 
 
 # --------------------
-# What helps besides another speed, load or place: by what is confused, not by the model.
+# Steps other than another speed, load or place, chosen by which effects are confused, not by the model.
 # --------------------
 
 
 LIKELY = 0.1
-"""Probability from which an effect is one of those to be told apart."""
+"""Probability from which an effect counts as one of those to be separated."""
 
 PASSED_ON = ("transfer_path", "tooth_wear", "surface_roughness", "sliding_friction", "bearing_clearance")
 AROUND_A_SHAFT = ("unbalance", "eccentricity", "misalignment")
-"""Effects that are taken for each other."""
+"""Groups of effects that are mistaken for each other."""
 
 
 def next_steps(
@@ -169,17 +170,17 @@ def next_steps(
     is_labelled: bool,
     has_run_up: bool = False,
 ) -> tuple[NextStep, ...]:
-    """Return what would tell the likely causes apart, best first; nothing where there is no gap.
+    """Return steps that would separate the likely causes, best first; empty where there is no gap.
 
     Parameters
     ----------
     outcome : GapOutcome
     causes : sequence of GapCause
     points : sequence of OperatingCondition
-        Of the recordings.
+        Points of the recordings.
     has_reference, has_encoders, is_labelled, has_run_up : bool
-        Whether every recording has a healthy reference; both shafts an encoder; recordings of the rig are labelled; a
-        run-up of the healthy machine was given, or the simulator cannot run up beside it.
+        Whether every recording has a healthy reference; both shafts have an encoder; recordings of the rig are
+        labelled; a run-up of the healthy machine was given, or the simulator cannot run up for comparison.
     """
     if outcome is GapOutcome.NO_GAP:
         return ()

@@ -1,18 +1,19 @@
-"""The path from the mesh to the sensors, as a run-up of the healthy machine measures it beside the twin's.
+"""The path from the mesh to the sensors, measured by a run-up of the healthy machine and compared with the twin's.
 
-A run-up takes each mesh harmonic k over a range of frequencies. With Y_k what a sensor reads of it, against the shaft's
-angle, and X_k what the twin's sensor reads on a run-up of its own,
+A run-up takes each mesh harmonic k through a range of frequencies. With Y_k its reading on a sensor, relative to the
+shaft's angle, and X_k that on the twin's sensor during a run-up of its own,
 
     ln Y_k(f)/X_k(f) = a_k + h(f),
 
-a_k by how much load and flanks excite the harmonic otherwise, and where the angle begins; h the path, recorded over
-simulated, which harmonics that pass one frequency have in common. Both follow from weighted least squares, h straight
-between frequencies `KNOT` apart. What a fault changes beside mesh harmonic k reaches the sensor h(f) − h(f_k) louder
-and later, relative to that harmonic, than on the twin. Housings bend that by some decibels within a dozen orders.
+where a_k is the difference in excitation of the harmonic by load and flanks, including the origin of the angle, and h
+the path, recorded over simulated, which is common to all harmonics that pass a frequency. Both follow from weighted
+least squares, with h piecewise linear between frequencies `KNOT` apart. A change caused by a fault beside mesh harmonic
+k reaches the sensor h(f) − h(f_k) louder and later, relative to that harmonic, than on the twin. Housings change this
+by some decibels within a dozen orders.
 
-How far to believe it: even harmonics are held against what odd ones say and the other way round. The share λ of what
-they do that is told so, times that of points which are heard over noise, multiplies h: 0 to 1. What noise or a bad
-tachometer makes does not repeat.
+Its credibility: even harmonics are compared with the prediction from odd ones, and vice versa. The fraction λ that is
+predicted, times the fraction of points above the noise, multiplies h: 0 to 1. Effects of noise or of a bad tachometer
+do not repeat.
 """
 
 from __future__ import annotations
@@ -34,58 +35,59 @@ from gearsig.recording import Recording
 from gearsig.rig import SIDES, EncoderChannel, PulseTimes, TachometerChannel
 
 MIN_SPEED_RATIO = 1.5
-"""Highest over lowest speed: with less hardly two harmonics pass one frequency."""
+"""Ratio of highest to lowest speed: with less, hardly two harmonics pass the same frequency."""
 
 N_TRACKED = 12
 BLOCK_REVOLUTIONS, BLOCK_OVERLAP = 4.0, 0.75
 BESIDE = 1.5
-"""Orders from a mesh harmonic to where only noise is: the window's zeros take out whole orders."""
+"""Distance in orders from a mesh harmonic at which only noise remains: the window's zeros cancel whole orders."""
 
 MAX_CHANGE = 0.25
-"""Of the speed within a block, relative: one at which a run-up begins says nothing of any frequency."""
+"""Maximum relative change of speed within a block: a larger one, as at the start of a run-up, belongs to no
+frequency."""
 
 USED_BAND = 0.4
-"""Of the sampling rate, above which filters against aliasing cut."""
+"""Fraction of the sampling rate above which anti-aliasing filters cut off."""
 
 KNOT = 0.015
-"""Of ln f, between the frequencies that h is straight between: half of a housing's resonance."""
+"""Spacing in ln f of the knots of h: half the width of a housing's resonance."""
 
 OWN_SCATTER = 0.1
-"""Of ln Y_k/X_k without noise: loads and teeth that meet differ along a run-up."""
+"""Scatter of ln Y_k/X_k without noise: loads and the teeth in mesh vary along a run-up."""
 
 MAX_NOISE = 0.1
-"""Power of noise over that of a harmonic. What is hardly heard is as loud as the noise at all frequencies, whatever the
-harmonic: beside the twin's that would repeat, and pass for a path."""
+"""Power of noise relative to that of a harmonic. Hidden harmonics read the noise level at all frequencies, whatever
+their number; compared with the twin's, that would repeat and be taken for a path."""
 
 STIFFNESS, MEAN_STIFFNESS = 1.0, 1e-3
-"""Weights of the squared steps of h, and of h itself, beside residuals over `OWN_SCATTER`²."""
+"""Weights of the squared steps of h, and of h itself, relative to residuals over `OWN_SCATTER`²."""
 
 N_PASSES, DEGREES = 6, 4.0
-"""Over all points; degrees of freedom of Student's t."""
+"""Passes over all points; degrees of freedom of Student's t."""
 
 ANGLE_SOURCES = (PulseTimes, TachometerChannel, EncoderChannel)
 MAX_BLOCKS = 100.0
-"""Of a run-up, beside each other: longer ones have longer blocks and less noise."""
+"""Maximum number of blocks of a run-up: longer ones have longer blocks and less noise."""
 
 TWIN_CHANGE, TWIN_MARGIN, LONGEST_S = 0.15, 1.1, 20.0
-"""Relative change of the twin's speed within its slowest block; by how much it goes beyond the recorded speeds; of the
+"""Relative change of the twin's speed within its slowest block; margin beyond the recorded speeds; longest
 simulation."""
 
 MAX_SPEED_RATIO = 8.0
-"""Highest over lowest speed that is looked at: slower, next to nothing is heard of the mesh."""
+"""Maximum ratio of highest to lowest speed used: at lower speeds the mesh is almost inaudible."""
 
 MIN_POINTS = 8
-"""Of a harmonic at frequencies that others pass, for it to be held against them."""
+"""Minimum number of points of a harmonic, at frequencies that others pass, for it to be compared with them."""
 
 
 @dataclass(frozen=True)
 class MeasuredPath:
-    """What lies between mesh and sensors of a machine, over what the twin has there.
+    """The path between mesh and sensors of a machine, relative to that of the twin.
 
     Parameters
     ----------
     name : str
-        Of the run-up.
+        Name of the run-up.
     frequency_hz : array, (n_knots,)
     responses : mapping
         Channel → h at these frequencies, (n_knots,), complex: nepers and radians.
@@ -94,9 +96,9 @@ class MeasuredPath:
     excitation : mapping
         Channel → a_k, (n_harmonics,), complex.
     speed_hz : array, (n_blocks,)
-        Of the driver along the run-up.
+        Of the driver, along the run-up.
     levels : mapping
-        Channel → ln |Y_k|, (n_harmonics, n_blocks); nan where noise hides it.
+        Channel → ln |Y_k|, (n_harmonics, n_blocks); nan where it is hidden by noise.
     """
 
     name: str
@@ -108,7 +110,7 @@ class MeasuredPath:
     levels: Mapping[str, FloatArray]
 
     def of_sidebands(self, channels: Sequence[str], frame: GearFrame, speed_hz: float) -> ComplexArray:
-        """Return exp λ(h(f) − h(f_k)) of the orders beside each mesh harmonic; 1 where nothing was measured.
+        """Return exp λ(h(f) − h(f_k)) for the orders beside each mesh harmonic; 1 where nothing was measured.
 
         Parameters
         ----------
@@ -120,7 +122,7 @@ class MeasuredPath:
         Returns
         -------
         complex array, (n_channels, 2, N_HARMONICS, n_offsets)
-            As `mesh_sidebands`.
+            As in `mesh_sidebands`.
         """
         factors = np.ones((len(channels), len(SIDES), N_HARMONICS, len(OFFSETS)), dtype=np.complex128)
         harmonics = np.arange(1, N_HARMONICS + 1)[:, None]
@@ -134,15 +136,15 @@ class MeasuredPath:
         return factors
 
     def _at(self, channel: str, frequency_hz: FloatArray) -> ComplexArray:
-        """Return h; beyond what was measured it stays as it is at the ends."""
+        """Return h; beyond the measured range it keeps the values at the ends."""
         log_hz = np.log(np.maximum(frequency_hz, 1e-9))
         return _interpolated(log_hz, np.log(self.frequency_hz), self.responses[channel])
 
     def gain_scatter(self, unknown: float) -> float:
-        """Return α, by how much harmonics are excited otherwise than the twin's; `unknown` is α₀, without a path.
+        """Return α, the difference in excitation between harmonics and the twin's; `unknown` is α₀, without a path.
 
-        α² = λ var_k Re a_k + (1 − λ) α₀², mean over channels, and α₀² at most: harmonics that are hardly heard scatter.
-        See `gearsig.gap._waveform.gain_scatter` for α₀.
+        α² = λ var_k Re a_k + (1 − λ) α₀², mean over channels, and at most α₀², since weak harmonics scatter. See
+        `gearsig.gap._waveform.gain_scatter` for α₀.
         """
         variances = [
             value * float(np.var(self.excitation[name][:N_HARMONICS].real)) + (1.0 - value) * unknown**2
@@ -151,10 +153,11 @@ class MeasuredPath:
         return max(min(float(np.sqrt(np.mean(variances))), unknown), MIN_GAIN_SCATTER)
 
     def missed_db(self, reference: ReducedRecording) -> float:
-        """Return by how much mesh harmonics, beside each other, miss those of a healthy recording at its speed.
+        """Return the error in dB of the mesh harmonics, relative to each other, against a healthy recording.
 
-        Root of the mean square over harmonics and channels, each channel's mean taken out; nan where fewer than two
-        harmonics of a channel can be compared, as the run-up does not come through that speed.
+        The run-up is read at the speed of that recording. RMS over harmonics and channels, with each channel's mean
+        removed; nan where fewer than two harmonics of a channel can be compared, because the run-up does not pass
+        through that speed.
         """
         variances = []
         for name in set(self.levels) & set(reference.channels):
@@ -174,12 +177,12 @@ class MeasuredPath:
 
     @property
     def facts(self) -> PathFacts:
-        """For the report."""
+        """Summary for the report."""
         return PathFacts(self.name, float(self.frequency_hz[0]), float(self.frequency_hz[-1]), self.credibility)
 
 
 def measured_path(run_up: PreparedRecording, twin: Twin, *, seed: int) -> MeasuredPath:
-    """Return the path that a healthy run-up, or run-down, measures beside the twin's own.
+    """Return the path that a healthy run-up, or run-down, measures relative to the twin's own.
 
     Parameters
     ----------
@@ -187,21 +190,21 @@ def measured_path(run_up: PreparedRecording, twin: Twin, *, seed: int) -> Measur
         With a rig whose first pair is the twin's; its speed may vary in any way.
     twin : Twin
     seed : int
-        Twin and its specimen, as trials run: a quiet one, if there is.
+        Twin and its specimen, as in trials: a quiet one, if available.
 
     Raises
     ------
     InputError
         If the speed hardly varies.
     RefusalError
-        If no pulses or encoder tell the shaft's angle, or the simulator cannot run up.
+        If no pulses or encoder give the shaft's angle, or the simulator cannot run up.
     """
     recording, frame = run_up.recording, gear_frame(run_up.rig)
     if not isinstance(twin, CanRunUp):
-        raise RefusalError("the simulator cannot run up, so that a run-up measures no path", remedy="leave it out")
+        raise RefusalError("the simulator cannot run up, so a run-up measures no path", remedy="leave it out")
     if not isinstance(recording.speed_source, ANGLE_SOURCES):
         raise RefusalError(
-            f"{recording.name}: nothing tells the angle of a shaft against which phases could be measured",
+            f"{recording.name}: no shaft's angle is known, against which phases could be measured",
             remedy="record the run-up with a tachometer or an encoder",
         )
     n_revolutions = run_up.angle_of(frame.shafts[DRIVER]).n_revolutions
@@ -261,7 +264,7 @@ class _Track:
 
 
 def _tracked(prepared: PreparedRecording, frame: GearFrame, revolutions: float) -> _Track:
-    """Return mesh harmonics over blocks of so many revolutions, without those in which the speed leaps."""
+    """Return mesh harmonics over blocks of so many revolutions, without blocks in which the speed changes too fast."""
     signal = prepared.over_angle(frame.shafts[DRIVER])
     teeth = frame.teeth[DRIVER]
     n = min(N_TRACKED, int((signal.highest_order - BESIDE) / teeth))
@@ -277,7 +280,7 @@ def _tracked(prepared: PreparedRecording, frame: GearFrame, revolutions: float) 
     for name in signal.channel_names:
         tracks = track_orders(signal, name, orders.tolist(), revolutions_per_block=revolutions, overlap=BLOCK_OVERLAP)
         speed_hz = tracks[0].speed_rpm / 60.0
-        # What the speed does between the begin and the end of a block.
+        # Change of speed between the start and the end of a block.
         change = np.abs(np.gradient(np.log(np.maximum(speed_hz, 1e-9)))) / (1.0 - BLOCK_OVERLAP)
         is_used = (change <= MAX_CHANGE) & (speed_hz >= speed_hz.max() / MAX_SPEED_RATIO)
         amplitudes = np.array([track.amplitude * np.exp(1j * track.phase_rad) for track in tracks])[:, is_used]
@@ -293,7 +296,7 @@ def _tracked(prepared: PreparedRecording, frame: GearFrame, revolutions: float) 
 
 
 def _run_up_of(twin: CanRunUp, run_up: PreparedRecording, low_hz: float, high_hz: float, seed: int) -> Recording:
-    """Return the twin's run-up through the same speeds, slow enough for blocks to see one speed each."""
+    """Return the twin's run-up through the same speeds, slow enough for a nearly constant speed in each block."""
     slowest_block_s = BLOCK_REVOLUTIONS / low_hz
     recording, (pair, *_) = run_up.recording, run_up.rig.pairs
     torque_nm = run_up.rig.nominal_torque_nm(pair.driver)
@@ -308,37 +311,37 @@ def _run_up_of(twin: CanRunUp, run_up: PreparedRecording, low_hz: float, high_hz
 
 
 def _logarithm(lines: ComplexArray) -> ComplexArray:
-    """Return ln of amplitudes over the blocks, (n_harmonics, n_blocks), phases without leaps."""
+    """Return ln of amplitudes over the blocks, (n_harmonics, n_blocks), with unwrapped phases."""
     log: ComplexArray = np.log(np.maximum(np.abs(lines), 1e-300)) + 1j * np.unwrap(np.angle(lines), axis=1)
     return log
 
 
 def _at_speeds(lines: ComplexArray, speed_hz: FloatArray, at_hz: FloatArray) -> ComplexArray:
-    """Return ln of the amplitudes of a run-up at other speeds, straight over ln of the speed."""
+    """Return ln of the amplitudes of a run-up at other speeds, interpolated linearly over ln of the speed."""
     log_amplitudes, log_speed = _logarithm(lines), np.log(speed_hz)
     return np.array([_interpolated(np.log(at_hz), log_speed, row) for row in log_amplitudes])
 
 
 # --------------------
-# What harmonics have in common at one frequency.
+# The part that harmonics have in common at one frequency.
 # --------------------
 
 
 def _fitted(
     log_ratio: ComplexArray, log_hz: FloatArray, weights: FloatArray, knots: FloatArray
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Return a and h of ln Y_k/X_k = a_k + h(f), the sum over points of w |residual|² as small as may be.
+    """Return a and h of ln Y_k/X_k = a_k + h(f) that minimise the sum over points of w |residual|².
 
-    Phases are known but for whole turns: residuals' lie within half a turn. What lies far off counts less, as under
-    Student's t.
+    Phases are known except for whole turns: those of residuals are taken within half a turn. Outliers count less, as
+    under Student's t.
 
     Parameters
     ----------
     log_ratio : complex array, (n_harmonics, n_blocks)
     log_hz, weights : arrays of the same shape
-        Weights of 0 leave points out.
+        A weight of 0 omits a point.
     knots : array, (n_knots,)
-        Of ln f.
+        Values of ln f.
     """
     n_harmonics, n_points = log_ratio.shape
     columns = np.zeros((log_ratio.size, n_harmonics + len(knots)))
@@ -347,7 +350,7 @@ def _fitted(
     held = np.zeros((columns.shape[1], columns.shape[1]))
     step = np.diff(np.eye(len(knots)), axis=0)
     held[n_harmonics:, n_harmonics:] = STIFFNESS * step.T @ step + MEAN_STIFFNESS * np.eye(len(knots))
-    held[:n_harmonics, :n_harmonics] = 1e-9 * np.eye(n_harmonics)  # of harmonics that are left out
+    held[:n_harmonics, :n_harmonics] = 1e-9 * np.eye(n_harmonics)  # for omitted harmonics
     observed: ComplexArray = log_ratio.ravel()
     robust: FloatArray = np.ones(log_ratio.size)
     for _ in range(N_PASSES):
@@ -360,7 +363,7 @@ def _fitted(
 
 
 def _between(log_hz: FloatArray, knots: FloatArray) -> FloatArray:
-    """Return how much each knot counts at each frequency, straight between two, (n_points, n_knots)."""
+    """Return the linear interpolation weight of each knot at each frequency, (n_points, n_knots)."""
     place = np.interp(log_hz, knots, np.arange(len(knots)))
     return np.maximum(1.0 - np.abs(place[:, None] - np.arange(len(knots))[None, :]), 0.0)
 
@@ -370,10 +373,10 @@ def _within_half_a_turn(values: ComplexArray) -> ComplexArray:
 
 
 def _credibility(log_ratio: ComplexArray, log_hz: FloatArray, weights: FloatArray, knots: FloatArray) -> float:
-    """Return λ, the share of what harmonics do that those of the other parity say at the same frequencies.
+    """Return λ, the fraction of the harmonics' response that those of the other parity predict at the same frequencies.
 
-    λ = 1 − Σ ρ(e − h)/Σ ρ(e), 0 at least, with a line over ln f taken out, harmonic by harmonic: it bends nothing
-    within a dozen orders. ρ(e) = ln(1 + w |e|²/ν), as in the fit.
+    λ = 1 − Σ ρ(e − h)/Σ ρ(e), at least 0, with a line over ln f removed for each harmonic, as it hardly varies within a
+    dozen orders. ρ(e) = ln(1 + w |e|²/ν), as in the fit.
     """
     left = whole = 0.0
     for parity in (0, 1):
@@ -391,7 +394,7 @@ def _credibility(log_ratio: ComplexArray, log_hz: FloatArray, weights: FloatArra
 
 
 def _bent(values: ComplexArray, log_hz: FloatArray, weights: FloatArray) -> float:
-    """Return Σ ρ(e) of what a line over ln f leaves; phases about their mean, within half a turn of it."""
+    """Return Σ ρ(e) of the residuals from a line over ln f; phases about their mean, within half a turn."""
     mean_rad = np.angle(np.sum(weights * np.exp(1j * values.imag)))
     values = _within_half_a_turn(values - 1j * mean_rad)
     root = np.sqrt(weights)

@@ -1,4 +1,4 @@
-"""Where a recording differs from what it is compared with, place by place, each with its share."""
+"""Where a recording differs from its baseline, place by place, each with its share."""
 
 from __future__ import annotations
 
@@ -39,27 +39,27 @@ from gearsig.rig import SIDES
 from gearsig.severity import ShaftLines, find_event, load_calibration
 
 # --------------------
-# Which places of a gap come first: what stands out by itself, then by share, last what only follows from others.
+# Order of a gap's places: what stands out by itself, then by share, last what only follows from others.
 # --------------------
 
 
 SAME_ORDER = 0.02
-"""Relative: of one family of lines, however they were found."""
+"""Relative tolerance within which orders belong to the same family of lines, however they were found."""
 
 
 def ranked_places(places: Sequence[GapPlace], unexpected: Sequence[GapPlace] = ()) -> tuple[GapPlace, ...]:
-    """Return the places in the order in which somebody at the machine should read them.
+    """Return the places in the order in which someone at the machine should read them.
 
-    Families of impacts that stand out by themselves come first: no tolerance of a simulator makes them. A place of the
-    gap at the same order is the same family, and gives its sizes to it. Then come the other places, largest share
-    first; last those that say nothing of where or what to look for, since other places make them.
+    Families of impacts that stand out by themselves come first: no tolerance of a simulator produces them. A place of
+    the gap at the same order belongs to the same family and passes its sizes on to it. The other places follow, largest
+    share first. Those that merely follow from other places, and so give no hint where to look, come last.
 
     Parameters
     ----------
     places : sequence of GapPlace
-        Of the gap, with sizes and shares.
+        Places of the gap, with sizes and shares.
     unexpected : sequence of GapPlace
-        Found without a simulation, surest first.
+        Places found without a simulation, most certain first.
     """
     remaining, first = list(places), []
     for family in unexpected:
@@ -74,14 +74,14 @@ def _rank(place: GapPlace) -> tuple[bool, float]:
 
 
 def _same_family(place: GapPlace, unexpected: GapPlace) -> bool:
-    """Whether a line or an envelope's line lies at the family's order."""
+    """Whether a place is a line, of the residual or an envelope, at the family's order."""
     if place.kind not in (PlaceKind.ENVELOPE, PlaceKind.LINE) or not place.orders:
         return False
     return abs(place.orders[0] / unexpected.orders[0] - 1.0) < SAME_ORDER
 
 
 def _joined(unexpected: GapPlace, same: Sequence[GapPlace]) -> GapPlace:
-    """Return what stands out with the sizes of the largest place of the same family, and their shares together."""
+    """Return an unexpected place with the sizes of the largest place of the same family and the sum of their shares."""
     if not same:
         return unexpected
     largest = max(same, key=lambda place: place.share)
@@ -90,25 +90,26 @@ def _joined(unexpected: GapPlace, same: Sequence[GapPlace]) -> GapPlace:
 
 
 # --------------------
-# What lines of races and shafts say against causes that would make them, or would not.
+# Evidence from the lines of races and shafts for or against causes.
 # --------------------
 
 
 RACES = {"bearing_outer_race": "outer", "bearing_inner_race": "inner"}
-"""Effect → the order of its bearing that it shows at, see `BearingFrame`, and the family of lines there."""
+"""Effect → the race whose order it shows at, see `BearingFrame`, and whose family of lines it raises."""
 
 MISSED_RACE = 0.2
-"""Probability that a damaged race shows, and has no lines of its own: as `MISSED_FAULT`, of bearings alone."""
+"""Probability that a damaged race shows without raising its own lines: like `MISSED_FAULT`, for bearings alone."""
 
 
 def with_unchanged_races_lowered(
     probabilities: Mapping[str, float], conditions: Sequence[Condition]
 ) -> dict[str, float]:
-    """Return the probabilities with those of races lowered whose lines rose in none of the recordings.
+    """Lower the probabilities of races whose lines rose in none of the recordings.
 
-    Balls that roll over a spall make lines at the race's own order. A tooth that strikes once a turn makes lines at all
-    multiples of its shaft, in the same bands, and some of them lie within a race's slip: the features of all bearings
-    rise with them. What has no lines of its own is multiplied by `MISSED_RACE`; then all are scaled to 1.
+    Balls that roll over a spall produce lines at the race's order. A tooth that strikes once per revolution produces
+    lines at all multiples of its shaft's order in the same bands. Some of them fall within a race's slip, so the
+    features of all bearings rise with them. A race without lines of its own is multiplied by `MISSED_RACE`; then all
+    probabilities are scaled to add up to 1.
 
     Parameters
     ----------
@@ -122,26 +123,27 @@ def with_unchanged_races_lowered(
 
 
 MULTIPLES_OF_ONE = 0.2
-"""Probability that multiples of a shaft's order come with a force that turns with it: its supports bend unevenly."""
+"""Probability that multiples of a shaft's order accompany a force rotating with it, due to unevenly stiff supports."""
 
 CLEAR_MULTIPLE, STRONG_MULTIPLE = 2.0, 0.1
-"""Floors by which a multiple rises clearly, and its power beside the first order's from which it is no by-product."""
+"""Floors from which a multiple has clearly risen; power relative to the first order from which it is no by-product."""
 
 
 def without_multiples(
     probabilities: Mapping[str, float], effects: Mapping[str, GapEffect], conditions: Sequence[Condition]
 ) -> dict[str, float]:
-    """Return the probabilities with those of forces that turn with a shaft lowered where its multiples rose as well.
+    """Lower the probabilities of forces that rotate with a shaft where its multiples rose as well.
 
-    An unbalance makes the first order alone. Where the second or third of the same shaft rose clearly, and are strong
-    beside it, it is multiplied by `MULTIPLES_OF_ONE`; then all are scaled to 1.
+    An unbalance raises the first order only. Where the second or third order of the same shaft rose clearly and is
+    strong relative to the first, the probability is multiplied by `MULTIPLES_OF_ONE`; then all are scaled to add up to
+    1.
 
     Parameters
     ----------
     probabilities : mapping
         Cause → probability.
     effects : mapping
-        Effect → whether it is such a force.
+        Effect → its `GapEffect`, which states whether it is such a force.
     conditions : sequence of Condition
         Of one rig.
     """
@@ -162,9 +164,9 @@ def _multiples_rose(condition: Condition) -> bool:
 
 
 def _silent_races(condition: Condition) -> set[str]:
-    """Return the effects whose race has no lines that rose, and more than the shafts' own in the envelope did.
+    """Return the effects whose race has no lines that rose, in an envelope by more than the shafts' own.
 
-    Of a race that the rig file does not describe nothing is known.
+    Nothing can be said of a race that the rig file does not describe.
     """
     envelope, residual = _envelope_levels(condition), _residual_levels(condition)
     of_shafts = max(family.rise_db for family in _shafts(condition, envelope))
@@ -181,7 +183,7 @@ def _silent_races(condition: Condition) -> set[str]:
 
 
 # --------------------
-# Where exactly within one family of features. Sizes come later.
+# The exact place within one family of features; sizes are added later.
 # --------------------
 
 
@@ -204,36 +206,37 @@ def band_text(band_hz: tuple[float, float]) -> str:
 
 
 # --------------------
-# Which bearing, race or strange order: lines that no shaft repeats, in envelopes and in the residual.
+# Bearing, race or unrelated order: lines at no multiple of a shaft's order, in envelopes and in the residual.
 # --------------------
 
 
 RACE_WORDS = {"outer": "outer race", "inner": "inner race", "ball": "rolling elements", "cage": "cage"}
 MIN_SHARE_OF_A_FAMILY = 0.6
-"""A family's rise over that of the strongest line, from which on the line is taken for one of the family's."""
+"""A family's rise relative to that of the strongest line, from which that line is taken to be one of the family's."""
 MIN_OF_A_FAMILY_DB = 3.0
 MIN_OF_A_FAMILY = 3
-"""Lines free of the shafts' orders, of the four."""
+"""Number of the family's four lines that must be clear of the shafts' orders."""
 UPWARDS, N_SLIPS = 0.005, 41
-"""Rolling elements lag behind; only the contact angle brings an outer race's order up a little."""
+"""Upper limit of slip, and number of trials: rolling elements lag; only the contact angle raises an outer race's order
+slightly."""
 HIGHEST_MULTIPLE, MISSED = 12, 0.004
 MAX_OF_A_BAND = 0.5
-"""Of a band's new power in one line: it is a tone, not noise."""
+"""Fraction of a band's added power in one line above which it is a tone, not noise."""
 _LINE_WIDTH = 3
 
 
 @dataclass(frozen=True)
 class LineLevels:
-    """Lines over their floor, in dB and not below 0, of a recording and of what it is compared with.
+    """Line levels above their floor, in dB and at least 0, of a recording and of its baseline.
 
     Parameters
     ----------
     now, baseline : arrays, (n_rows, n_lines)
-        On the same orders.
+        Both on the same orders.
     step : float
-        Orders from line to line.
+        Spacing of the lines, in orders.
     taken : array, (n_lines,)
-        Which lie at a multiple of a shaft's order: what the averages left over.
+        Lines at a multiple of a shaft's order, where the averages leave a remainder.
     """
 
     now: FloatArray
@@ -251,7 +254,7 @@ class _StrongestRise:
 
 
 def locate_envelope(condition: Condition) -> GapPlace:
-    """Return whose order modulates what no shaft repeats."""
+    """Return the place of the order that modulates the non-synchronous part of the signal."""
     now, names = condition.now, tuple(condition.now.channels)
     levels = _envelope_levels(condition)
     levels, sign = _with_rising_change(levels, condition.over_floors[condition.strongest("envelope.")])
@@ -265,7 +268,7 @@ def locate_envelope(condition: Condition) -> GapPlace:
 
 
 def locate_line(condition: Condition) -> GapPlace:
-    """Return which line of the residual changed most: the supply's, a bearing's, or a strange one."""
+    """Return the residual line that changed most: of the mains, of a bearing, or of unknown origin."""
     strongest = condition.strongest("line.outer", "line.inner", "line.ball", "line.cage", "line.strange", "hum")
     levels, sign = _with_rising_change(_residual_levels(condition), condition.over_floors[strongest])
     line = _strongest(condition, levels, fundamental=False)
@@ -275,7 +278,7 @@ def locate_line(condition: Condition) -> GapPlace:
 
 
 def line_within(condition: Condition, band_hz: tuple[float, float], change_db: float) -> GapPlace | None:
-    """Return the line that makes up most of what a band of the residual has more; None where it is noise."""
+    """Return the line that makes up most of a band's added residual power; None where it is noise."""
     if change_db <= 0:
         return None
     now = condition.now
@@ -295,7 +298,7 @@ def line_within(condition: Condition, band_hz: tuple[float, float], change_db: f
     levels = _residual_levels(condition)
     rise = float((levels.now - levels.baseline)[row, min(peak, len(levels.taken) - 1)])
     place = _line(condition, _StrongestRise(_named_order_text(condition, order), rise, (order,), row), 1.0)
-    # What no average of the gears holds of the mesh, as it swells and fades, is theirs all the same.
+    # Mesh components that swell and fade are missing from the averages, but still belong to the gears.
     is_of_the_mesh = _mesh_harmonic(condition, order) is not None
     return replace(place, kind=PlaceKind.BAND, band_hz=band_hz) if is_of_the_mesh else place
 
@@ -333,14 +336,14 @@ def _levels(condition: Condition, ratios: list[FloatArray], step: float, step_be
 
 
 def _with_rising_change(levels: LineLevels, size: float) -> tuple[LineLevels, float]:
-    """Return the comparison the other way round, and −1, where it went down."""
+    """Return the comparison reversed, and −1, where the level went down."""
     if size >= 0:
         return levels, 1.0
     return replace(levels, now=levels.baseline, baseline=_widened(levels.now)), -1.0
 
 
 def _widened(levels: FloatArray) -> FloatArray:
-    """Return each line's largest neighbour, so that a line that moved by one counts as the same."""
+    """Return the maximum over each line and its neighbours, so that a line that moved by one bin counts as the same."""
     from scipy.ndimage import maximum_filter1d
 
     widened: FloatArray = maximum_filter1d(levels, 3, axis=1)
@@ -348,17 +351,17 @@ def _widened(levels: FloatArray) -> FloatArray:
 
 
 def _family_or_line(family: _StrongestRise, line: _StrongestRise) -> _StrongestRise:
-    """Return the family if it is heard beside the strongest line, or that line is one of its multiples."""
+    """Return the family if it is strong enough beside the strongest line, or if that line is one of its multiples."""
     harmonic = family.orders[0] / line.orders[0] if family.orders else 0.0
     if family.rise_db < MIN_OF_A_FAMILY_DB or (harmonic > 1.5 and abs(harmonic / round(harmonic) - 1.0) < MISSED):
-        return line  # of a lower line's harmonics, the family has but some
+        return line  # the family is only some of a lower line's harmonics
     multiple = line.orders[0] / family.orders[0]
     is_multiple = round(multiple) in range(1, HIGHEST_MULTIPLE + 1) and abs(multiple / round(multiple) - 1.0) < MISSED
     return family if is_multiple or family.rise_db > MIN_SHARE_OF_A_FAMILY * line.rise_db else line
 
 
 def _best_race(condition: Condition, levels: LineLevels) -> _StrongestRise:
-    """Return the bearing's family whose lines rose most."""
+    """Return the bearing family whose lines rose most."""
     races = [_StrongestRise("", 0.0, (), 0)]
     now, baseline = _widened(levels.now), levels.baseline
     for bearing in condition.now.frame.bearings:
@@ -371,9 +374,10 @@ def _best_race(condition: Condition, levels: LineLevels) -> _StrongestRise:
 
 
 def _family_rise(rise: FloatArray, order: float, levels: LineLevels) -> tuple[float, int, float]:
-    """Return the second smallest rise among a family's lines, its row, and the order with slip.
+    """Return the second smallest rise among a family's lines, its row, and the order including slip.
 
-    One strange line that falls on a harmonic makes no family; one harmonic that is missing does not spoil it.
+    A single unrelated line that falls on a harmonic does not make a family; a single missing harmonic does not break
+    one.
     """
     slips = order * (1.0 + np.linspace(-SLIP, UPWARDS, N_SLIPS))
     lines = np.rint(np.outer(slips, np.arange(1, N_FAMILY + 1)) / levels.step).astype(np.intp)
@@ -383,14 +387,14 @@ def _family_rise(rise: FloatArray, order: float, levels: LineLevels) -> tuple[fl
     values = np.where(free, rise[:, lines], np.inf)  # (row, slip, harmonic)
     second = np.sort(values, axis=2)[:, :, 1]
     second = np.where(free.sum(axis=1) >= MIN_OF_A_FAMILY, second, -np.inf)
-    # Of slips that are as good, the one whose lines are strongest in all.
+    # Of equally good slips, take the one whose lines are strongest on average.
     mean = np.where(free, rise[:, lines], 0.0).mean(axis=2)
     row, best = np.unravel_index(int(np.argmax(second + 1e-3 * mean)), second.shape)
     return float(max(second[row, best], 0.0)), int(row), float(slips[best])
 
 
 def _shafts(condition: Condition, levels: LineLevels) -> list[_StrongestRise]:
-    """Return the shafts' families, where the features say that they changed."""
+    """Return the shafts' families, with a rise of 0 dB where their features did not change."""
     families, rise = [], _widened(levels.now) - levels.baseline
     for side, order in enumerate(condition.now.frame.shaft_orders):
         lines = np.rint(order * np.arange(1, N_SHAFT_FAMILY + 1) / levels.step).astype(np.intp)
@@ -408,7 +412,7 @@ def _multiples(order: float, n: int) -> tuple[float, ...]:
 
 
 def _strongest(condition: Condition, levels: LineLevels, *, fundamental: bool) -> _StrongestRise:
-    """Return the line that rose most of those at no multiple of a shaft's order."""
+    """Return the line that rose most, among those at no multiple of a shaft's order."""
     rise = np.where(levels.taken, -np.inf, levels.now - levels.baseline)
     row, line = (int(i) for i in np.unravel_index(int(np.argmax(rise)), rise.shape))
     change = float(rise[row, line])
@@ -419,14 +423,14 @@ def _strongest(condition: Condition, levels: LineLevels, *, fundamental: bool) -
 
 
 def _mesh_harmonic(condition: Condition, order: float) -> int | None:
-    """Return the number of the mesh harmonic that lies at an order."""
+    """Return the number of the mesh harmonic at an order, None if there is none."""
     mesh = condition.now.frame.teeth[DRIVER]
     k = max(round(order / mesh), 1)
     return k if abs(order - k * mesh) <= 1.5 * condition.now.order_step else None
 
 
 def _named_order_text(condition: Condition, order: float) -> str:
-    """Return whose order it is by itself, without a family of multiples."""
+    """Return the words that say to what a single order belongs, apart from any family of multiples."""
     frame, step = condition.now.frame, 1.5 * condition.now.order_step
     if (k := _mesh_harmonic(condition, order)) is not None:
         return f"at order {order:.4g}, {'that' if k == 1 else f'{k} times that'} of the mesh"
@@ -442,7 +446,7 @@ def _named_order_text(condition: Condition, order: float) -> str:
 
 
 def _fundamental(level: FloatArray, line: int) -> int:
-    """Return the line of which this one is a harmonic, where there is one half as high in dB."""
+    """Return the line of which this one is a harmonic, where one has at least half its level in dB."""
     for divisor in range(HIGHEST_MULTIPLE, 1, -1):
         first = max(round(line / divisor) - 1, 1)
         lower = first + int(np.argmax(level[first : first + 3]))
@@ -454,7 +458,7 @@ def _fundamental(level: FloatArray, line: int) -> int:
 def _is_mains_order(condition: Condition, order: float) -> bool:
     speed_hz = condition.now.speed_hz
     lines = np.array([k * supply for supply in MAINS_HZ for k in range(1, N_MAINS_HARMONICS + 1)])
-    # Twice what a supply wanders: the order was found on a grid of lines, at a mean speed.
+    # Twice the variation of a supply, since the order was found on a grid of lines at a mean speed.
     width = np.maximum(2.0 * MAINS_TOLERANCE * lines, condition.now.order_step * speed_hz)
     return bool((np.abs(order * speed_hz - lines) < width).any())
 
@@ -476,12 +480,12 @@ def _hum(condition: Condition) -> GapPlace:
 
 FURTHEST_SIDEBAND = 12
 WORTH_NAMING = 0.25
-"""Of the largest change of power: what changed by less is not named, be its ratio ever so large."""
+"""Fraction of the largest change in power below which a change is not named, however large its ratio."""
 MAX_ORDERS = 6
 MIN_CHANGE_DB = 1.0
-"""Of a sideband or shaft order; features that saw more saw noise."""
+"""Minimum change of a sideband or shaft order; where features show more, it is noise."""
 EXPLAINED = 0.5
-"""Of the largest change of power, what a shaft's own lines must hold of it."""
+"""Fraction of the largest change in power that a shaft's own lines must account for."""
 
 
 def locate_mesh(condition: Condition) -> GapPlace | None:
@@ -502,12 +506,12 @@ def locate_mesh(condition: Condition) -> GapPlace | None:
     if strongest is None:
         return None
     row, best, change = strongest
-    if abs(change) < MIN_CHANGE_DB:  # the lines hardly moved: what was scored is a ratio, of harmonics or of sensors
+    if abs(change) < MIN_CHANGE_DB:  # hardly any change: a ratio of harmonics or sensors was scored
         scored = condition.strongest("mesh.", "alike.")
         change = condition.change_db[scored]
         title = f"{feature_text(scored, frame)}, {by_decibels(change)}"
         if scored.startswith("alike."):
-            title = "what lies beside the mesh harmonics, which themselves hardly moved"
+            title = "orders around the mesh harmonics, which themselves hardly changed"
         return GapPlace(PlaceKind.MESH, title, change, orders=_harmonic_order(scored, frame))
     total = condition.change_db["mesh.total"]
     alike = condition.has_reference and abs(total) > 0.7 * abs(change) and total * change > 0
@@ -519,13 +523,13 @@ def locate_mesh(condition: Condition) -> GapPlace | None:
 
 
 def _harmonic_order(feature: str, frame: GearFrame) -> tuple[float, ...]:
-    """Return the order of the one mesh harmonic that a feature is of; none for what is of all."""
+    """Return the order of the mesh harmonic that a feature describes; empty if it describes all of them."""
     harmonic = Feature.of(feature).detail.rpartition(".")[2]
     return (float(int(harmonic) * frame.teeth[DRIVER]),) if harmonic.isdigit() else ()
 
 
 def locate_sidebands(condition: Condition, side: int) -> GapPlace | None:
-    """Return about which mesh harmonic a shaft's sidebands changed most, and which of them."""
+    """Return the mesh harmonic around which a shaft's sidebands changed most, and the orders of these sidebands."""
     now, before = _lines_of_both(condition, side, relative=not condition.has_reference)
     frame = condition.now.frame
     teeth, n = frame.teeth[side], now.power.shape[1]
@@ -567,7 +571,7 @@ def locate_shaft(condition: Condition, side: int) -> GapPlace | None:
 
 @dataclass(frozen=True)
 class _Lines:
-    """Lines of a shaft's average, (n_channels, n_orders): all power, the shaft's own, and the noise put under it."""
+    """Powers of the lines of a shaft's average, (n_channels, n_orders): total, synchronous, and assumed noise."""
 
     power: FloatArray
     synchronous: FloatArray
@@ -586,7 +590,7 @@ class _Lines:
 
 
 def _lines_of_both(condition: Condition, side: int, *, relative: bool) -> tuple[_Lines, _Lines]:
-    """Return the lines of both on the same orders; `relative` to each channel's mesh harmonics."""
+    """Return the lines of recording and baseline on the same orders; `relative` to each channel's mesh harmonics."""
     names = tuple(condition.now.channels)
     now, before = (_lines(run, names, side, relative=relative) for run in (condition.now, condition.baseline))
     n = min(now.power.shape[1], before.power.shape[1])
@@ -604,10 +608,10 @@ def _lines(reduced: ReducedRecording, names: Sequence[str], side: int, *, relati
 
 
 def _strongest_group(now: _Lines, before: _Lines, groups: Sequence[list[int]]) -> tuple[int, int, float] | None:
-    """Return channel, group and change in dB of the largest ratio among those whose power changed much.
+    """Return channel, group and change in dB of the largest ratio among the groups whose power changed substantially.
 
-    Channels are weighed by their own largest change: a sensor with a small gain sees the same. What changed must be the
-    shaft's own lines; None where it is noise, or leaks into the average.
+    Each channel is judged by its own largest change, since a sensor with a small gain sees the same. The shaft's own
+    lines must account for the change; None where it is noise or leaks into the average.
     """
     now_sums, before_sums = now.of_groups(groups), before.of_groups(groups)
     floor = np.maximum(np.maximum(now_sums.floor, before_sums.floor), 1e-300)
@@ -622,7 +626,7 @@ def _strongest_group(now: _Lines, before: _Lines, groups: Sequence[list[int]]) -
 
 
 def _largest_lines(moved: FloatArray, lines: list[int]) -> list[int]:
-    """Return the lines of one group whose power changed most, the largest first."""
+    """Return the lines of one group whose power changed most, largest first."""
     amounts = np.abs(moved[lines])
     order = np.argsort(amounts)[::-1][:MAX_ORDERS]
     return [lines[i] for i in order if amounts[i] >= WORTH_NAMING * amounts.max()]
@@ -643,18 +647,18 @@ def _channel(condition: Condition, row: int) -> str:
 
 
 # --------------------
-# Which band, what of the speed, what of the amplitudes.
+# Places in the bands, in the speed and in the amplitudes.
 # --------------------
 
 
 MIN_SPEED_CHANGE = 3e-4
-"""Relative; a steadier speed is as good as constant."""
+"""Relative; a smaller variation counts as constant speed."""
 CLIPPED_SHARE = 1e-3
-"""Share of samples within half a percent of the extreme; of a vibration with random peaks, some 1e-5 lie there."""
+"""Share of samples within half a percent of the extreme; in a vibration with random peaks it is about 1e-5."""
 
 
 def locate_band(condition: Condition) -> GapPlace:
-    """Return the band of the residual that changed most: its level, or how impulsive it is."""
+    """Return the band of the residual that changed most, in level or in kurtosis."""
     name = condition.strongest("floor.band", "floor.kurtosis")
     kind, _, number = Feature.of(name).detail.partition(".")
     band = condition.now.bands_hz[int(number) - 1]
@@ -680,7 +684,7 @@ def _most_changed_channel(condition: Condition, band: int, *, kurtosis: bool) ->
 
 
 def locate_speed(condition: Condition) -> GapPlace | None:
-    """Return what the speed does otherwise; None where it hardly does anything."""
+    """Return how the speed varies differently; None where it hardly varies."""
     name = condition.strongest("speed.")
     change = condition.change_db[name]
     drift, swing, _, frequency_hz = condition.now.speed
@@ -693,13 +697,13 @@ def locate_speed(condition: Condition) -> GapPlace | None:
 
 
 def locate_tail(condition: Condition) -> GapPlace:
-    """Return how the amplitudes are distributed otherwise."""
+    """Return how the distribution of amplitudes differs."""
     name = condition.strongest("raw.near", "raw.kurtosis")
     change = condition.change_db[name]
     channel = max(condition.now.channels, key=lambda c: float(condition.now.channels[c].tail[:, 2].mean()))
     if name == "raw.near_the_extreme":
         piled = float(condition.now.channels[channel].tail[:, 2].mean()) > CLIPPED_SHARE
-        clipping = ", as clipping makes them" if change > 0 and piled else ""
+        clipping = ", as clipping causes them" if change > 0 and piled else ""
         title = f"samples close to the largest amplitude{clipping}, {by_decibels(change)}"
         return GapPlace(PlaceKind.TAIL, title, change, channel=channel, follows=not clipping)
     tails = "heavier" if change > 0 else "lighter"
@@ -708,33 +712,33 @@ def locate_tail(condition: Condition) -> GapPlace:
 
 
 # --------------------
-# At which angle and tooth a shaft's average changed: energy tooth by tooth.
+# Angle and tooth at which a shaft's average changed: energy tooth by tooth.
 # --------------------
 
 
 STANDS_OUT = 6.0
-"""Energy within one pitch over the median pitch's from which on one tooth is named: of teeth that all
-differ by chance, the largest has some 5."""
+"""Energy within one pitch relative to the median pitch, from which a single tooth is named; where all teeth differ by
+chance, the largest reaches about 5."""
 
 ALL_ROUND = (".level", ".elsewhere", ".peak")
-"""Ends of the names of features that say how large a pattern is, and not what shape it has."""
+"""Endings of the names of features that measure the size of a pattern, not its shape."""
 
 MIN_SYNCHRONOUS_SHARE = 0.3
-"""Of a pattern's power in the shaft's own lines, below which it is no pattern of teeth."""
+"""Fraction of a pattern's power in the shaft's own lines, below which it is no pattern of teeth."""
 
 
 @dataclass(frozen=True)
 class ToothPattern:
-    """Energy over a shaft's angle, of what tells its teeth apart.
+    """Energy over a shaft's angle of the component in which its teeth differ.
 
     Parameters
     ----------
     energy : array, (n_channels, n)
-        Mean square within one pitch over the mesh harmonics' power.
+        Mean square within one pitch, relative to the power of the mesh harmonics.
     lines : ShaftLines
-        What it was made of.
+        The lines it was computed from.
     synchronous_share : float
-        Of its power, in lines that keep their phase from block to block.
+        Fraction of its power in lines that keep their phase from block to block.
     """
 
     energy: FloatArray
@@ -743,13 +747,13 @@ class ToothPattern:
 
     @property
     def prominence(self) -> float:
-        """Largest energy over the median, of all channels together."""
+        """Largest energy over the median energy, mean over channels."""
         mean = self.energy.mean(axis=0)
         return float(mean.max() / max(float(np.median(mean)), 1e-300))
 
     @property
     def place_rev(self) -> float:
-        """Where the tooth engages that stands out, 0 to 1: the answer follows a little later."""
+        """Position, 0 to 1, at which the prominent tooth engages; the response follows a little later."""
         centre = find_event(self.lines).centre_rev
         return (centre - load_calibration().lag_pitches / self.lines.teeth) % 1.0
 
@@ -761,7 +765,7 @@ def pattern_of_recording(reduced: ReducedRecording, side: int) -> ToothPattern:
 
 
 def changed_pattern(now: ReducedRecording, healthy: ReducedRecording, side: int) -> ToothPattern:
-    """Return the pattern of the difference from a healthy recording, turned so that the same teeth meet."""
+    """Return the pattern of the difference from a healthy recording, rotated so that the same teeth coincide."""
     turned, _ = turned_difference(now, healthy, side)
     return _pattern(now, side, difference_residuals(now, turned, side), turned)
 
@@ -780,7 +784,7 @@ def _pattern(
 def locate_tooth(condition: Condition, side: int) -> GapPlace | None:
     """Return the angle and tooth that stands out, or that the teeth's pattern changed all round.
 
-    None where most of the pattern is noise, or leaks into the average.
+    None where most of the pattern is noise or leaks into the average.
     """
     frame, now = condition.now.frame, condition.now
     pattern = (
@@ -800,34 +804,34 @@ def locate_tooth(condition: Condition, side: int) -> GapPlace | None:
 
 
 def distributed_place(condition: Condition, side: int, shaft: str, channel: str) -> GapPlace:
-    """Return that no tooth in particular stands out, with the figure of the feature that was scored."""
+    """Return the place where no single tooth stands out, with the change of the feature that was scored."""
     scored = condition.strongest(*(f"{kind}.{SIDES[side]}." for kind in ("tooth", "change", "surprise")))
     level = f"tooth.{SIDES[side]}.level"
     if not scored.endswith(ALL_ROUND) and abs(condition.over_floors[level]) > 1.0:
         scored = level
     change = condition.change_db[scored]
     if not scored.endswith(ALL_ROUND):
-        title = f"shape of the teeth's pattern of {shaft}, no tooth in particular"
+        title = f"shape of the tooth pattern of {shaft}, no tooth in particular"
         return GapPlace(PlaceKind.TOOTH, title, change, channel=channel, follows=True)
     of_difference = not scored.startswith("tooth.")
-    by = f"{by_decibels(change)} against what healthy machines change by" if of_difference else by_decibels(change)
-    subject = "what has changed of the pattern of the teeth" if of_difference else "pattern of the teeth"
+    by = f"{by_decibels(change)} relative to changes of healthy machines" if of_difference else by_decibels(change)
+    subject = "change in the tooth pattern" if of_difference else "tooth pattern"
     return GapPlace(PlaceKind.TOOTH, f"{subject} of {shaft} all round, {by}", change, channel=channel)
 
 
 MIN_SHARE = 0.01
 
 REPEATING = ("floor.to_signal", "floor.total", "raw.level")
-"""Features that only repeat what others say of a place."""
+"""Features that only repeat what others say about a place."""
 
 
 def gap_places(condition: Condition) -> tuple[GapPlace, ...]:
-    """Return where a recording differs, largest share first; last what only follows from other places.
+    """Return where a recording differs, largest share first, and last what only follows from other places.
 
-    A place is a family of features; its size s_f is their mean of high order over the floors, and its share
-    max(s_f² − 1, 0)/Σ max(s² − 1, 0): what does not exceed the larger floor has none, nor has what only follows from
-    other places (nan), which is not in the sum. Shares add up to less than 1
-    where some of what changed is no more than noise and leakage in a place, or below 1 % of the whole.
+    A place is a family of features. Its size s_f is their mean of high order over the floors, and its share max(s_f² −
+    1, 0)/Σ max(s² − 1, 0). A family that does not exceed the larger floor has no share. One that only follows from
+    other places has none either (nan) and is not in the sum. Shares add up to less than 1 where some of the change is
+    only noise and leakage, or below 1 % of the whole.
 
     Parameters
     ----------
@@ -836,7 +840,7 @@ def gap_places(condition: Condition) -> tuple[GapPlace, ...]:
     Raises
     ------
     RefusalError
-        If the reference was taken at another speed.
+        If the reference was taken at a different speed.
     """
     names, now = condition.change.names, condition.now
     distances, ratios = (np.array([*by_name.values()]) for by_name in (condition.change_db, condition.over_floors))
@@ -857,7 +861,7 @@ def gap_places(condition: Condition) -> tuple[GapPlace, ...]:
 
 
 def _merged(places: list[GapPlace]) -> list[GapPlace]:
-    """Return the places with those put together to which two families of features led."""
+    """Return the places, with those that two families of features lead to merged into one."""
     merged: dict[tuple[PlaceKind, str, bool], GapPlace] = {}
     for place in sorted(places, key=lambda duplicate: -duplicate.structural):
         key = (place.kind, place.shaft, place.follows)

@@ -1,4 +1,4 @@
-"""The population of drawn machines, and what is learned from it."""
+"""The population of randomly drawn machines, and what is learned from it."""
 
 from __future__ import annotations
 
@@ -35,55 +35,55 @@ from gearsig.gap._report import NONE, UNKNOWN
 from gearsig.recording import sha256_of
 
 # --------------------
-# Drawn machines, healthy and with every effect; changes of features and causes.
+# Drawn machines, healthy and with every effect; changes of features and their causes.
 # --------------------
 
 
 MAX_BYTES = 1_000_000_000
-"""Of its arrays; they have nineteen million."""
+"""Limit of its arrays, which have nineteen million elements."""
 MAKE_POPULATION = "in a checkout of the project: python -m app.studies.gap.population make, some hours"
 INDEPENDENT = "independent"
-"""Simulator of the rig that makes blind cases; only its development gears are in the population."""
+"""Simulator of the rig used for blind cases; only its development gears are in the population."""
 BY_HAND = "by hand"
-"""Source of effects that are put into a healthy machine's recordings as the literature describes them."""
+"""Source of effects added to a healthy machine's recordings as described in the literature."""
 
 LEFT_OUT: ContextVar[str] = ContextVar("LEFT_OUT", default="")
-"""Simulator whose machines nothing may be learned from, see `without_machines_of`."""
+"""Simulator whose machines must not be learned from, see `without_machines_of`."""
 
 
 def population_file() -> Path:
-    """Return where the population is kept: as GEARSIG_POPULATION says, or else among the user's kept files.
+    """Return the file of the population: as GEARSIG_POPULATION states, otherwise in the user's cache.
 
-    What it teaches comes with the library (`LEARNED_FILE`); it is asked only by the studies that make that, and by
-    diagnoses that leave a simulator out.
+    What is learned from it is shipped with the library (`LEARNED_FILE`). Only the studies that produce that file, and
+    diagnoses that leave a simulator out, need the population itself.
     """
     return Path(environ.get("GEARSIG_POPULATION") or cache_folder("population") / "population.npz")
 
 
 @dataclass(frozen=True)
 class Population:
-    """Recordings of machines drawn at random, of which the cause of every change is known.
+    """Recordings of randomly drawn machines, in which the cause of every change is known.
 
     Parameters
     ----------
     rigs : array, (n,)
-        Which machine a row is of.
+        Machine of each row.
     simulators : array of str, (n,)
-        That the machine is of.
+        Simulator of the machine.
     causes : array of str, (n,)
         Effect, "none" or "unknown".
     by_hand : bool array, (n,)
-        Effects that no simulator made, see `BY_HAND`.
+        Effects that were not made by a simulator, see `BY_HAND`.
     change_names, feature_names : tuple of str
-        Of the columns; the first changes are the differences of the features.
+        Names of the columns; the first changes are the differences of the features.
     changes, change_scatter : arrays, (n, n_changes)
         Against a healthy recording of the same machine on another day, and standard errors.
     features, feature_scatter : arrays, (n, n_features)
         Of the recording itself, and standard errors.
     simulated, simulated_scatter : arrays, (n, n_features)
-        Of the twin that knows the rig file only.
+        Of the twin, which knows only the rig file, and standard errors.
     loads_n_per_mm : array, (n,)
-        Of the teeth.
+        Tooth loads.
     """
 
     rigs: NDArray[np.int64]
@@ -102,23 +102,23 @@ class Population:
 
     @cached_property
     def sources(self) -> NDArray[np.str_]:
-        """Return what made each effect: a simulator, or `BY_HAND`."""
+        """Source of each effect: a simulator, or `BY_HAND`."""
         return np.where(self.by_hand, BY_HAND, self.simulators)
 
     def of_rows(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> Population:
-        """Return some of the recordings."""
+        """Return the population reduced to some of its recordings."""
         by_row = {field.name for field in fields(self)} - {"change_names", "feature_names"}
         return replace(self, **{name: getattr(self, name)[rows] for name in by_row})
 
     @cached_property
     def credibility(self) -> FloatArray:
-        """How much of what the simulation says of each feature holds for healthy machines, 0 to 1, (n_features,)."""
+        """Fraction of each simulated feature that holds for healthy machines, 0 to 1, (n_features,)."""
         healthy = self.causes == NONE
         return credibility_of(self.features[healthy], self.simulated[healthy])
 
     @cached_property
     def gaps(self) -> FloatArray:
-        """What the simulation, as far as it is credible, leaves of the features, (n, n_features)."""
+        """Features less the credible part of the simulation, (n, n_features)."""
         gaps: FloatArray = self.features - self.credibility * self.simulated
         return gaps
 
@@ -129,14 +129,14 @@ class Population:
         return scatter
 
     def floor(self, *, with_reference: bool) -> StructuralFloor:
-        """Return how far healthy machines differ from themselves on another day, or from what their simulation says."""
+        """Return the floor of healthy machines against themselves on another day, or against their simulation."""
         names, rows = (self.change_names, self.changes) if with_reference else (self.feature_names, self.gaps)
         return StructuralFloor.of_healthy(names, rows[self.causes == NONE])
 
 
 @contextmanager
 def without_machines_of(simulator: str) -> Iterator[None]:
-    """Let nothing be known of a simulator's machines: how well others prepare for it is seen then."""
+    """Exclude a simulator's machines from what is known, to show how well other machines prepare for them."""
     token = LEFT_OUT.set(simulator)
     try:
         yield
@@ -145,12 +145,12 @@ def without_machines_of(simulator: str) -> Iterator[None]:
 
 
 def load_population(path: Path | None = None) -> Population:
-    """Return the population that was made, but for what `without_machines_of` leaves out; see `population_file`.
+    """Return the population without what `without_machines_of` leaves out; see `population_file`.
 
     Raises
     ------
     InputError
-        If there is no such file or it belongs to other features.
+        If the file is missing or belongs to other features.
     """
     return _read(path or population_file(), LEFT_OUT.get())
 
@@ -180,30 +180,30 @@ def _read(path: Path, left_out: str) -> Population:
 
 
 # --------------------
-# What is learned from it.
+# Learning from the population.
 # --------------------
 
 
 N_TREES = 150
 ROW_SHARE, FEATURE_SHARE, MIN_IN_A_LEAF = 0.4, 0.3, 6
-"""Of the rows that each tree is fitted to, of the columns that each split may choose from, and the least rows that a
-split leaves on either side. Two forests of 200 trees that differ in their random numbers alone have log losses on blind
-cases that scatter by 0.02, and name three in a hundred differently."""
+"""Fraction of the rows that each tree is fitted to, fraction of the columns that each split may choose from, and
+minimum number of rows on either side of a split. The log losses on blind cases of two forests of 200 trees that differ
+in their random numbers alone scatter by 0.02, and three in a hundred are named differently."""
 
 LINEAR_SHRINKAGE = 0.2
-"""How far the discriminant's covariance is drawn towards a diagonal one."""
+"""Shrinkage of the discriminant's covariance towards its diagonal."""
 
 EVENNESS = 0.5
-"""0: every row counts alike; 1: every source of a cause does."""
+"""0: all rows have equal weight; 1: all sources of a cause have equal weight."""
 
 MIN_SIZE = 0.6
-"""Structural floors, below which a drawn effect changed nothing that could be learned."""
+"""Structural floors below which a drawn effect changed nothing from which to learn."""
 
 _SEED = 0
 
 
 def learn(population: Population, *, n_trees: int = N_TREES) -> Learned:
-    """Return all that a diagnosis asks of a population."""
+    """Return everything that a diagnosis uses of a population."""
     return Learned(
         population.feature_names,
         population.credibility,
@@ -212,7 +212,7 @@ def learn(population: Population, *, n_trees: int = N_TREES) -> Learned:
 
 
 def fit_classifier(population: Population, *, with_reference: bool, n_trees: int = N_TREES) -> EffectClassifier:
-    """Fit to a population, and to the same with driver and driven gear exchanged.
+    """Fit a classifier to a population and its copy with driver and driven gear exchanged.
 
     Extremely randomised trees: P. Geurts, D. Ernst, L. Wehenkel, "Extremely randomized trees", 2006. The linear
     discriminant with a shrunken covariance: J. H. Friedman, "Regularized discriminant analysis", 1989.
@@ -264,9 +264,9 @@ def fit_classifier(population: Population, *, with_reference: bool, n_trees: int
 
 
 def balanced_source_weights(sources: NDArray[np.str_], causes: NDArray[np.str_]) -> FloatArray:
-    """Return weights of rows by which the sources of a cause count more alike than they have rows: n^(−`EVENNESS`).
+    """Return row weights that reduce the imbalance between the sources of a cause: n^(−`EVENNESS`).
 
-    None of them shows an effect as it is; what they have in common is what holds for a machine.
+    No source shows an effect exactly as it is; what they have in common holds for real machines.
     """
     _, kind, counts = np.unique(np.char.add(np.char.add(sources, "/"), causes), return_inverse=True, return_counts=True)
     weights: FloatArray = counts[kind] ** -EVENNESS
@@ -275,7 +275,7 @@ def balanced_source_weights(sources: NDArray[np.str_], causes: NDArray[np.str_])
 
 
 def _is_visible(floor: StructuralFloor, changes: FloatArray, causes: NDArray[np.str_]) -> NDArray[np.bool_]:
-    """Return which rows to learn from: an effect that changes nothing would only teach that nothing is that effect."""
+    """Return which rows to learn from: an effect without a change would only teach that no change is that effect."""
     rows = floor.from_centre(floor.names, changes) / floor.of(floor.names)
     sizes = np.array([soft_size(floor.names, row) for row in rows]) / floor.floor_size(floor.names)
     is_visible: NDArray[np.bool_] = (sizes > MIN_SIZE) | np.isin(causes, (NONE, UNKNOWN))
@@ -283,12 +283,12 @@ def _is_visible(floor: StructuralFloor, changes: FloatArray, causes: NDArray[np.
 
 
 def load_learned() -> Learned:
-    """Return what comes with this version; within `without_machines_of`, what the other machines teach.
+    """Return what is shipped with this version or, within `without_machines_of`, learned from the other machines.
 
     Raises
     ------
     InputError
-        If there is no such file or it is damaged; if a simulator is left out and there is no population.
+        If the file is missing or damaged; if a simulator is left out and there is no population.
     """
     return _learned(LEFT_OUT.get())
 
@@ -309,6 +309,6 @@ def _learned(left_out: str) -> Learned:
         kept = learn(population)
         for old in path.parent.glob(f"without_{left_out}-*.npz"):
             old.unlink(missing_ok=True)
-        with suppress(InputError):  # where the folder cannot be written, the next process learns anew
+        with suppress(InputError):  # if the folder is not writable, the next process learns again
             write_learned(kept, path)
     return kept

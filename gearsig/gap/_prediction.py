@@ -1,4 +1,4 @@
-"""Changes that a simulator predicts of an effect over its severity; the severity that fits the observed ones."""
+"""Changes that a simulator predicts for an effect over its severity, and the severity that fits the observed ones."""
 
 from __future__ import annotations
 
@@ -17,43 +17,43 @@ from gearsig.gap._simulator import AddedEffect
 from gearsig.rig import SIDES
 
 N_SEVERITIES = 41
-"""Severities that are tried, over the whole range and again about the best."""
+"""Severities tried over the whole range, and again around the best."""
 
 MIN_TRIED = 0.3
-"""Times the least simulated severity."""
+"""Lowest tried severity, relative to the lowest simulated one."""
 
 LARGEST_DISTANCE = 6.0
-"""In floors; what is further from a prediction counts little more: one wild feature must not decide."""
+"""In floors; larger distances from a prediction hardly count more, so that one outlier cannot decide."""
 
 INTERVAL_COST = 2.71
-"""Rise of the cost, a sum of squared standard deviations, that bounds the 90 % interval, 1.645², where the best fit is
-as near as floors allow, which is a cost of 1 for each family; in proportion more where it is not."""
+"""Rise of the cost, a sum of squared standard deviations, that bounds the 90 % interval: 1.645² where the best fit is
+as close as floors allow, which is a cost of 1 per family; proportionally more otherwise."""
 
 LEVELS_DB = tuple(float(level) for level in (*range(-30, 30, 5), *range(30, 61, 10)))
 LEVEL_SCATTER_DB = 10.0
-"""By how much louder than on the twin what an effect adds may be on the real machine, whose path from gears and shafts
-to the sensor nobody knows; and its standard deviation, for each operating condition."""
+"""Levels of an effect on the real machine relative to the twin, since the path from gears and shafts to the sensor is
+not known, and their standard deviation for each operating condition."""
 
 GROUNDS_DB = (0.0, -25.0, -50.0)
-"""By how much less a shaft's lowest orders shake a machine than one on soft mounts; the last is rigid ground. None is
-likelier than another."""
+"""Reduction of a shaft's lowest orders relative to a machine on soft mounts; the last is for rigid ground. All are
+equally likely."""
 
 WAYS_DB = tuple((level, ground) for ground in GROUNDS_DB for level in LEVELS_DB)
-"""Level and ground: what is not known of how an effect reaches a sensor."""
+"""Level and ground: the unknowns of an effect's path to a sensor."""
 
 
 @dataclass(frozen=True)
 class ObservedChange:
-    """One condition's observed distances from what is compared with.
+    """One condition's observed distances from its baseline.
 
     Parameters
     ----------
     condition : int
-        Which operating condition.
+        Index of the operating condition.
     distances : array, (n,)
-        dB, from where healthy machines lie.
+        dB, from the centre of healthy machines.
     floors : array, (n,)
-        dB: structural floor and repeatability together.
+        dB: structural and repeatability floor combined.
     """
 
     condition: int
@@ -69,20 +69,20 @@ class ObservedChange:
 
 @dataclass(frozen=True)
 class EffectPath:
-    """An effect with one set of options: the change it makes, over its severity, at every condition.
+    """An effect with one set of options: its change over severity, at every condition.
 
     Parameters
     ----------
     name : str
     options : mapping
     severities : array, (k,)
-        Rising, above 0.
+        Ascending, positive.
     distances : tuple of arrays, (n_ways, k, n)
-        dB from the healthy machine; one per condition.
+        Distances from the healthy machine in dB; one array per condition.
     names : tuple of str
-        Of the n features.
+        Names of the n features.
     levels_db : tuple of float
-        Of each of `WAYS_DB`, or whatever the distances were made for.
+        Level of each of `WAYS_DB`, or of other ways for which the distances were computed.
     """
 
     name: str
@@ -95,7 +95,7 @@ class EffectPath:
     def at(self, severities: FloatArray, condition: int) -> FloatArray:
         """Return the predicted distances, (n_ways, n_severities, n).
 
-        Straight over ln s between simulations, and proportional to s below them.
+        They are interpolated linearly over ln s between simulations, and proportional to s below them.
         """
         table = self.distances[condition]
         place = np.interp(np.log(severities), np.log(self.severities), np.arange(len(self.severities)))
@@ -106,22 +106,22 @@ class EffectPath:
         return predicted
 
     def tried(self) -> FloatArray:
-        """Return the severities that a fit looks at."""
+        """Return the severities that a fit evaluates."""
         return np.geomspace(MIN_TRIED * self.severities[0], self.severities[-1], N_SEVERITIES)
 
 
 @dataclass(frozen=True)
 class Fit:
-    """The severity of a path that fits best.
+    """The best-fitting severity of a path.
 
     Parameters
     ----------
     path : EffectPath
     severity : Interval
     cost : float
-        The least: squared distances between observed and predicted, in standard deviations.
+        Minimum cost: squared distances between observed and predicted, in standard deviations.
     ways : mapping
-        Condition → which of `WAYS_DB`, or of the path's levels where it was made for others.
+        Condition → index in `WAYS_DB`, or in the path's own levels.
     """
 
     path: EffectPath
@@ -135,14 +135,14 @@ class Fit:
         return AddedEffect(self.path.name, float(f"{self.severity.value:.4g}"), dict(self.path.options))
 
     def at(self, condition: int) -> FloatArray:
-        """Return the predicted distances; at a condition that it was not fitted to, at the level of the others."""
+        """Return the predicted distances; at a condition outside the fit, at the median level of the others."""
         by_level = sorted(self.ways.values(), key=lambda way: self.path.levels_db[way])
         way = self.ways.get(condition, by_level[len(by_level) // 2])
         predicted: FloatArray = self.path.at(np.array([self.severity.value]), condition)[way, 0]
         return predicted
 
     def at_level_of(self, observed: ObservedChange) -> Fit:
-        """Return the fit with the level that suits another condition best; severity and options stay."""
+        """Return the fit with the best level for another condition; severity and options stay."""
         predicted = self.path.at(np.array([self.severity.value]), observed.condition)[:, 0]
         costs = _squares(observed.distances - predicted, observed.floors) @ _family_weights(self.path.names)
         way = int(np.argmin(costs + _level_costs(self.path)))
@@ -155,15 +155,15 @@ def paths_of(
     distances: Sequence[FloatArray],
     levels_db: tuple[float, ...] = (0.0,),
 ) -> tuple[EffectPath, ...]:
-    """Return the paths that an effect's candidates make: one for each set of options.
+    """Return the paths formed by an effect's candidates: one for each set of options.
 
     Parameters
     ----------
     names : tuple of str
-        Of the features.
+        Names of the features.
     candidates : sequence of AddedEffect
     distances : sequence of arrays, (n_ways, n_candidates, n)
-        One per condition.
+        One array per condition.
     levels_db : tuple of float
     """
     groups: dict[tuple[tuple[str, float | str], ...], list[int]] = {}
@@ -187,14 +187,14 @@ def paths_of(
 
 
 def fit_effect(paths: Iterable[EffectPath], observed: Sequence[ObservedChange]) -> Fit:
-    """Return the best fit over all paths of an effect: that of the least cost, see `fit_path`.
+    """Return the best fit over all paths of an effect: that of minimum cost, see `fit_path`.
 
     Parameters
     ----------
     paths : iterable of EffectPath
         The effect with each set of options.
     observed : sequence of ObservedChange
-        Of one or several conditions.
+        From one or several conditions.
     """
     return min((fit_path(path, observed) for path in paths), key=lambda fit: fit.cost)
 
@@ -202,16 +202,17 @@ def fit_effect(paths: Iterable[EffectPath], observed: Sequence[ObservedChange]) 
 def fit_path(path: EffectPath, observed: Sequence[ObservedChange]) -> Fit:
     """Return the likely severity, with the interval in which the cost rises little.
 
-    s = exp(Σ w_i ln s_i/Σ w_i), w = exp(−(cost − least)/2): where many fit alike, the least cost is one of them by
-    chance.
+    s = exp(Σ w_i ln s_i/Σ w_i), w = exp(−(cost − minimum)/2): where many severities fit similarly, the minimum is one
+    of them by chance.
 
-    How loud the effect is beside the twin's is fitted at each condition, within what paths differ by: two sensors of
-    one gearbox show one unbalance 20 dB apart, and so do two speeds. What an effect changes, and which part of it more
-    than another, is the simulation's.
+    The level relative to the twin is fitted for each condition, within the variation between transfer paths: two
+    sensors on one gearbox show the same unbalance 20 dB apart, and so do two speeds. Which features an effect changes,
+    and in what proportion, comes from the simulation.
 
-    Where the best fit misses by more than floors allow, the simulation is wrong by as much, and the interval is as much
-    wider (R. T. Birge, The calculation of errors by the method of least squares, *Phys. Rev.* 40, 1932). Where the
-    largest severity that was simulated fits as well it has no upper end, and where the least does, it begins at 0.
+    Where the best fit misses by more than floors allow, the simulation's error is of that size, and the interval is
+    widened in proportion (R. T. Birge, The calculation of errors by the method of least squares, *Phys. Rev.* 40,
+    1932). The interval has no upper end where the largest simulated severity fits as well, and starts at 0 where the
+    smallest does.
     """
     coarse = path.tried()
     tried = np.geomspace(*_bracket(coarse, _is_near_best(path, _costs(path, coarse, observed)[0])), N_SEVERITIES)
@@ -223,15 +224,15 @@ def fit_path(path: EffectPath, observed: Sequence[ObservedChange]) -> Fit:
     if near[-1] and tried[-1] == coarse[-1]:
         high = math.inf
     likelihood = np.exp(-0.5 * (costs - costs.min()))
-    best = round(float(likelihood @ np.arange(len(tried)) / likelihood.sum()))  # they are even in ln s
+    best = round(float(likelihood @ np.arange(len(tried)) / likelihood.sum()))  # uniform in ln s
     fitted = {change.condition: int(row[best]) for change, row in zip(observed, ways, strict=True)}
     return Fit(path, Interval(float(tried[best]), low, high), float(costs.min()), fitted)
 
 
 def _is_near_best(path: EffectPath, costs: FloatArray) -> NDArray[np.bool_]:
-    """Return at which severities the cost has risen by no more than is likely.
+    """Return which severities have a cost within the likely range of the minimum.
 
-    That is `INTERVAL_COST`, and as many times more as the best fit misses by.
+    The range is `INTERVAL_COST`, multiplied by the factor by which the best fit misses.
     """
     misses = max(1.0, float(costs.min()) / len(family_members(path.names)))
     near: NDArray[np.bool_] = costs <= costs.min() + misses * INTERVAL_COST
@@ -239,7 +240,7 @@ def _is_near_best(path: EffectPath, costs: FloatArray) -> NDArray[np.bool_]:
 
 
 def _bracket(tried: FloatArray, near: NDArray[np.bool_]) -> tuple[float, float]:
-    """Return the first severities on either side of those that are near; the ends where there are none."""
+    """Return the first severities outside the near ones on either side, or the ends of the range."""
     rows = np.flatnonzero(near)
     return float(tried[max(rows[0] - 1, 0)]), float(tried[min(rows[-1] + 1, len(tried) - 1)])
 
@@ -249,7 +250,7 @@ def _costs(
 ) -> tuple[FloatArray, NDArray[np.intp]]:
     """Return the costs, mean over conditions, (n_severities,), and the best ways, (n_conditions, n_severities).
 
-    Σ over families of the mean squared distance, and the squared level over its standard deviation.
+    The cost is the sum over families of the mean squared distance, plus the squared level over its standard deviation.
     """
     weights = _family_weights(path.names)
     costs, ways = [], []
@@ -262,7 +263,7 @@ def _costs(
 
 
 def _level_costs(path: EffectPath) -> FloatArray:
-    """Return the levels' squares in standard deviations."""
+    """Return the squared levels in standard deviations."""
     squares: FloatArray = (np.array(path.levels_db) / LEVEL_SCATTER_DB) ** 2
     return squares
 
@@ -270,7 +271,7 @@ def _level_costs(path: EffectPath) -> FloatArray:
 def _squares(misses: FloatArray, floors: FloatArray) -> FloatArray:
     """Return ρ(u), u = miss/floor, in squared standard deviations: u² up to 6, from there 36 (1 + ln(u²/36)).
 
-    It never ceases to rise: a fit must find its way to a change that is larger than anything that it starts from.
+    It keeps rising, so that a fit can find its way to a change larger than any that it starts from.
     """
     distances = np.abs(misses / floors)
     near = np.minimum(distances, LARGEST_DISTANCE)
@@ -280,7 +281,7 @@ def _squares(misses: FloatArray, floors: FloatArray) -> FloatArray:
 
 
 def _family_weights(names: tuple[str, ...]) -> FloatArray:
-    """Return what makes a sum over features one over families of their means."""
+    """Return weights that turn a sum over features into a sum over families of their means."""
     weights = np.zeros(len(names))
     for rows in family_members(names).values():
         weights[rows] = 1.0 / len(rows)
@@ -288,7 +289,7 @@ def _family_weights(names: tuple[str, ...]) -> FloatArray:
 
 
 def family_square(names: tuple[str, ...], misses: FloatArray, observed: ObservedChange, used: FloatArray) -> float:
-    """Return Σ_f mean_{i∈f} ρ(u_i), u = miss/floor in standard deviations; `used` is 1 for what counts."""
+    """Return Σ_f mean_{i∈f} ρ(u_i), u = miss/floor in standard deviations; `used` is 1 for features that count."""
     squares, total = _squares(misses, observed.floors), 0.0
     for rows in family_members(names).values():
         if used[rows].sum() > 0:
@@ -297,12 +298,12 @@ def family_square(names: tuple[str, ...], misses: FloatArray, observed: Observed
 
 
 # --------------------
-# What an effect that was simulated on a twin would change on the real machine, whose own unevenness is another.
+# Transfer of an effect from the twin to the real machine, whose own irregularity is different.
 # --------------------
 
 
 _STRONGEST = {"shaft.{}.strongest": "shaft.{}.strongest.to_mesh", "sideband.{}.strongest": "sideband.{}.6to12"}
-"""How far the strongest line stands out, and the power by which an effect raises it."""
+"""Prominence of the strongest line, and the power through which an effect raises it."""
 
 _BANDS, _KURTOSIS = "floor.band.", "floor.kurtosis."
 _OF_A_PATTERN = ("prominence", "second", "kurtosis", "width", "below_mesh", "centroid")
@@ -317,34 +318,34 @@ def predicted_on_baseline(
     level_db: float = 0.0,
     ground_db: float = 0.0,
 ) -> FloatArray:
-    """Return the changes that a simulated effect makes on the real machine's own baseline.
+    """Return the changes that a simulated effect causes on the real machine's own baseline.
 
     Powers of different causes add: P = P_real + (P_with − P_healthy). On a twin whose teeth are rougher than the real
-    ones, or whose floor is lower, the same effect changes the decibels less or more. Mesh harmonics pass through the
-    same resonances as those of the healthy machine and change by the same decibels each; what they do together hangs on
-    which of them the real machine has. What falls, falls by the same decibels.
+    ones, or whose floor is lower, the same effect changes the levels less or more. Mesh harmonics pass through the same
+    resonances as those of the healthy machine, so each changes by the same decibels; their total depends on which of
+    them the real machine has. Decreases are transferred unchanged in decibels.
 
     Parameters
     ----------
     names : sequence of str
-        Of the changes, see `change_feature_values`; those of patterns last, or none.
+        Names of the changes, see `change_feature_values`; those of patterns last, or none.
     change : array, (…, n)
-        dB, with the effect less healthy, both simulated. `change.…`: the pattern's own value.
+        dB, with the effect minus healthy, both simulated. `change.…`: the pattern's own value.
     simulated, real : mapping
-        Feature → value of the healthy twin and of the healthy machine.
+        Feature → value for the healthy twin and for the healthy machine.
     usual : mapping
-        `change.…` → what mere repetition gives.
+        `change.…` → value from repetition alone.
     level_db : float
-        By which everything the effect adds is louder on the real machine than on the twin: its path is another.
+        How much louder an effect is on the real machine than on the twin, because of the different path.
     ground_db : float
-        By which the lowest shaft orders are louder still: it stands otherwise. There a machine moves as a whole, as
-        force over mass, and not by the path on which the mesh reaches a sensor: what is added does not fall with a
-        mesh that is quieter than the twin's.
+        How much louder still the lowest shaft orders are, because of the different support. At these orders the machine
+        moves as a whole, as force over mass, not through the path from the mesh to a sensor: the added level does not
+        decrease with a mesh that is quieter than the twin's.
 
     Returns
     -------
     array, (…, n)
-        dB; `change.…` from what repetition gives.
+        dB; `change.…` relative to repetition alone.
     """
     simulated_change = dict(zip(names, np.moveaxis(change, -1, 0), strict=True))
     moved = dict(simulated_change)
@@ -382,13 +383,13 @@ def _power(decibels: FloatArray | float) -> FloatArray:
 
 
 def _added(change_db: FloatArray, simulated_db: float, real_db: float, gain_db: float) -> FloatArray:
-    """Return the change that the same added power makes on the real baseline; what falls, falls alike."""
+    """Return the change that the same added power causes on the real baseline; decreases are unchanged in decibels."""
     risen = (_power(simulated_db + np.maximum(change_db, 0.0)) - _power(simulated_db)) * _power(gain_db - real_db)
     return np.minimum(change_db, 0.0) + 10.0 * np.log10(1.0 + risen)
 
 
 def _mesh(change: Mapping[str, FloatArray], real: Mapping[str, float], level_db: float) -> dict[str, FloatArray]:
-    """Return the mesh harmonics' changes: what is added comes as much louder, on the harmonics that the machine has."""
+    """Return the mesh harmonics' changes: added power is scaled by the level, on the harmonics it has."""
     shares = [name for name in change if name.startswith("mesh.share.")]
     levels = np.array([_added(change[name] + change["mesh.total"], 0.0, 0.0, level_db) for name in shares])
     powers = np.array([_power(real[name]) for name in shares])
@@ -397,12 +398,12 @@ def _mesh(change: Mapping[str, FloatArray], real: Mapping[str, float], level_db:
 
 
 def _part(change_db: FloatArray) -> FloatArray:
-    """Return which part of the power is the effect's, if that raised it by so many decibels."""
+    """Return the effect's fraction of the power that it raised by so many decibels."""
     return 1.0 - 1.0 / _power(np.maximum(change_db, 0.0))
 
 
 def _prominence_rise(born_db: float, alone_db: FloatArray, more_db: FloatArray) -> FloatArray:
-    """Return by how much the strongest stands out further: as much as it rose, no further than by itself alone."""
+    """Return the increase in prominence: the rise of the line, but not beyond its prominence in the simulation."""
     return np.minimum(born_db + np.maximum(more_db, 0.0), np.maximum(alone_db, born_db)) - born_db
 
 
@@ -413,7 +414,7 @@ def _tooth(
     simulated: Mapping[str, float],
     real: Mapping[str, float],
 ) -> dict[str, FloatArray]:
-    """Return the shape of a shaft's pattern where the effect's own is added to what the real teeth are born with."""
+    """Return the shape of a shaft's pattern where the effect's own is added to that of the real teeth."""
     peak, elsewhere = moved[f"{name}.peak"], moved[f"{name}.elsewhere"]
     part = _part(moved[f"{name}.level"])
     shapes = {
@@ -428,7 +429,7 @@ def _tooth(
 def _pattern(
     name: str, change: Mapping[str, FloatArray], usual: Mapping[str, float], pattern_db: float, level_db: float
 ) -> dict[str, FloatArray]:
-    """Return how far the pattern of the difference lies from what mere repetition gives."""
+    """Return the distances of the difference pattern's features from repetition alone."""
     moved = {}
     for detail in ("level", "elsewhere", "peak"):
         key = f"{name}.{detail}"
@@ -443,15 +444,15 @@ def _pattern(
 
 
 # --------------------
-# How far a gap shrinks once an effect is added, on data that the effect was not fitted to.
+# Shrinkage of a gap once an effect is added, on data that the effect was not fitted to.
 # --------------------
 
 
 SAME_PREDICTION = 0.8
-"""Cosine of the angle between two predictions, in floors, from which they say the same."""
+"""Cosine of the angle between two predictions, in floors, from which they are equivalent."""
 
 MIN_AFFECTED = 1.5
-"""Floors that an effect must change a feature by for it to be its own."""
+"""Floors by which an effect must change a feature for it to count as affected."""
 
 
 @dataclass(frozen=True)
@@ -463,7 +464,7 @@ class Fold:
     fitted : tuple of ObservedChange
     scored : ObservedChange
     again : tuple of tuples of ObservedChange
-        `scored` with a block of revolutions left out, each block in turn: of the recording, and of its reference.
+        `scored` with each block of revolutions left out in turn: those of the recording, and those of its reference.
     """
 
     fitted: tuple[ObservedChange, ...]
@@ -472,7 +473,7 @@ class Fold:
 
 
 def affected_features(fit: Fit, observed: ObservedChange) -> FloatArray:
-    """Return 1 for the features that the fitted effect changes, 0 for the others; its strongest one at least."""
+    """Return 1 for the features that the fitted effect changes, else 0; its strongest feature always has 1."""
     predicted = np.abs(fit.at(observed.condition) / observed.floors)
     used: FloatArray = (predicted >= min(MIN_AFFECTED, float(predicted.max()))).astype(np.float64)
     return used
@@ -481,13 +482,13 @@ def affected_features(fit: Fit, observed: ObservedChange) -> FloatArray:
 def closed_shares(fits: Mapping[str, Sequence[Fit]], folds: Sequence[Fold]) -> dict[str, float]:
     """Return each effect's shrink, as in `shrinkage`, on the features that any of the effects changes; mean over folds.
 
-    On its own features a flexible wrong effect shrinks a gap as far as the true one does: what it leaves of the rest
-    of the gap counts here as well, so that effects can be compared.
+    On its own features, a flexible wrong effect shrinks a gap as much as the true one. Here the rest of the gap counts
+    as well, so that effects can be compared.
 
     Parameters
     ----------
     fits : mapping
-        Effect → its fit to the part of each fold that it is not scored on.
+        Effect → its fits to the part of each fold that is not scored.
     folds : sequence of Fold
     """
     shares: dict[str, list[float]] = {name: [] for name in fits}
@@ -518,23 +519,23 @@ def shrinkage(
 ) -> Shrinkage:
     """Return the shrinkage of the gap by an effect, mean over folds.
 
-    shrink = 1 − (r² − n²)/(o² − n²) on the effect's own features: o the gap before, r what is left, n what the floors
-    themselves make, o and r no less than n; the effect's severity and options are fitted to the other part of the data.
+    shrink = 1 − (r² − n²)/(o² − n²) on the effect's own features: o is the gap before, r the remainder, n the
+    contribution of the floors, with o and r at least n. Severity and options are fitted to the other part of the data.
 
-    Where the fitted effect predicts nothing, idle gears, say, it has no features of its own and nothing can shrink:
-    such folds do not count, unless there are no others.
+    Where the fitted effect predicts nothing, for example with unloaded gears, it has no features of its own and nothing
+    can shrink: such folds do not count, unless there are no others.
 
-    The intervals hold the scatter of what is scored, from its blocks of revolutions; that of the fit is not in them.
+    The intervals contain the scatter of the scored data, from its blocks of revolutions, but not that of the fit.
 
     Parameters
     ----------
     paths : sequence of EffectPath
-        Of the effect.
+        Paths of the effect.
     folds : sequence of Fold
     excluded : sequence of EffectPath
-        Of the effect where the recordings tell that it is not: on the other shaft, say. They serve as placebos.
+        Paths that the recordings rule out, for example on the other shaft. They serve as placebos.
     fits : sequence of Fit
-        To the part of each fold that is not scored, where they are known.
+        Fits to the part of each fold that is not scored, if known.
     """
     pairs = list(zip(folds, fits or [fit_effect(paths, fold.fitted) for fold in folds], strict=True))
     shown = [(fold, fit) for fold, fit in pairs if _largest_predicted(fit, fold.scored) >= MIN_PREDICTED] or pairs
@@ -563,9 +564,9 @@ def _mean(values: Sequence[float | None]) -> float | None:
 
 
 def _shrink_across_conditions(paths: Sequence[EffectPath], fold: Fold) -> float | None:
-    """Return the shrink where severity and options come from the other conditions alone; None if there is none.
+    """Return the shrink where severity and options come from the other conditions alone; None if there are none.
 
-    The level comes from the condition's own other revolutions: no other condition knows the path at this speed.
+    The level comes from other revolutions of the same condition, as no other condition shows the path at this speed.
     """
     elsewhere = [change for change in fold.fitted if change.condition != fold.scored.condition]
     if not elsewhere:
@@ -587,14 +588,14 @@ def _score(fold: Fold, fit: Fit) -> tuple[tuple[float, float, float], FloatArray
 
 
 def _placebos(paths: Sequence[EffectPath], fold: Fold, fit: Fit) -> list[float]:
-    """Return what the effect shrinks the gap by where it is not, but for places that predict the same."""
+    """Return the effect's shrinks in wrong places, without places whose predictions are equivalent."""
     used = affected_features(fit, fold.scored)
     wrong = [fit_path(path, fold.fitted) for path in paths if path.options != fit.path.options]
     return [_before_and_after(w, fold.scored, used)[2] for w in wrong if not _is_alike(fit, w, fold.scored)]
 
 
 def _is_alike(first: Fit, second: Fit, scored: ObservedChange) -> bool:
-    """Whether two places predict the same: bearings of one type on one shaft do, and are no placebos of each other."""
+    """Whether two places have equivalent predictions, as bearings of one type on one shaft do: no placebos."""
     a, b = (fitted.at(scored.condition) / scored.floors for fitted in (first, second))
     product = float(np.sqrt((a @ a) * (b @ b)))
     return product > 0.0 and float(a @ b) > SAME_PREDICTION * product
@@ -607,7 +608,7 @@ def _before_and_after(fit: Fit, scored: ObservedChange, used: FloatArray) -> tup
     misses = scored.distances - fit.at(scored.condition)
     squares = [family_square(names, d, scored, used) / n_families for d in (scored.distances, misses)]
     excess = max(squares[0] - 1.0, 0.1)
-    shrink = (max(squares[0], 1.0) - max(squares[1], 1.0)) / excess  # where there was no gap, none can shrink
+    shrink = (max(squares[0], 1.0) - max(squares[1], 1.0)) / excess  # without a gap nothing can shrink
     before, after = (float(np.sqrt(s)) / FLOOR_IN_DEVIATIONS for s in squares)
     return before, after, float(np.clip(shrink, -1.0, 1.0))
 

@@ -1,4 +1,4 @@
-"""From a recording to its sums over blocks of revolutions."""
+"""Reduction of a recording to sums over blocks of revolutions."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from gearsig.severity import orders_from_mesh
 from gearsig.spectra import BEYOND_THE_ENDS, reflected_ends
 
 # --------------------
-# The gear pair under study, with every order counted on its driver's shaft.
+# The gear pair under study; all orders refer to its driver's shaft.
 # --------------------
 
 
@@ -38,9 +38,9 @@ class BearingFrame:
     ----------
     name : str
     side : int
-        0: on the driver's shaft; 1: on the driven one.
+        0: on the driver's shaft; 1: on the driven shaft.
     outer, inner, spin, cage : float
-        BPFO, BPFI, BSF, FTF; nan where not known.
+        BPFO, BPFI, BSF and FTF; nan where not known.
     """
 
     name: str
@@ -52,7 +52,7 @@ class BearingFrame:
 
     @property
     def families(self) -> dict[str, float]:
-        """Family of lines → the order that it counts: a ball strikes with both sides."""
+        """Family of lines → its order; for balls twice the spin, since a defect strikes both races."""
         return {"outer": self.outer, "inner": self.inner, "ball": 2.0 * self.spin, "cage": self.cage}
 
 
@@ -64,11 +64,11 @@ class GearFrame:
     ----------
     pair : GearPair
     shafts : (str, str)
-        Of driver and driven gear.
+        Names of the driver's and the driven gear's shaft.
     teeth : (int, int)
     bearings : tuple of BearingFrame
     background : tuple of float
-        Orders at which a machine's other pairs and shafts are heard, per revolution of the driver: `background_orders`.
+        Orders of a machine's other pairs and shafts per revolution of the driver, see `background_orders`.
     """
 
     pair: GearPair
@@ -84,7 +84,7 @@ class GearFrame:
 
 
 def shaft_text(frame: GearFrame, side: int) -> str:
-    """Return "the input shaft" or "shaft 2"."""
+    """Return a shaft in words, for example "the input shaft" or "shaft 2"."""
     name = frame.shafts[side]
     if "shaft" in name.lower():
         return name
@@ -97,7 +97,7 @@ def gear_frame(rig: Rig) -> GearFrame:
     Raises
     ------
     RefusalError
-        If there is no pair, or its teeth are not known.
+        If there is no pair, or its numbers of teeth are not known.
     """
     remedy = "describe one pair with both tooth counts in the rig file"
     if not rig.pairs:
@@ -118,14 +118,14 @@ def gear_frame(rig: Rig) -> GearFrame:
 
 
 N_BACKGROUND_HARMONICS, N_BACKGROUND_SIDEBANDS, N_BACKGROUND_ORDERS = 20, 2, 4
-"""Of another pair's mesh, beside each of its harmonics by either of its shafts, and of another shaft."""
+"""Harmonics of another pair's mesh, sidebands of each at either of its shafts, and orders of another shaft."""
 
 
 def background_orders(rig: Rig) -> tuple[float, ...]:
-    """Return the orders of a rig's pairs but the first, per revolution of that one's driver, rising.
+    """Return the orders of a rig's pairs other than the first, per revolution of the first one's driver, ascending.
 
-    Mesh harmonics with sidebands at both of a pair's shafts, and the first orders of shafts that the first pair does
-    not sit on. Pairs whose ratio or teeth are not known are passed over: nobody knows where they are heard.
+    They are mesh harmonics with sidebands at both of a pair's shafts, and the first orders of shafts that do not belong
+    to the first pair. Pairs whose ratio or teeth are not known are skipped, as their orders are not known.
     """
     if len(rig.pairs) < 2:
         return ()
@@ -159,12 +159,12 @@ def background_orders(rig: Rig) -> tuple[float, ...]:
 
 
 INSEPARABLE_ORDERS = 0.03
-"""Orders, closer than which to the first pair's mesh harmonics and first sidebands nobody can tell two lines apart in
-a hundred revolutions: such lines stay."""
+"""Distance in orders from the first pair's mesh harmonics and first sidebands below which two lines cannot be separated
+in a hundred revolutions; such lines are kept."""
 
 
 # --------------------
-# What a recording is reduced to: sums over blocks of revolutions, of which every feature is made.
+# The reduced recording: sums over blocks of revolutions, from which all features are computed.
 # --------------------
 
 
@@ -174,29 +174,29 @@ N_MESH_HARMONICS = 6
 NOMINAL_REVOLUTIONS = 64.0
 BY_CHANCE = 1e-3
 SMOOTH_SIDEBANDS, SMOOTH_SHAFT_ORDERS = 2, 3
-"""Mesh lines with so many sidebands on either side, and the first shaft orders: eccentricity makes those."""
+"""Sidebands on either side of mesh lines, and first shaft orders, that eccentricity causes."""
 MIN_APART = 3
-"""Orders between two that both shafts share, for those to be left out."""
+"""Minimum spacing of the orders that both shafts share, for these to be removed."""
 
 
 @dataclass(frozen=True)
 class ChannelSums:
-    """Sums of one channel, one row per block.
+    """Sums of one channel, with one row per block.
 
     Parameters
     ----------
     lines : (array, array)
-        (n_blocks, n_orders) complex amplitudes (peak) of the blocks' averages of driver and driven gear.
+        (n_blocks, n_orders) complex amplitudes (peak) of the blocks' averages, for driver and driven gear.
     counts : (array, array)
-        (n_blocks,) revolutions in each average.
+        (n_blocks,) number of revolutions in each average.
     residual_power : array, (n_blocks, n_orders)
-        Power spectrum, over order of the driver, of what neither shaft repeats.
+        Power spectrum over order of the driver of the residual, which neither shaft repeats.
     envelope_power : array, (n_blocks, n_bands, n_cycles)
         Power spectrum of the residual's squared envelope in each band, over its squared mean.
     moments : array, (n_blocks, n_bands, 2)
         Mean square and mean fourth power of the residual in each band.
     tail : array, (n_blocks, 3)
-        Of the raw signal: mean square, mean fourth power, share of samples close to the extreme.
+        Mean square, mean fourth power and fraction of samples close to the extreme, of the raw signal.
     """
 
     lines: tuple[ComplexArray, ComplexArray]
@@ -222,20 +222,20 @@ class ChannelSums:
 
 @dataclass(frozen=True)
 class ShaftAverage:
-    """What a shaft repeats in one channel.
+    """The synchronous average of one shaft in one channel.
 
     Parameters
     ----------
     lines : complex array, (n_orders,)
-        Amplitudes (peak) of its orders, from 0 on.
+        Complex amplitudes (peak) of its orders, from 0 on.
     scatter : array, (n_orders,)
-        Power that the line's own scatter over the blocks leaves on it.
+        Power in each line due to its scatter over the blocks.
     n_blocks : int
     n_revolutions : float
     teeth, other_teeth : int
-        Of its gear, and of the one that this meshes with.
+        Of its gear, and of the mating gear.
     highest : int
-        Highest order whose line is true.
+        Highest valid order.
     """
 
     lines: ComplexArray
@@ -248,45 +248,45 @@ class ShaftAverage:
 
     @cached_property
     def noise(self) -> FloatArray:
-        """Power that noise leaves on each line."""
-        # A line's own scatter is that of few blocks: its neighbourhood says it better.
+        """Noise power in each line."""
+        # The scatter of one line over few blocks is uncertain, so neighbouring lines are averaged.
         return np.maximum(smooth_power(self.scatter), 1e-300)
 
     @cached_property
     def excess(self) -> FloatArray:
-        """The lines' power beyond noise."""
+        """Power of the lines in excess of noise."""
         return np.maximum(np.abs(self.lines) ** 2 - self.noise, 0.0)
 
     @property
     def longer(self) -> float:
-        """By how much longer the record is than `NOMINAL_REVOLUTIONS`; 1 at least."""
+        """Length of the record relative to `NOMINAL_REVOLUTIONS`; at least 1."""
         return max(1.0, self.n_revolutions / NOMINAL_REVOLUTIONS)
 
     @cached_property
     def power(self) -> FloatArray:
-        """The lines' power over a floor that does not depend on the record's length.
+        """Power of the lines over a floor that does not depend on the record's length.
 
-        |a|² holds the noise; what exceeds it counts, and the noise of `NOMINAL_REVOLUTIONS` is put under it. A line
-        that is not there reads alike in records of any length from there on.
+        The noise contained in |a|² is subtracted, and that of `NOMINAL_REVOLUTIONS` is added. An absent line thus has
+        the same value in all records of at least that length.
         """
         return self.excess + self.longer * self.noise
 
     @property
     def mesh_lines(self) -> FloatArray:
-        """Power of those of the first mesh harmonics that can be seen."""
+        """Power of the visible ones among the first mesh harmonics."""
         return self.power[self.teeth : N_MESH_HARMONICS * self.teeth + 1 : self.teeth][: self.highest // self.teeth]
 
     @cached_property
     def mesh_power(self) -> float:
-        """Power of the mesh harmonics together."""
+        """Total power of the mesh harmonics."""
         return float(self.mesh_lines.sum())
 
     @cached_property
     def is_synchronous(self) -> NDArray[np.bool_]:
-        """Which lines keep their phase from block to block: a shaft's own do, what leaks into its average does not.
+        """Which lines keep their phase from block to block, as a shaft's own lines do and leakage does not.
 
-        |a|² against the power that the same line's scatter over the blocks leaves of it, an F test with 2 and 2(B − 1)
-        degrees of freedom; of lines of noise, `BY_CHANCE` pass for a shaft's own.
+        |a|² is compared with the power of the same line's scatter over the blocks, an F test with 2 and 2(B − 1)
+        degrees of freedom; a fraction `BY_CHANCE` of noise lines passes.
         """
         degrees = max(self.n_blocks - 1, 1)
         # The F distribution with 2 and 2m degrees has P(F > f) = (1 + f/m)^(−m).
@@ -297,7 +297,7 @@ class ShaftAverage:
     def residual(self, lines: ComplexArray | None = None) -> ComplexArray:
         """Return its lines, or others over the same orders, without mesh harmonics, first sidebands and shaft orders.
 
-        Orders that the other shaft has, too, are left out unless those are most: which teeth meet depends on them.
+        Orders shared with the other shaft are removed, too, unless most are shared: they depend on which teeth meet.
         """
         source_lines = self.lines if lines is None else lines
         orders = np.arange(len(source_lines))
@@ -311,7 +311,7 @@ class ShaftAverage:
 
     @cached_property
     def pattern(self) -> ComplexArray:
-        """What tells the teeth apart: the residual over the mesh harmonics' amplitude."""
+        """The component in which teeth differ: the residual over the mesh harmonics' amplitude."""
         pattern: ComplexArray = self.residual() / np.sqrt(self.mesh_power)
         return pattern
 
@@ -331,24 +331,24 @@ class ReducedRecording:
     frame : GearFrame
     channels : mapping of str to ChannelSums
     order_step : float
-        Between the lines of `residual_power`, in orders of the driver.
+        Spacing of the lines of `residual_power`, in orders of the driver.
     cycle_step : float
-        Between the lines of `envelope_power`, in orders of the driver.
+        Spacing of the lines of `envelope_power`, in orders of the driver.
     bands_hz : tuple of (float, float)
-        Of `envelope_power` and `moments`.
+        Bands of `envelope_power` and `moments`.
     highest_order : float
-        Of the driver, up to which lines are true.
+        Order of the driver up to which lines are valid.
     speed_hz : float
         Mean frequency of the driver.
     speed : SpeedFigures
     hum : tuple of float
-        Of each supply, see `mains_lines`.
+        Excess of each mains supply's lines, see `mains_lines`.
     marks : (bool, bool)
         Whether angle 0 of driver and driven shaft is a mark on that shaft.
     n_revolutions : float
-        Of the driver.
+        Revolutions of the driver.
     kept : dict
-        What has been made of it; it is asked for again and again.
+        Cache of derived quantities, which are used repeatedly.
     """
 
     frame: GearFrame
@@ -371,7 +371,7 @@ class ReducedRecording:
 
     @property
     def fewest_revolutions(self) -> float:
-        """Of the slower shaft."""
+        """Number of revolutions of the slower shaft."""
         return self.n_revolutions * min(self.frame.shaft_orders)
 
     def of_blocks(self, kept: NDArray[np.bool_] | slice) -> ReducedRecording:
@@ -383,11 +383,11 @@ class ReducedRecording:
         return (self.of_blocks(np.arange(self.n_blocks) != block) for block in range(self.n_blocks))
 
     def with_channels(self, channels: dict[str, ChannelSums]) -> ReducedRecording:
-        """Return the recording with other sums."""
+        """Return the recording with other channel sums."""
         return replace(self, channels=channels, kept={})
 
     def turned_about(self, names: Iterable[str]) -> ReducedRecording:
-        """Return the recording with some channels times −1."""
+        """Return the recording with some channels multiplied by −1."""
         turned = {
             name: replace(sums, lines=(-sums.lines[0], -sums.lines[1]))
             for name, sums in self.channels.items()
@@ -400,7 +400,7 @@ class ReducedRecording:
         return self.with_channels({name: self.channels[name] for name in names})
 
     def average(self, channel: str, side: int) -> ShaftAverage:
-        """Return what the driver (0) or the driven shaft (1) repeats in a channel."""
+        """Return the synchronous average of the driver's (0) or driven (1) shaft in a channel."""
         if (channel, side) not in self.kept:
             counts, blocks = self.channels[channel].counts[side], self.channels[channel].lines[side]
             lines = (counts / counts.sum()) @ blocks
@@ -418,12 +418,12 @@ class ReducedRecording:
         return average
 
     def averages(self, side: int) -> list[ShaftAverage]:
-        """Return what a shaft repeats in each channel."""
+        """Return a shaft's synchronous averages in all channels."""
         return [self.average(channel, side) for channel in self.channels]
 
 
 # --------------------
-# Lines of the electric supply, at their frequency whatever the speed.
+# Lines of the mains supply, at fixed frequencies whatever the speed.
 # --------------------
 
 
@@ -431,19 +431,21 @@ N_MAINS_HARMONICS = 3
 _NEIGHBOURHOOD_HZ = 8.0
 _N_SHAFT_HARMONICS = 8
 _APART = 20.0
-"""Widths between a shaft's orders from which they can be told from the supply in four places of five."""
+"""Spacing of a shaft's orders, in line widths, from which they can be distinguished from the mains in four of five
+positions."""
 _N_STRONG_MULTIPLES = 3
-"""Of a shaft, which unbalance, misalignment and their like raise by themselves, and their harmonics with them."""
+"""Multiples of a shaft's order that unbalance, misalignment and the like raise directly, along with their harmonics."""
 _N_BESIDE, _AMONG_MULTIPLES_DB = 3, 10.0
-"""Multiples on either side that hum on one of them is held against, and by how much it must exceed the strongest."""
+"""Multiples on either side with which hum on one of them is compared, and the excess that it must have over the
+strongest."""
 
 
 def mains_lines(recording: Recording, names: Sequence[str], speed_hz: float, frame: GearFrame) -> tuple[float, ...]:
-    """Return, for each supply, the mean excess in dB of its harmonics over what is there anyway, on the best channel.
+    """Return the mean excess in dB of each supply's harmonics over their surroundings, on the best channel.
 
-    That is the neighbourhood, or, of a harmonic that falls on a higher multiple of a shaft, the multiples beside that
-    one: see `_excess`. Harmonics that fall on mesh lines and on a shaft's first orders are left out; 0 where none is
-    left.
+    The surroundings are the neighbouring lines or, for a harmonic that coincides with a higher multiple of a shaft, the
+    multiples next to it, see `_excess`. Harmonics that coincide with mesh lines or with a shaft's first orders are
+    omitted; the result is 0 where none is left.
     """
     return tuple(
         max(_mean_excess(recording.values(name), recording, supply, speed_hz, frame) for name in names)
@@ -470,11 +472,11 @@ def _mean_excess(
 def _excess(
     power: FloatArray, step_hz: float, supply_hz: float, harmonic: int, speed_hz: float, frame: GearFrame
 ) -> float | None:
-    """Return by how much a harmonic stands out in dB; None where the gears' own lines fall on it.
+    """Return the excess of one harmonic in dB; None where it coincides with the gears' own lines.
 
-    On a shaft's higher multiple it has to stand out by `_AMONG_MULTIPLES_DB` over the strongest of the multiples beside
-    it: a shaft does not raise one of them alone, hum does. Of a slow shaft all multiples lie everywhere: only the first
-    count, which are strong.
+    On a shaft's higher multiple it must exceed the strongest of the adjacent multiples by `_AMONG_MULTIPLES_DB`: hum
+    raises one of them alone, a shaft does not. The multiples of a slow shaft are everywhere, so only the first, strong
+    ones count.
     """
     frequency_hz = harmonic * supply_hz
     width = max(2.0 * step_hz, MAINS_TOLERANCE * frequency_hz)
@@ -515,12 +517,12 @@ def _to_a_multiple(frequency_hz: float, of_hz: float) -> float:
 
 
 # --------------------
-# What the speed does besides standing still: figures of the shaft angle.
+# How the speed varies: figures from the shaft angle.
 # --------------------
 
 
 class SpeedFigures(NamedTuple):
-    """Relative linear change of a speed; relative rms about it; its strongest line over the others; where."""
+    """A speed's relative linear drift; relative RMS about it; strongest line over the others; that line's frequency."""
 
     drift: float
     swing: float
@@ -529,20 +531,21 @@ class SpeedFigures(NamedTuple):
 
 
 HIGHEST_SHAFT_ORDER = 2
-"""Of each other shaft, that is taken out of the speed: a run-out shakes the speed at its shaft's orders."""
+"""Highest order of each other shaft that is removed from the speed: run-out modulates the speed at its shaft's
+orders."""
 
 
 def speed_figures(angle: ShaftAngle, other_shafts: Sequence[float] = ()) -> SpeedFigures:
-    """Return figures of a shaft's speed, taken once per revolution.
+    """Return figures of a shaft's speed, sampled once per revolution.
 
-    Faster changes belong to the shaft's orders and are left to the vibration; so do those at other shafts' orders,
-    which once a revolution look slower than they are.
+    Faster variations belong to the shaft's orders and are left to the vibration features; so are those at other shafts'
+    orders, which alias to lower frequencies.
 
     Parameters
     ----------
     angle : ShaftAngle
     other_shafts : sequence of float
-        Their revolutions per revolution of this one.
+        Their revolutions per revolution of this shaft.
     """
     n = int(angle.n_revolutions)
     time = np.linspace(angle.start_s, angle.end_s, 8 * n + 1)
@@ -566,7 +569,7 @@ def speed_figures(angle: ShaftAngle, other_shafts: Sequence[float] = ()) -> Spee
 
 
 def _cycles_per_revolution(other_shafts: Sequence[float], n: int) -> Iterator[float]:
-    """Yield the shafts' orders as they look once a revolution, 0 to 1/2; not those as slow as the record is long."""
+    """Yield the shafts' orders aliased by one sample per revolution, 0 to 1/2, except those as slow as the record."""
     for ratio in other_shafts:
         for order in range(1, HIGHEST_SHAFT_ORDER + 1):
             cycles = abs(order * ratio - round(order * ratio))
@@ -575,8 +578,8 @@ def _cycles_per_revolution(other_shafts: Sequence[float], n: int) -> Iterator[fl
 
 
 MAX_RUN_OUT = 2e-3
-"""Relative amplitude of the speed that a run-out makes at most, e/r: a tenth of a millimetre at 50 mm. A swing of the
-drive whose alias falls on another shaft's order is larger, and only so much of it is taken out."""
+"""Maximum relative amplitude of the speed due to run-out, e/r: a tenth of a millimetre at 50 mm. A swing of the drive
+whose alias falls on another shaft's order is larger, and only this much of it is removed."""
 
 
 def _without_cycles(deviation: FloatArray, cycles: Sequence[float]) -> FloatArray:
@@ -593,38 +596,38 @@ def _without_cycles(deviation: FloatArray, cycles: Sequence[float]) -> FloatArra
 
 
 MIN_REVOLUTIONS = 8
-"""Of the driver and of the driven gear: two in each block, the fewest that tell one shaft's orders from the other's."""
+"""Of driver and driven gear: two per block, the minimum that separates the two shafts' orders."""
 
 REVOLUTIONS_PER_BLOCK = 20
 MIN_BLOCKS, MAX_BLOCKS = 4, 8
-"""Blocks long enough to tell bearing orders from shaft orders, and enough of them for a jackknife."""
+"""Blocks are long enough to separate bearing orders from shaft orders, and enough of them for a jackknife."""
 
 N_BANDS = 4
 LOWEST_BAND_HZ = 300.0
 HIGHEST_CYCLE, BEYOND_THE_MESH = 40.0, 5.0
-"""Modulation orders are looked at up to here, in orders of the driver, or to so many beyond the mesh order."""
+"""Modulation orders are evaluated up to this order of the driver, or to so many beyond the mesh order."""
 
 NEAR_THE_EXTREME = 0.005
-"""A sample within this share of the largest magnitude counts as close to it."""
+"""Samples within this fraction of the largest magnitude count as close to it."""
 
 
 def reduce_recording(
     recording: Recording | PreparedRecording, rig: Rig | None = None, channels: Sequence[str] = ()
 ) -> ReducedRecording:
-    """Reduce a recording to what the features need.
+    """Reduce a recording to what the features require.
 
     Parameters
     ----------
     recording : Recording or PreparedRecording
     rig : Rig or None
-        With one gear pair; None: the one that the recording carries.
+        With a gear pair; None: the rig that the recording carries.
     channels : sequence of str
-        Default: all vibration channels. Accelerations in a known unit are taken in m/s², as simulations are.
+        Default: all vibration channels. Accelerations in a known unit are converted to m/s², as in simulations.
 
     Raises
     ------
     RefusalError
-        If the speed cannot be known, there are too few revolutions, or the mesh lies above what is sampled.
+        If the speed is not known, there are too few revolutions, or the mesh frequency is above the sampled range.
     """
     prepared = prepare(recording) if rig is None else prepare(recording).with_rig(rig)
     recording, frame = prepared.recording, gear_frame(prepared.rig)
@@ -642,8 +645,8 @@ def reduce_recording(
     _check_mesh(signals[DRIVER], frame, recording, speed_hz)
     bands = _bands(recording.sampling_rate_hz, signals[DRIVER].samples_per_revolution * speed_hz)
     reduced = {
-        # Channel by channel: signals of all of them in double precision, over both shafts and without what either
-        # repeats, are several times the recording.
+        # One channel at a time: double-precision signals of all channels, over both shafts and with the averages
+        # removed, would take several times the memory of the recording.
         name: _channel_sums(
             [_one_channel(signal, i, _si_factor(recording, name)) for signal in signals],
             recording.values(name) * _si_factor(recording, name),
@@ -680,17 +683,17 @@ def _one_channel(signal: AngleSignal, i: int, factor: float) -> AngleSignal:
 
 
 def _check_mesh(signal: AngleSignal, frame: GearFrame, recording: Recording, speed_hz: float) -> None:
-    """Refuse a record that was sampled too slowly to hold the mesh and its sidebands, which all is compared with."""
+    """Refuse a record sampled too slowly to contain the mesh and its sidebands, on which all comparisons rest."""
     if signal.highest_order < frame.teeth[0] + max(frame.shaft_orders):
         mesh_hz = frame.teeth[0] * speed_hz
         raise RefusalError(
-            f"the gears mesh at {mesh_hz:.4g} Hz, above what {recording.sampling_rate_hz:.6g} Hz of sampling rate show",
+            f"the gears mesh at {mesh_hz:.4g} Hz, too high for a sampling rate of {recording.sampling_rate_hz:.6g} Hz",
             remedy=f"sample at {4.0 * mesh_hz:.2g} Hz at least",
         )
 
 
 def _bands(sampling_rate_hz: float, angle_rate_hz: float) -> tuple[tuple[float, float], ...]:
-    """Bands of equal relative width, then all of them together."""
+    """Return bands of equal relative width, then the whole range."""
     top = 0.42 * min(sampling_rate_hz, angle_rate_hz)
     low = min(LOWEST_BAND_HZ, top / 8.0)
     edges = [low * (top / low) ** (i / N_BANDS) for i in range(N_BANDS + 1)]
@@ -705,16 +708,16 @@ def _channel_sums(
     bands: Sequence[tuple[float, float]],
     speed_hz: float,
 ) -> tuple[ChannelSums, float, float]:
-    """Return one channel's sums, and the steps of its residual's and its envelopes' lines in orders of the driver."""
+    """Return one channel's sums, and the line spacings of residual and envelopes in orders of the driver."""
     signals = [_without_background(signal, frame, side) for side, signal in enumerate(signals)]
     separated = orders.separate_shafts(signals, frame.teeth)
     lines = []
     for signal in separated.signals:
-        # All lines that the samples hold, the one at half their number as 0: windows of one tooth count on them.
+        # All lines of the samples, with 0 at the Nyquist order: windows of one tooth rely on them.
         average = orders.average_lines(signal, n_parts=n_blocks, highest_order=np.inf)
         blocks = np.zeros((n_blocks, signal.samples_per_revolution // 2 + 1), dtype=np.complex128)
         blocks[:, : average.highest_order + 1] = average.parts[:, 0]
-        blocks[:, 0] *= 2.0  # the mean counts as a peak, too: the floors were learned so, and it is in their noise
+        blocks[:, 0] *= 2.0  # the mean counts as a peak, as it did when the floors were learned
         lines.append((blocks, average.n_revolutions))
     n = signals[DRIVER].samples_per_revolution
     residual = separated.residual.samples[0]
@@ -737,17 +740,18 @@ def _without_background(signal: AngleSignal, frame: GearFrame, side: int) -> Ang
 
 
 REACH = 2000
-"""Lines of a whole record's spectrum on either side of an order, over which its leakage is taken out: −76 dB beyond."""
+"""Lines on either side of an order over which its leakage is removed: −76 dB beyond."""
 
 N_PASSES = 2
-"""Over all orders: what leaks from one into the estimate of another is gone in the second."""
+"""Passes over all orders: the second removes the leakage between their estimates."""
 
 
 def _without_lines(values: FloatArray, background: FloatArray, n_per_rev: int) -> FloatArray:
-    """Return a signal over angle without what is heard at given orders, each a steady line.
+    """Return a signal over angle without steady lines at given orders.
 
-    A line a exp(2πi f n/N) has X_k = a (e^{2πi(f−k)} − 1)/(e^{2πi(f−k)/N} − 1). Its amplitude is read through a Hann
-    window, X_k/2 − (X_{k−1} + X_{k+1})/4 at the nearest k, which hardly sees the others; then it is subtracted.
+    A line a exp(2πi f n/N) has X_k = a (e^{2πi(f−k)} − 1)/(e^{2πi(f−k)/N} − 1). Its amplitude is estimated with a Hann
+    window, X_k/2 − (X_{k−1} + X_{k+1})/4 at the nearest k, which suppresses the other lines; then the line is
+    subtracted.
     """
     from scipy.fft import irfft, rfft
 
@@ -771,13 +775,13 @@ def _without_lines(values: FloatArray, background: FloatArray, n_per_rev: int) -
 
 
 def _line(away: FloatArray, n: int) -> ComplexArray:
-    """Return the spectrum of a line of unit amplitude, so many lines away from it."""
+    """Return the spectrum of a line of unit amplitude at given distances from it, in bins."""
     away = np.where(np.abs(away) < 1e-9, 1e-9, away)
     return np.asarray(np.expm1(2j * np.pi * away) / np.expm1(2j * np.pi * away / n))
 
 
 def _segment_power(values: FloatArray, rate: float, n_segments: int) -> tuple[FloatArray, float]:
-    """Return the Hann power spectra (mean square per line) of equal segments and the lines' distance."""
+    """Return the Hann power spectra (mean square per line) of equal segments, and the spacing of the lines."""
     from scipy.fft import rfft
 
     length = len(values) // n_segments
@@ -796,7 +800,7 @@ def _envelopes(
     speed_hz: float,
     highest_cycle: float,
 ) -> tuple[FloatArray, FloatArray, float]:
-    """Return spectra of squared envelopes over their squared mean, the bands' moments, and the spectra's step."""
+    """Return spectra of squared envelopes over their squared mean, the bands' moments, and the line spacing."""
     from scipy.fft import irfft, next_fast_len, rfft
 
     n = len(residual)
@@ -824,7 +828,7 @@ def _envelopes(
 
 
 def _squared_envelope(band: NDArray[np.complex128], n: int) -> FloatArray:
-    """Return |z|² of a band of lines of n samples, at just the rate that it needs: twice the band's width."""
+    """Return |z|² of a band of lines of n samples, at the minimum rate: twice the band's width."""
     from scipy.fft import ifft, next_fast_len
 
     m = next_fast_len(2 * len(band) + 1)

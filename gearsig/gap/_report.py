@@ -1,4 +1,4 @@
-"""The gap report: where the gap lies, which effect causes it, how far it shrinks, what to record next."""
+"""The gap report: where the gap is, which effect causes it, how far it shrinks, what to record next."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _UNITS = {"um": "µm", "deg": "°", "g mm": "g·mm", "N m": "N·m", "m/s^2": "m/
 
 
 def severity_unit(unit: str) -> str:
-    """Write the unit of a severity for people.
+    """Format the unit of a severity for display.
 
     Examples
     --------
@@ -35,23 +35,23 @@ def severity_unit(unit: str) -> str:
 
 @dataclass(frozen=True)
 class SpectrumCurves:
-    """Order spectra of one shaft's average or of the residual, measured against simulated.
+    """Order spectra of one shaft's average or of the residual, measured and simulated.
 
     Parameters
     ----------
     label, unit : str
     orders : array, (n,)
-        Of the driver's shaft.
+        In orders of the driver's shaft.
     measured, before, after : arrays, (n,)
-        Peak amplitudes; `after` is with the likeliest effect, empty where there is none; `before` is empty where
-        nothing was simulated.
+        Peak amplitudes. `after` includes the most probable effect and is empty where there is none; `before` is empty
+        where nothing was simulated.
     floor : array, (n,)
-        Repeatability; where nothing was simulated, the noise beside the lines.
+        Repeatability floor; where nothing was simulated, the noise level around the lines.
     structural_db : array, (n,)
-        How far healthy machines lie from what is compared with, line by line; empty: not known.
+        Deviation of healthy machines from the baseline compared with, line by line; empty if not known.
     reference, reference_floor, reference_structural_db : arrays, (n,)
-        Peak amplitudes of the healthy reference, the repeatability floor of both recordings, and how far healthy
-        machines change from one recording to another; empty where there is no reference.
+        Peak amplitudes of the healthy reference, the repeatability floor of both recordings together, and how much
+        healthy machines change from one recording to another; empty where there is no reference.
     """
 
     label: str
@@ -69,17 +69,17 @@ class SpectrumCurves:
 
 @dataclass(frozen=True)
 class AngleCurves:
-    """The residual synchronous average of one shaft over its angle, measured against simulated.
+    """Energy of one shaft's residual synchronous average over its angle, measured and simulated.
 
     Parameters
     ----------
     shaft, unit : str
     teeth : int
     has_mark : bool
-        Whether angle 0 is a mark, so that teeth have numbers.
+        Whether angle 0 is a tachometer mark, so that teeth can be numbered.
     angle_deg : array, (n,)
     measured, before, after : arrays, (n,)
-        Energy within one pitch, over the median tooth's; `after` may be empty.
+        Energy within one pitch relative to the median tooth; `after` may be empty.
     """
 
     shaft: str
@@ -94,18 +94,18 @@ class AngleCurves:
 
 @dataclass(frozen=True)
 class AverageCurves:
-    """What tells a shaft's teeth apart in its synchronous average, of the recording and of the healthy reference.
+    """The tooth-to-tooth part of a shaft's synchronous average, of the recording and of the healthy reference.
 
     Parameters
     ----------
     shaft, unit, channel : str
     teeth : int
     has_mark : bool
-        Whether angle 0 is a mark, so that teeth have numbers.
+        Whether angle 0 is a tachometer mark, so that teeth can be numbered.
     angle_deg : array, (n,)
     measured, reference : arrays, (n,)
-        Without the mesh harmonics, what lies close to them and the first shaft orders; the reference turned so that
-        the same teeth meet, and its gain matched as far as a slightly other speed or load explains it.
+        Without the mesh harmonics, their close sidebands and the first shaft orders. The reference is rotated so that
+        the same teeth coincide, and its gain is matched as far as a slightly different speed or load explains it.
     """
 
     shaft: str
@@ -119,30 +119,32 @@ class AverageCurves:
 
 
 LIKELIER_THAN_NOT = 0.5
-"""Probability from which a cause, or a kind of fault, is likelier than all others together. No effect is named below
-it, nor are two that have less together: then what is wrong is unknown, however sure it is that something is."""
+"""Probability from which a cause, or a kind of fault, is more probable than all others together. No effect is named
+below it, nor are two whose sum is below it: the cause is then unknown, however certain it is that something is
+wrong."""
 
 NONE, UNKNOWN = "none", "unknown"
-"""Names of the two causes that are no effect: no gap beyond the floor; a gap that nothing in the catalogue explains."""
+"""Names of the two causes that are not effects: no gap beyond the floor; a gap that nothing in the catalogue
+explains."""
 
 
 class GapOutcome(Enum):
-    """What a diagnosis comes to."""
+    """The outcome of a diagnosis."""
 
     NO_GAP = "no gap"
     EFFECT = "effect"
     CANNOT_SEPARATE = "cannot separate"
     UNKNOWN = "unknown"
     UNDECIDED = "undecided"
-    """Neither an effect nor its absence is likely enough to be said, and no unknown cause is, either."""
+    """Neither an effect, nor its absence, nor an unknown cause is probable enough to be stated."""
 
 
 NAMING = (GapOutcome.EFFECT, GapOutcome.CANNOT_SEPARATE)
-"""Outcomes that name an effect; nothing is added to the simulator elsewhere."""
+"""Outcomes that name an effect; with any other outcome nothing is added to the simulator."""
 
 
 class PlaceKind(Enum):
-    """In which way a place of the gap is meant."""
+    """The domain in which a place of the gap is located."""
 
     MESH = "mesh harmonics"
     SIDEBANDS = "sidebands"
@@ -157,32 +159,32 @@ class PlaceKind(Enum):
 
 @dataclass(frozen=True)
 class GapPlace(Result):
-    """One place at which the recording differs from what it is compared with.
+    """One place at which the recording differs from its baseline.
 
     Parameters
     ----------
     kind : PlaceKind
     title : str
-        The statement in one sentence.
+        The finding in one phrase.
     change_db : float
-        Recording over simulation (or over reference), of the strongest part; where nothing was simulated and no
-        reference shows it, lines over the noise beside them.
+        Level of the recording relative to the simulation (or the reference) at the strongest part; for lines found
+        without a simulation and not shown by the reference, relative to the noise around them.
     repeatability, structural : float
-        The change over both floors, 1: as large as a floor; nan where nothing was simulated.
+        The change divided by each floor (1: as large as the floor); nan where nothing was simulated.
     share : float
-        Of the whole gap, 0 to 1; nan where it `follows`, or was found without a simulation.
+        Fraction of the whole gap, 0 to 1; nan where it `follows` or was found without a simulation.
     shaft : str
     orders : tuple of float
-        Of the driver's shaft, where it is largest.
+        Orders of the driver's shaft at which the change is largest.
     band_hz : (float, float) or None
     angle_deg : float or None
-        Of the shaft.
+        Angle of the shaft.
     tooth : int or None
-        From 1 at the mark; None where there is no mark.
+        Counted from 1 at the mark; None where there is no mark.
     channel : str
-        Where it is strongest; empty: on all.
+        Channel on which it is strongest; empty: all channels.
     follows : bool
-        Whether it only follows from what other places say, and tells nobody where to look.
+        Whether it only follows from other places, and so gives no hint of its own where to look.
     """
 
     kind: PlaceKind
@@ -202,14 +204,14 @@ class GapPlace(Result):
 
 @dataclass(frozen=True)
 class Interval:
-    """A value with its 90 % interval; `high` is infinite where nothing bounds it.
+    """A value with its 90 % interval; `high` is infinite where there is no upper bound.
 
     Parameters
     ----------
     value : float
-        In the unit of what it is of.
+        In the unit of the quantity.
     low, high : float
-        Of the interval; low 0 and high infinite: any size fits about as well.
+        Ends of the interval; 0 and infinity mean that any size fits about as well.
     """
 
     value: float
@@ -218,7 +220,7 @@ class Interval:
 
     @classmethod
     def around(cls, value: float, half: float, low: float = -inf, high: float = inf) -> Interval:
-        """Return value ± half, its ends no further than `low` and `high`."""
+        """Return value ± half, with its ends limited to `low` and `high`."""
         return cls(value, max(value - half, low), min(value + half, high))
 
     @property
@@ -228,11 +230,11 @@ class Interval:
 
     @property
     def text(self) -> str:
-        """The value, in as many digits as `words` gives the ends."""
+        """The value, with as many digits as `words` gives the ends."""
         return self._written(self.value)
 
     def words(self) -> str:
-        """Return the interval in words, in as many digits, two at least, as tell its ends apart.
+        """Return the interval in words, with as many digits (at least two) as distinguish its ends.
 
         Examples
         --------
@@ -252,7 +254,7 @@ class Interval:
 
 NOT_KNOWN = Interval(nan, nan, nan)
 MIN_PREDICTED = 0.5
-"""Floors: what a simulator changes by less tells nothing, whether the gap shrinks or grows."""
+"""Floors: predicted changes smaller than this are no evidence, whether the gap shrinks or grows."""
 
 
 @dataclass(frozen=True)
@@ -262,26 +264,26 @@ class Shrinkage:
     Parameters
     ----------
     before, after : Interval
-        Root mean square of the gap on the effect's own features, in structural floors.
+        RMS of the gap over the effect's own features, in structural floors.
     shrink : Interval
-        1 − after²/before², what exceeds the floors; 1: all of it is explained.
+        1 − after²/before², each less the floors; 1: fully explained.
     slope : float
-        Of the observed change over the predicted one; 1: sign and size are right.
+        Slope of the observed change against the predicted one; 1: sign and size are right.
     placebo : float
-        The largest shrink that the same effect gets in a wrong place: another order, gear, shaft or bearing. 0 where
-        there is no other.
+        Largest shrink that the same effect reaches in a wrong place: another order, gear, shaft or bearing. 0 where
+        there is no other place.
     held_out : str
-        What it was scored on: "another operating condition" or "other revolutions of the same recordings".
+        Data it was scored on: "another operating condition" or "other revolutions of the same recordings".
     n_placebos : int
-        Wrong places that were tried.
+        Number of wrong places tried.
     elsewhere : float or None
-        The shrink at operating conditions of which nothing but the level was fitted, severity and place being those of
-        the others; None with one condition.
+        Shrink at operating conditions of which only the level was fitted; severity and place come from the other
+        conditions. None with a single condition.
     predicted : float or None
-        The largest change that the simulator predicts of the fitted effect, in floors; None where it is not known.
+        Largest change that the simulator predicts for the fitted effect, in floors; None where not known.
     of_all : float or None
-        The shrink on the features that any of the tried effects changes, by which they can be compared; None where it
-        is not known.
+        Shrink over the features that any of the tried effects changes, which makes effects comparable; None where not
+        known.
     """
 
     before: Interval
@@ -297,7 +299,7 @@ class Shrinkage:
 
     @property
     def is_predicted(self) -> bool:
-        """Whether the simulator shows enough of the effect for a shrink to mean anything."""
+        """Whether the simulated effect is large enough for its shrink to mean anything."""
         return self.predicted is None or self.predicted >= MIN_PREDICTED
 
 
@@ -311,10 +313,10 @@ class Evidence:
         In words, e.g. "sidebands of the driver's shaft, 6 to 12 orders away".
     predicted_db, observed_db, floor_db : float
     speaks_for : bool
-        Whether sign and size are those predicted.
+        Whether sign and size agree with the prediction.
     is_further : bool
-        Whether it moved the predicted way, and further than predicted: the effect does not explain the rest, which is
-        no evidence against it. `speaks_for` is False then.
+        Whether the feature changed in the predicted direction, but by more than predicted. The effect does not explain
+        the excess, which is no evidence against it; `speaks_for` is False then.
     """
 
     feature: str
@@ -327,28 +329,28 @@ class Evidence:
 
 @dataclass(frozen=True)
 class GapCause(Result):
-    """A candidate with its probability; the first is the likeliest.
+    """A candidate cause with its probability.
 
     Parameters
     ----------
     name : str
-        Of an effect, or "none" or "unknown".
+        Name of an effect, or "none" or "unknown".
     group, title, unit : str
     probability : float
         Calibrated, over all causes; an upper limit where nothing was simulated.
     severity : Interval or None
-        With which the twin comes nearest, in the effect's unit; the interval is the fit's, and the machine's own may
-        lie further off.
+        Severity at which the twin comes nearest, in the effect's unit. The interval is that of the fit; the machine's
+        true severity may lie outside it.
     fitted : AddedEffect or None
-        The setting that fits best.
+        The best-fitting setting.
     place : str
-        "tooth 7 of the driver", "bearing 2", "order 6"; empty where it has none.
+        For example "tooth 7 of the driver", "bearing 2" or "order 6"; empty where the cause has no place.
     shrinkage : Shrinkage or None
     evidence : tuple of Evidence
         Strongest first, for and against.
     is_nuisance : bool
     notes : tuple of str
-        What speaks for and against it in words, where no simulation predicts anything.
+        Evidence for and against it in words, where no simulation makes a prediction.
     """
 
     name: str
@@ -366,21 +368,21 @@ class GapCause(Result):
 
     @property
     def is_effect(self) -> bool:
-        """Whether it is an effect, and neither none nor unknown."""
+        """Whether it is an effect, neither "none" nor "unknown"."""
         return self.name not in (NONE, UNKNOWN)
 
 
 def group_probabilities(
     probabilities: Mapping[str, float], known: Mapping[str, GapEffect] | Mapping[str, GapCause]
 ) -> dict[str, float]:
-    """Return group → probability of its causes together, P(g) = Σ_{c∈g} P(c), largest first.
+    """Return group → total probability of its causes, P(g) = Σ_{c∈g} P(c), largest first.
 
     Parameters
     ----------
     probabilities : mapping
         Cause → probability.
     known : mapping
-        Cause → what has its group; a cause that is not in it is a group by itself.
+        Cause → object with its group; a cause that is missing here forms a group of its own.
     """
     by_group: dict[str, float] = {}
     for name, p in probabilities.items():
@@ -390,39 +392,39 @@ def group_probabilities(
 
 
 def likeliest_first(probabilities: Mapping[str, float]) -> dict[str, float]:
-    """Return the same probabilities, the largest first."""
+    """Return the same probabilities, largest first."""
     return dict(sorted(probabilities.items(), key=lambda item: -item[1]))
 
 
 TOGETHER, MAX_RIVALS = 0.9, 4
-"""What cannot be told apart: the fewest likeliest effects that have such a share of what all effects have, and not
-more of them than anybody would look at."""
+"""Effects that cannot be separated: the smallest set of most probable effects that holds this fraction of the
+probability of all effects, limited to this many."""
 
 
 def scaled(weights: Mapping[str, float]) -> dict[str, float]:
-    """Return probabilities in proportion to weights, likeliest first."""
+    """Return weights normalised to probabilities, largest first."""
     total = sum(weights.values())
     return likeliest_first({name: weight / total for name, weight in weights.items()})
 
 
 def shares_of(levels: Mapping[str, float]) -> dict[str, float]:
-    """Return probabilities p_c ∝ exp(level_c), likeliest first."""
+    """Return probabilities p_c ∝ exp(level_c), largest first."""
     top = max(levels.values())
     return scaled({name: exp(level - top) for name, level in levels.items()})
 
 
 def inseparable_effects(causes: Sequence[GapCause]) -> tuple[str, ...]:
-    """Return the effects that cannot be told apart: the two likeliest, and more until they have `TOGETHER` of all.
+    """Return the effects that cannot be separated: the two most probable, and more until they hold `TOGETHER` of all.
 
     Parameters
     ----------
     causes : sequence of GapCause
-        Those of no effect and of an unknown one are passed over.
+        "none" and "unknown" are skipped.
 
     Returns
     -------
     tuple of str
-        Likeliest first, `MAX_RIVALS` at most.
+        Most probable first, at most `MAX_RIVALS`.
     """
     effects = sorted((c for c in causes if c.is_effect), key=lambda cause: -cause.probability)
     shares = np.cumsum([cause.probability for cause in effects])
@@ -431,7 +433,7 @@ def inseparable_effects(causes: Sequence[GapCause]) -> tuple[str, ...]:
 
 
 USER_LABELS = "your own labels"
-"""Group of causes that only the user's labelled recordings know."""
+"""Group of causes known only from the user's labelled recordings."""
 
 KIND_TITLES = {
     "tooth-local": "a damaged tooth",
@@ -442,20 +444,20 @@ KIND_TITLES = {
     "measurement chain": "the measurement chain",
     USER_LABELS: "what you have labelled",
 }
-"""Group of effects → the kind of fault, in words; of another group, its name."""
+"""Group of effects → kind of fault in words; for any other group its name is used."""
 
 
 @dataclass(frozen=True)
 class GapKind:
-    """The kind of fault, which is surer than which effect of that kind it is.
+    """The kind of fault, which is more certain than the particular effect.
 
     Parameters
     ----------
     group, title : str
     probability : float
-        Of its effects together.
+        Sum over its effects.
     place : str
-        As of its likeliest effect; empty where that has none.
+        Place of its most probable effect; empty where that has none.
     """
 
     group: str
@@ -465,7 +467,7 @@ class GapKind:
 
 
 def kind_of(causes: Sequence[GapCause], groups: Mapping[str, float]) -> GapKind | None:
-    """Return the likeliest kind of fault, None where that is no likelier than all else together."""
+    """Return the most probable kind of fault, None where it is no more probable than all else together."""
     effects = {name: p for name, p in groups.items() if name not in (NONE, UNKNOWN, "")}
     group = max(effects, key=effects.__getitem__, default="")
     if not effects.get(group, 0.0) >= LIKELIER_THAN_NOT:
@@ -476,7 +478,7 @@ def kind_of(causes: Sequence[GapCause], groups: Mapping[str, float]) -> GapKind 
 
 @dataclass(frozen=True)
 class GapStep:
-    """One bar of the waterfall: what is left of the whole gap once `label` is added, on held-out data."""
+    """One bar of the waterfall chart: what remains of the whole gap once `label` is added, on held-out data."""
 
     label: str
     remaining: Interval
@@ -484,18 +486,19 @@ class GapStep:
 
 @dataclass(frozen=True)
 class NextRecording:
-    """A recording that would separate the two likeliest causes.
+    """A recording that would separate the two most probable causes.
 
     Parameters
     ----------
     point : OperatingCondition
     separates : (str, str)
     standard_deviations : float
-        Distance of both predictions there, in structural floors; `now` at the points there are.
+        Distance between the two predictions at that point, in structural floors.
     now : float
+        The same distance at the points recorded so far.
     text : str
     place : str
-        Of a further sensor, which alone shows so much; empty: the sensors that there are.
+        Place of the additional sensor that alone shows this distance; empty: the existing sensors do.
     """
 
     point: OperatingCondition
@@ -508,7 +511,7 @@ class NextRecording:
 
 @dataclass(frozen=True)
 class NextStep:
-    """Something to do next that no simulation was needed for.
+    """A next step that needs no simulation.
 
     Parameters
     ----------
@@ -529,12 +532,12 @@ class ConditionFacts:
     ----------
     name : str
     point : OperatingCondition
-        Nominal torque; measured speed.
+        Nominal torque and measured speed.
     n_revolutions : float
-        Of the driver.
+        Revolutions of the driver.
     duration_s, sampling_rate_hz : float
     reference : str
-        Name of the healthy reference that it is compared with; empty: none.
+        Name of the healthy reference it is compared with; empty: none.
     """
 
     name: str
@@ -547,16 +550,16 @@ class ConditionFacts:
 
 @dataclass(frozen=True)
 class LabelledFacts:
-    """What labelled recordings of the rig, or of somebody's own simulation of it, changed in the answer.
+    """How labelled recordings of the rig, or of your own simulation of it, changed the result.
 
     Parameters
     ----------
     counts : mapping
-        Label → recordings that were used.
+        Label → number of recordings used.
     without : mapping
-        Cause → probability that it would have had without them, likeliest first.
+        Cause → probability without them, largest first.
     outcome_without : GapOutcome
-        What the diagnosis would have come to.
+        Outcome without them.
     """
 
     counts: Mapping[str, int]
@@ -565,11 +568,11 @@ class LabelledFacts:
 
     @property
     def text(self) -> str:
-        """What they are, and what the answer would be without them, in a sentence or two."""
+        """Their number by label and the result without them, in a sentence or two."""
         n, first = sum(self.counts.values()), next(iter(self.without), NONE)
         kinds = ", ".join(f"{label.replace('_', ' ')} {count}" for label, count in self.counts.items())
         return (
-            f"Labelled recordings of this rig that joined what is known of other machines: {n} ({kinds}). "
+            f"Labelled recordings of this rig, used in addition to what is known of other machines: {n} ({kinds}). "
             f"Without {'them' if n > 1 else 'it'} the likeliest would be {first.replace('_', ' ')}, "
             f"{odds_text(self.without.get(first, 0.0))} (outcome: {self.outcome_without.value})."
         )
@@ -577,16 +580,17 @@ class LabelledFacts:
 
 @dataclass(frozen=True)
 class PathFacts:
-    """The path from the mesh to the sensors, as a run-up of the healthy machine measured it.
+    """The path from the mesh to the sensors, as measured by a run-up of the healthy machine.
 
     Parameters
     ----------
     run_up : str
         Name of the recording.
     low_hz, high_hz : float
-        Between which mesh harmonics went.
+        Frequency range covered by mesh harmonics.
     credibility : mapping
-        Channel → share of what was measured that harmonics of other numbers repeat at the same frequencies, 0 to 1.
+        Channel → fraction of the measured response that harmonics of different number reproduce at the same
+        frequencies, 0 to 1.
     """
 
     run_up: str
@@ -596,19 +600,18 @@ class PathFacts:
 
     @property
     def text(self) -> str:
-        """What was measured, and how far it is believed, in a sentence or two."""
+        """What was measured, and how far it is trusted, in a sentence or two."""
         believed = ", ".join(f"{channel} {value:.2f}" for channel, value in self.credibility.items())
         return (
             f"The path from the mesh to the sensors was measured by {self.run_up} from {self.low_hz:.0f} to "
-            f"{self.high_hz:.0f} Hz; the waveforms of simulated tooth faults pass it before they are compared. So much "
-            f"of it is repeated by mesh harmonics of other numbers at the same frequencies, and counts: {believed} "
-            "(1: all)."
+            f"{self.high_hz:.0f} Hz; the waveforms of simulated tooth faults pass it before they are compared. It "
+            f"counts as far as different mesh harmonics repeat it at the same frequencies: {believed} (1: fully)."
         )
 
 
 def too_small_to_judge_text(shrinkage: Shrinkage) -> str:
-    """Return what is said of an effect that the simulator does not make large enough to judge."""
-    return f"hardly shows on the simulator at these conditions (at most {shrinkage.predicted or 0.0:.2g} floors)"
+    """Return the statement that the simulated effect is too small to judge."""
+    return f"hardly shows in the simulation at these conditions (at most {shrinkage.predicted or 0.0:.2g} floors)"
 
 
 def evidence_direction_text(evidence: Evidence) -> str:
@@ -619,7 +622,7 @@ def evidence_direction_text(evidence: Evidence) -> str:
 
 
 def fitted_text(cause: GapCause, severity: float, recording: str) -> str:
-    """Return what a twin's file says of the effect in it: severity, its fit, what it was fitted to, probability."""
+    """Return the note on a fitted effect in a twin's file: severity, interval, recording and probability."""
     within = f"interval of the fit {cause.severity.words()}; " if cause.severity else ""
     size = f"{severity:.3g} {cause.unit}".rstrip()
     return f"{cause.title}: {size}, {within}fitted to {recording}, probability {cause.probability:.2f}"
@@ -632,32 +635,32 @@ def fitted_text(cause: GapCause, severity: float, recording: str) -> str:
 
 @dataclass(frozen=True)
 class GapReport(Result, rows="causes"):
-    """The answer.
+    """The result of a gap diagnosis.
 
     Parameters
     ----------
     rig, simulator : str
-        Names; no simulator where none can be set to the rig.
+        Names; `simulator` is empty where none can model the rig.
     conditions : tuple of ConditionFacts
     references : tuple of str
-        Names of the healthy recordings that were compared with; empty: the simulation itself is compared with.
+        Names of the healthy recordings compared with; empty: the simulation itself is the baseline.
     outcome : GapOutcome
     size : Interval
-        Of the whole gap in structural floors (the largest that healthy machines reach once in twenty is 1); nan where
+        The whole gap in structural floors (1 is the level that healthy machines exceed once in twenty); nan where
         nothing was simulated.
     repeatability : float
         The same in repeatability floors.
     places : tuple of GapPlace
-        As `ranked_places` orders them.
+        In the order of `ranked_places`.
     causes : tuple of GapCause
-        What the outcome names first, the others by probability; these add up to 1.
+        The cause that matches the outcome first, then the others by probability; the probabilities add up to 1.
     groups : mapping
-        Group → probability; default: of the causes.
+        Group → probability; default: computed from the causes.
     inseparable : tuple of str or None
-        Causes that these recordings cannot separate, likeliest first; default: `inseparable_effects`, where the outcome
-        says so.
+        Causes that these recordings cannot separate, most probable first; default: `inseparable_effects`, where the
+        outcome is "cannot separate".
     steps : tuple of GapStep
-        Before, with each effect, what is left.
+        What remains before any effect is added, and with each effect.
     next_recordings : tuple of NextRecording
         Best first.
     spectra : tuple of SpectrumCurves
@@ -665,18 +668,18 @@ class GapReport(Result, rows="causes"):
     averages : tuple of AverageCurves
         Empty where there is no reference.
     notes : tuple of str
-        What the reader should know.
+        Remarks on the result.
     warnings : tuple of str
-        What must be checked first, where there is strong evidence of it: a wrong rig file, or recording and reference
-        exchanged. The rest of the report is as if it were not so.
+        Strongly supported doubts that must be checked first: a wrong rig file, or recording and reference exchanged.
+        The rest of the report assumes that all is in order.
     twin_toml : str
-        The simulator with the effect fitted, as a preset; empty where none is named.
+        The simulator with the fitted effect, as a preset; empty where no effect is named.
     labelled : LabelledFacts or None
-        What labelled recordings of the rig changed; None: none were given.
+        How labelled recordings of the rig changed the result; None: none were given.
     next_steps : tuple of NextStep
-        What would help most besides, best first.
+        Other steps that would help, best first.
     path : PathFacts or None
-        What a healthy run-up told of the path to the sensors; None: none was given.
+        What a healthy run-up measured of the path to the sensors; None: none was given.
     """
 
     rig: str
@@ -712,26 +715,26 @@ class GapReport(Result, rows="causes"):
 
     @property
     def kind(self) -> GapKind | None:
-        """The kind of fault that is named; None where nothing is, or no kind is likelier than all else together."""
+        """The kind of fault that is named; None where no effect is named, or no kind is more probable than all else."""
         return kind_of(self.causes, self.groups) if self.outcome in NAMING else None
 
     def _repr_html_(self) -> str:
-        """Return the four lines of the verdict and the likeliest causes, for notebooks."""
+        """Return the four lines of the verdict and the most probable causes, for notebooks."""
         probable = [cause for cause in self.causes if cause.probability >= 0.01][:5]
         rows = [(cause.title, odds_text(cause.probability), cause.place) for cause in probable]
         return verdict_html(self.verdict, ("cause", "probability", "place"), rows)
 
     @property
     def is_simulated(self) -> bool:
-        """Whether a simulator could be set to the rig; without one there are no sizes in floors, no steps, no twin."""
+        """Whether a simulator can model the rig; without one there are no sizes in floors, no steps and no twin."""
         return bool(self.simulator)
 
     @property
     def is_beyond(self) -> bool:
         """Whether an effect is named, or the whole gap exceeds what healthy machines show.
 
-        Single places and lines may exceed their own floors all the same, by chance. True where nothing was simulated:
-        there is no whole then.
+        Single places and lines may still exceed their own floors by chance. Always true where nothing was simulated,
+        because then there is no size of the whole gap.
         """
         return self.outcome in NAMING or not self.size.value <= 1.0
 
@@ -743,9 +746,7 @@ class GapReport(Result, rows="causes"):
         return _where_seen(self), _which_seen(self), NO_SIMULATION, _next_seen(self)
 
 
-NO_SIMULATION = (
-    "How far: cannot be told; the simulators have a gear pair and this rig has none, so nothing was simulated."
-)
+NO_SIMULATION = "How far: not known; the simulators need a gear pair and this rig has none, so nothing was simulated."
 
 
 def _where(report: GapReport) -> str:
@@ -761,7 +762,7 @@ def _where(report: GapReport) -> str:
 
 
 def _with_size(place: GapPlace) -> str:
-    """Return a place's title, with its size and share as far as it has them."""
+    """Return a place's title with its size and share, where it has them."""
     size = f", {place.structural:.2g} structural floors" if isfinite(place.structural) else ""
     return f"{place.title}{size}{f' ({percent(place.share)} of the gap)' if isfinite(place.share) else ''}"
 
@@ -770,7 +771,7 @@ def _which(report: GapReport) -> str:
     first = report.causes[0]
     odds = odds_text(first.probability)
     if report.outcome is GapOutcome.NO_GAP:
-        return f"Which: none ({odds}); what differs is no more than between healthy machines and the simulator."
+        return f"Which: none ({odds}); the difference is no larger than between healthy machines and the simulator."
     if report.outcome is GapOutcome.UNDECIDED:
         return _which_undecided(report)
     if report.outcome is GapOutcome.UNKNOWN:
@@ -785,7 +786,7 @@ def _which(report: GapReport) -> str:
 
 
 MIN_SURER = 0.01
-"""By how much the kind of fault is surer than the effect, from which it is told first."""
+"""By how much the kind of fault must be more probable than the effect for the kind to be stated first."""
 
 
 def _kind(kind: GapKind) -> str:
@@ -795,7 +796,7 @@ def _kind(kind: GapKind) -> str:
 
 
 def _kind_and_inseparable(report: GapReport, rivals: Sequence[str]) -> str:
-    """Return the kind of fault with what of it is likeliest, then what else may be; without a kind, all of them."""
+    """Return the kind of fault with its most probable effects, then the other rivals; without a kind, all rivals."""
     if report.kind is None:
         return _or_text(report, rivals)
     groups = {cause.name: cause.group for cause in report.causes}
@@ -803,7 +804,9 @@ def _kind_and_inseparable(report: GapReport, rivals: Sequence[str]) -> str:
     beyond = [name for name in rivals if name not in within]
     if not within:
         return _or_text(report, rivals)
-    return f"{_kind(report.kind)}: {_or_text(report, within)}{f'; else {_or_text(report, beyond)}' if beyond else ''}"
+    return (
+        f"{_kind(report.kind)}: {_or_text(report, within)}{f'; otherwise {_or_text(report, beyond)}' if beyond else ''}"
+    )
 
 
 def _or_text(report: GapReport, names: Sequence[str]) -> str:
@@ -817,22 +820,22 @@ def _which_unknown(report: GapReport) -> str:
     unknown = next((cause.probability for cause in report.causes if cause.name == UNKNOWN), 1.0)
     if best is None or best.probability <= unknown:
         return "Which: unknown; nothing in the catalogue explains it well enough."
-    return f"Which: unknown; {best.title} comes nearest ({odds_text(best.probability)}), too little to be named."
+    return f"Which: unknown; {best.title} comes nearest ({odds_text(best.probability)}), not enough to be named."
 
 
 def named_cause(name: str, probability: float, effects: Mapping[str, GapEffect], place: str = "") -> GapCause:
-    """Return a cause by its name: one of the effects, none or unknown, or somebody's own label."""
+    """Return a cause by its name: one of the effects, "none", "unknown" or a user's label."""
     if name in effects:
         e = effects[name]
         return GapCause(name, e.group, e.title, e.unit, probability, place=place, is_nuisance=e.is_nuisance)
     if name not in (NONE, UNKNOWN):
         return GapCause(name, USER_LABELS, f"“{name.replace('_', ' ')}”", "", probability)
-    title = "nothing beyond what healthy machines differ by" if name == NONE else "nothing in the catalogue"
+    title = "nothing beyond the differences between healthy machines" if name == NONE else "nothing in the catalogue"
     return GapCause(name, name, title, "", probability)
 
 
 def in_order(causes: Sequence[GapCause], outcome: GapOutcome) -> tuple[GapCause, ...]:
-    """Put first what the outcome says; the rest by probability."""
+    """Put the cause that matches the outcome first; the rest by probability."""
     ranked = sorted(causes, key=lambda cause: -cause.probability)
     if outcome is GapOutcome.UNDECIDED:
         return tuple(ranked)
@@ -842,41 +845,41 @@ def in_order(causes: Sequence[GapCause], outcome: GapOutcome) -> tuple[GapCause,
 
 
 def most_probable_two(causes: Sequence[GapCause]) -> tuple[str, str] | None:
-    """Return the names of the first two effects, None where there are fewer."""
+    """Return the names of the first two effects, None where there are fewer than two."""
     names = [c.name for c in causes if c.is_effect]
     return (names[0], names[1]) if len(names) > 1 else None
 
 
 SETTLED = 0.01
-"""Probability of the second effect below which nobody needs a further recording to tell it from the first."""
+"""If the second effect is less probable than this, no further recording is needed to separate it from the first."""
 
 
 def names_single_effect(causes: Sequence[GapCause]) -> bool:
-    """Whether of all effects one alone is likely."""
+    """Whether only one of all effects is likely."""
     probabilities = sorted((c.probability for c in causes if c.is_effect), reverse=True)
     return len(probabilities) > 1 and probabilities[1] < SETTLED <= probabilities[0]
 
 
 def named_effects(causes: Sequence[GapCause], outcome: GapOutcome) -> tuple[str, ...]:
-    """Return the effects that an answer names: the first, or those that cannot be told apart."""
+    """Return the effects that a diagnosis names: the first, or those that cannot be separated."""
     if outcome is GapOutcome.CANNOT_SEPARATE:
         return inseparable_effects(causes)
     return (causes[0].name,) if outcome in NAMING else ()
 
 
 def unbounded_fits(causes: Sequence[GapCause], outcome: GapOutcome) -> list[str]:
-    """Say of what is named which effects the fit can give no size."""
+    """Return a message for each named effect whose size the fit does not bound."""
     named = named_effects(causes, outcome)
     return [
         f"{cause.title[0].upper()}{cause.title[1:]}: the fit to the twin bounds its severity neither above nor below. "
-        "How the recordings changed speaks for it, the simulation hardly does."
+        "The evidence for it is how the recordings changed, hardly the simulation."
         for cause in causes
         if cause.name in named and cause.severity is not None and cause.severity.is_unbounded
     ]
 
 
 def _which_undecided(report: GapReport) -> str:
-    """Name the likeliest two, and the group that is likelier than not."""
+    """Name the two most probable causes, and the group that is more probable than not."""
     named = {NONE: "no gap", UNKNOWN: "a gap of unknown cause"}
     most_probable = sorted(report.causes, key=lambda cause: -cause.probability)[:2]
     parts = [f"{named.get(cause.name, cause.title)} {odds_text(cause.probability)}" for cause in most_probable]
@@ -889,7 +892,7 @@ def _which_undecided(report: GapReport) -> str:
 
 
 def _severity(cause: GapCause, severity: Interval) -> str:
-    """Write a severity with three digits, without an exponent, and its unit."""
+    """Format a severity with three digits, without an exponent, and its unit."""
     return f"{float(f'{severity.value:.3g}'):.12g} {severity_unit(cause.unit)}".rstrip()
 
 
@@ -911,31 +914,29 @@ def _shrinkage_text(report: GapReport) -> str:
     for one, both in zip(report.steps[1:], report.steps[2:], strict=False):  # with two effects, where one leaves much
         left = f"from {one.remaining.value:.2g} to {both.remaining.value:.2g} structural floors"
         far += (
-            f" It cannot make all lines; {both.label} beside it takes the whole gap {left}, and may be there as well."
+            f" It cannot explain all lines; adding {both.label} takes the whole gap {left}, so that may be present too."
         )
     return far
 
 
 SLOW_RPM = 300.0
-"""Up to which crack, chip and spall begin to part: of 121 at 120 to 240 rpm 62 in 100 were told rightly, of 227 at 600
-to 3000 rpm 55."""
+"""Speed up to which crack, chip and spall become distinguishable: of 121 at 120 to 240 rpm 62 in 100 were identified
+correctly, of 227 at 600 to 3000 rpm 55."""
 
 WIDE = 2.0
-"""Ratio of speeds from which a resonance is told from an order."""
+"""Ratio of speeds from which a resonance can be distinguished from an order."""
 
 HEALTHY_MACHINE = "the same machine when it was healthy"
 NEXT_STEPS = {
-    "healthy": f"{HEALTHY_MACHINE}, at the same speed and load; then only what has changed since counts",
+    "healthy": f"{HEALTHY_MACHINE}, at the same speed and load, so that only changes since then count",
     "encoders": "encoders on both shafts: no path distorts their transmission error, whose profile over one engagement "
-    "tells a damaged tooth from a displaced one",
+    "distinguishes a damaged tooth from a displaced one",
     "slow_loads": f"two loads below {SLOW_RPM:.0f} rpm, at which the gears ring less over one engagement",
-    "run_up": "a run-up of the healthy machine (--run-up), which measures the path that a tooth's fault takes to the "
-    "sensors",
+    "run_up": "a run-up of the healthy machine (--run-up), which measures the path from a tooth fault to the sensors",
     "other_speed": "the same machine at twice or half the speed: a resonance stays at its frequency, what belongs to a "
     "shaft at its order",
-    "less_gain": "the same with less gain, or a wider range: tops that are cut off and loud low orders both look like "
-    "a sine",
-    "label": "two labelled recordings of each likely cause on this rig (--learn): nothing else tells so much",
+    "less_gain": "the same with less gain, or a wider range: clipped peaks and strong low orders both look like a sine",
+    "label": "two labelled recordings of each likely cause on this rig (--learn): nothing else helps as much",
 }
 
 
@@ -947,31 +948,31 @@ def _next(report: GapReport) -> str:
     if best:
         return f"Next: {best}"
     if report.outcome in (GapOutcome.UNKNOWN, GapOutcome.UNDECIDED):
-        purpose = {"speed": ", which tells orders from resonances"}
+        purpose = {"speed": ", which distinguishes orders from resonances"}
         ways = "".join(f", or another {what}{purpose.get(what, '')}" for what in _unvaried_quantities(report)[:1])
         return f"Next: another sensor nearer to where it is loudest{ways}."
     if report.outcome is GapOutcome.NO_GAP:
-        return "Next: nothing is needed; keep these recordings, later ones are best compared with them."
+        return "Next: nothing is needed; keep these recordings as references for later ones."
     if not names_single_effect(report.causes) and sum(cause.shrinkage is not None for cause in report.causes) < 2:
         ways = " or ".join(_unvaried_quantities(report)) or "sensor"
-        return f"Next: another {ways}; no two effects are likely enough to compute which would tell most."
+        return f"Next: another {ways}; no two effects are likely enough to compute which would help most."
     where_to_look = _common_place(report)
     look = f"look at {where_to_look}; " if where_to_look else ""
     why = "speed or load that was simulated would put the two likeliest effects further apart"
     if names_single_effect(report.causes):
-        why = "effect is likely enough to be told from this one by a further recording"
+        why = "effect is likely enough to be separated from this one by a further recording"
     return f"Next: {look}no other {why}."
 
 
 def _unvaried_quantities(report: GapReport) -> list[str]:
-    """Return what of speed and load is the same in all recordings."""
+    """Return which of speed and load are the same in all recordings."""
     points = [condition.point for condition in report.conditions]
     same = {"speed": same_speed, "load": same_load}
     return [what for what, is_same in same.items() if all(is_same(points[0], point) for point in points)]
 
 
 def _common_place(report: GapReport) -> str:
-    """Return the place that both likeliest effects share, which can be looked at; empty where they have none."""
+    """Return the tooth that both most probable effects share, which can be inspected; empty where they share none."""
     first, second = [cause.place for cause in report.causes if cause.is_effect][:2]
     return first if first == second and first.startswith("tooth") else ""
 
@@ -996,4 +997,4 @@ def _which_seen(report: GapReport) -> str:
 def _next_seen(report: GapReport) -> str:
     if report.references:
         return "Next: another sensor nearer to the bearings, or a longer recording."
-    return f"Next: {HEALTHY_MACHINE}, at the same speed; then only what has changed since is named."
+    return f"Next: {HEALTHY_MACHINE}, at the same speed, so that only changes since then are named."

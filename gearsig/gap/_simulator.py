@@ -1,4 +1,4 @@
-"""What the gap diagnosis asks of a simulator: a twin of one rig that runs at any point, with effects switched on."""
+"""Interface of a simulator to the gap diagnosis: a twin of one rig that runs at any point, with effects switched on."""
 
 from __future__ import annotations
 
@@ -14,29 +14,29 @@ from gearsig.rig import PathOfContact, Rig, ToothContact
 
 @dataclass(frozen=True)
 class GapEffect:
-    """An effect of the catalogue as the diagnosis sees it.
+    """An effect of the catalogue, as used by the diagnosis.
 
     Parameters
     ----------
     name, group, title : str
     severity_name, unit : str
     signature : str
-        Where theory expects it.
+        Where theory predicts it to show.
     shows_in : tuple of str
         Kinds of features, see `sims.effects.Effect.shows_in`.
     is_nuisance : bool
-        Of the measurement chain: in every real recording, never a cause in the machine.
+        Whether it belongs to the measurement chain: present in every real recording, and never a cause in the machine.
     signs : tuple of (str, int)
-        The textbook's: features that rise (1), fall (−1) or change either way (0); ``{side}`` is driver or driven.
+        Textbook signs: features that rise (1), fall (−1) or change either way (0); ``{side}`` is driver or driven.
     moves_pitches : float
-        By how much, either way, its place within a tooth's engagement moves between the severities of its candidates.
+        Maximum shift, either way, of its place within a tooth's engagement between the severities of its candidates.
     is_on_every_tooth : bool
-        Whether it sits on all teeth of a gear, on each by itself.
+        Whether it affects all teeth of a gear, each individually.
     profile_varies_with : str
         Name of its severity or of an option with which the profile of its change over a tooth's engagement varies
-        steadily, so that it can be interpolated; empty: it varies with nothing.
+        smoothly, so that it can be interpolated; empty: there is none.
     turns_with_shaft : bool
-        Whether it is a force that turns with a shaft, which of a linear machine makes the first order alone.
+        Whether it is a force rotating with a shaft, which excites the first order alone in a linear machine.
     """
 
     name: str
@@ -56,7 +56,7 @@ class GapEffect:
 
 @dataclass(frozen=True)
 class AddedEffect:
-    """An effect that is switched on: severity in the effect's unit, and its options (gear, tooth, bearing, order)."""
+    """An effect switched on, with its severity in the effect's unit and its options (gear, tooth, bearing, order)."""
 
     name: str
     severity: float
@@ -64,7 +64,7 @@ class AddedEffect:
 
     @property
     def place(self) -> tuple[tuple[str, float | str], ...]:
-        """The options, for a key."""
+        """The options, as part of a key."""
         return tuple(sorted(self.options.items()))
 
 
@@ -83,44 +83,44 @@ class OperatingCondition:
 
 
 SAME_SPEED, SAME_TORQUE = 0.03, 0.1
-"""Relative: recordings nearer than this to each other are of one operating condition."""
+"""Relative differences within which recordings belong to the same operating condition."""
 
 
 def point_text(point: OperatingCondition) -> str:
-    """Write an operating point for people."""
+    """Format an operating point for display."""
     return f"{float(f'{point.speed_rpm:.4g}'):.6g} rpm and {point.torque_nm:.3g} N·m"
 
 
 def same_condition(first: OperatingCondition, second: OperatingCondition) -> bool:
-    """Whether two points are one operating condition."""
+    """Whether two points belong to the same operating condition."""
     return same_speed(first, second) and same_load(first, second)
 
 
 def same_speed(first: OperatingCondition, second: OperatingCondition) -> bool:
-    """Whether two points are at one speed."""
+    """Whether two points have the same speed."""
     return isclose(first.speed_rpm, second.speed_rpm, rel_tol=SAME_SPEED)
 
 
 def same_load(first: OperatingCondition, second: OperatingCondition) -> bool:
-    """Whether two points are at one torque."""
+    """Whether two points have the same torque."""
     return isclose(first.torque_nm, second.torque_nm, rel_tol=SAME_TORQUE)
 
 
 class Twin(Protocol):
-    """A simulated machine that is set to one rig; what is not known of the rig is usual for its size.
+    """A simulated machine set to one rig; unknown properties of the rig have the usual values for its size.
 
-    The same `seed` gives the same flanks, tolerances and noise at every point, with every effect (common random
-    numbers): two runs differ by the effect only.
+    The same `seed` gives the same flanks, tolerances and noise at every point and with every effect (common random
+    numbers), so that two runs differ by the effect only.
     """
 
     @property
     def key(self) -> str:
-        """Text that changes whenever a run would come out otherwise: model, version, values."""
+        """Text that changes whenever the result of a run would change: model, version, values."""
         ...
 
     @property
     def point(self) -> OperatingCondition:
-        """The rig's nominal operating point, as is usual for its size where the rig does not tell."""
+        """The rig's nominal operating point, or the usual one for its size where the rig does not state it."""
         ...
 
     def run(
@@ -133,35 +133,35 @@ class Twin(Protocol):
         sampling_rate_hz: float,
         noise: int = 0,
     ) -> Recording:
-        """Return a recording with the rig's geometry; another `noise` is another run of the same machine."""
+        """Return a recording with the rig's geometry; another `noise` gives another run of the same machine."""
         ...
 
     def candidates(self, effect: str) -> Sequence[AddedEffect]:
-        """Return settings of an effect worth a try on this machine, from barely noticeable to strong."""
+        """Return settings of an effect worth trying on this machine, from barely noticeable to strong."""
         ...
 
     def preset_toml(self, point: OperatingCondition, added: Sequence[AddedEffect], notes: Sequence[str]) -> str:
-        """Return the machine with the effects as a preset file that `gearsig simulate` runs."""
+        """Return the machine with the effects as a preset file for `gearsig simulate`."""
         ...
 
 
 @runtime_checkable
 class CanBeQuiet(Protocol):
-    """A twin that can also run where nothing vibrates but what an effect adds."""
+    """A twin that can also run without any vibration except that of an added effect."""
 
     def quiet(self) -> Twin:
-        """Return the machine without the noise of its surroundings, its own vibration as small as may be."""
+        """Return the machine without ambient noise and with minimum vibration of its own."""
         ...
 
 
 def as_tried(twin: Twin) -> Twin:
-    """Return the twin that effects are tried on: without noise, if it can be."""
+    """Return the twin for trials of effects: without noise, if possible."""
     return twin.quiet() if isinstance(twin, CanBeQuiet) else twin
 
 
 @runtime_checkable
 class CanRunUp(Protocol):
-    """A twin whose speed can also rise, for the path to be measured."""
+    """A twin whose speed can also rise, so that the path can be measured."""
 
     @property
     def point(self) -> OperatingCondition:
@@ -178,16 +178,16 @@ class CanRunUp(Protocol):
         duration_s: float,
         sampling_rate_hz: float,
     ) -> Recording:
-        """Return a recording of the healthy machine whose speed rises, by equal factors in equal times."""
+        """Return a recording of the healthy machine whose speed rises exponentially."""
         ...
 
 
 @runtime_checkable
 class HasFurtherSettings(Protocol):
-    """A twin that knows further settings of a tooth's fault, which take another profile over the engagement."""
+    """A twin with further settings of tooth faults, whose profiles over the engagement are different."""
 
     def further_settings(self, effect: str) -> Sequence[AddedEffect]:
-        """Return those settings, beside the candidates; none where these show all there is."""
+        """Return these settings, in addition to the candidates; none where the candidates cover all profiles."""
         ...
 
 
@@ -196,20 +196,20 @@ class HasFurtherPlaces(Protocol):
     """A twin that can also be measured where its rig has no sensor."""
 
     def with_further_sensors(self) -> tuple[Twin, Mapping[str, str]]:
-        """Return the machine with a further sensor at each place that has none, and those channels' places."""
+        """Return the machine with an additional sensor at each place without one, and the places of those channels."""
         ...
 
 
 class GapSimulator(Protocol):
-    """A simulator that takes part in the gap diagnosis."""
+    """A simulator that supports the gap diagnosis."""
 
     @property
     def name(self) -> str:
-        """As on the command line."""
+        """Name used on the command line."""
         ...
 
     def gap_effects(self) -> Mapping[str, GapEffect]:
-        """Return the effects that have a meaning for this model."""
+        """Return the effects that are meaningful for this model."""
         ...
 
     def twin_of(self, rig: Rig) -> Twin:
@@ -218,34 +218,35 @@ class GapSimulator(Protocol):
         Raises
         ------
         RefusalError
-            If the rig's data do not suffice, with what is missing.
+            If the rig's data are insufficient, with what is missing.
         """
         ...
 
 
 # --------------------
-# The same of machines that start and stop, whose equations of motion are compared and not their vibration.
+# The same for machines that start and stop, where equations of motion are compared instead of vibration.
 # --------------------
 
 
 @dataclass(frozen=True)
 class DriveFacts:
-    """How a start–stop machine is built and driven: its rig's contact, and what its recording shows.
+    """Design and drive of a start–stop machine: its rig's contact, and values from its recording.
 
     Parameters
     ----------
     path : PathOfContact
     contact : ToothContact
-        Of the rig; half the play, driven inertia and flank friction from a healthy recording where it shows them.
+        Contact of the rig; half the play and driven inertia come from a healthy recording where it shows
+        them.
     module_mm : float
     motor_torque_nm, brake_torque_nm : float
-        With the valve open; in a stop.
+        With the valve open, and during a stop.
     load_friction_nm : float
         On the driven shaft.
     top_speed_rad_s : float
         Of the driver.
     on_s, off_s : float
-        Of a cycle.
+        Durations within a cycle.
     """
 
     path: PathOfContact
@@ -260,11 +261,11 @@ class DriveFacts:
 
 
 class DriveTwin(Protocol):
-    """A simulated drive that is set to one rig and driven as a recording shows it; its runs have no sensor noise."""
+    """A simulated drive set to one rig and driven as in a recording; its runs have no sensor noise."""
 
     @property
     def point(self) -> OperatingCondition:
-        """Torque of the open valve, and the driver's speed that the flow allows."""
+        """Torque with the valve open, and the driver's speed as limited by the flow."""
         ...
 
     def run(self, added: Sequence[AddedEffect] = ()) -> Recording:
@@ -272,42 +273,42 @@ class DriveTwin(Protocol):
         ...
 
     def at_torque(self, factor: float) -> DriveTwin:
-        """Return the drive with another torque of the motor, and so another top speed."""
+        """Return the drive with another motor torque, and hence another top speed."""
         ...
 
     def worn_curve_um(self, deflection_um: float, depth_um: float, n_places: int) -> FloatArray:
-        """Return how much further the driver turns at each place of the mesh cycle with worn teeth, (n_places,).
+        """Return the driver's additional rotation at each place of the mesh cycle with worn teeth, (n_places,).
 
         Parameters
         ----------
         deflection_um : float
-            Of one pair under the ordinary load.
+            Deflection of one pair under the ordinary load.
         depth_um : float
-            Where the wear is greatest.
+            Maximum depth of wear.
         n_places : int
         """
         ...
 
     def crack_stiffness_loss(self, crack: AddedEffect) -> float:
-        """Return which part of its stiffness a cracked tooth loses."""
+        """Return the fraction of its stiffness that a cracked tooth loses."""
         ...
 
     def preset_toml(self, added: AddedEffect, notes: Sequence[str]) -> str:
-        """Return the drive with an effect as a preset file that `gearsig simulate` runs."""
+        """Return the drive with an effect as a preset file for `gearsig simulate`."""
         ...
 
 
 @runtime_checkable
 class DriveSimulator(Protocol):
-    """A simulator that takes part in the gap diagnosis of machines that start and stop."""
+    """A simulator that supports the gap diagnosis of machines that start and stop."""
 
     @property
     def name(self) -> str:
-        """As on the command line."""
+        """Name used on the command line."""
         ...
 
     def gap_effects(self) -> Mapping[str, GapEffect]:
-        """Return the effects that have a meaning for this model."""
+        """Return the effects that are meaningful for this model."""
         ...
 
     def drive_twin_of(self, facts: DriveFacts) -> DriveTwin:

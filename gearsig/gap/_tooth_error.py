@@ -1,11 +1,11 @@
-"""Which fault of a tooth changed the transmission error between encoders on both shafts: no path lies between.
+"""Identify a tooth fault from the change in transmission error between encoders, which involves no transfer path.
 
-While one tooth is in mesh, a root crack lets it give way all through the engagement, most where it carries alone; a
-spall for a short while about the pitch point; a chip where the tip should carry; a wrong pitch moves all teeth. So the
-change of what that gear adds to the transmission error is described by its profile: how long it lasts, how it rises and
-falls, where it lies in the mesh cycle. The descriptors' densities were learned from the static contact of simulators
-that describe teeth otherwise than each other (`app.studies.gap.tooth_errors`); a profile like none of those, as where
-the drive's torsion rings, says nothing.
+While the damaged tooth is in mesh, a root crack makes it deflect throughout the engagement, most where it carries the
+load alone; a spall does so briefly around the pitch point; a chip where the tip should carry load. A pitch error moves
+all teeth. The change in that gear's contribution to the transmission error is therefore described by its profile: its
+duration, how it rises and falls, and its place in the mesh cycle. The densities of these descriptors were learned from
+the static contact of simulators that model teeth in different ways (`app.studies.gap.tooth_errors`). A profile unlike
+any of these, for example where the drive's torsion rings, is no evidence.
 """
 
 from __future__ import annotations
@@ -35,46 +35,47 @@ MAX_BYTES = 10_000_000
 MAKE_TOOTH_ERRORS = "in a checkout of the project: python -m app.studies.gap.tooth_errors"
 
 STEPS = 32
-"""Of a pitch."""
+"""Steps per pitch."""
 WINDOW = 3 * STEPS
-"""In which a tooth's engagement lies, with what is beside it."""
+"""Steps of the window around a tooth's engagement, with a margin."""
 LOWEST_ORDER, HIGHEST_PITCH_ORDER = 3, 8.0
-"""Of the shaft, below which an event is not looked for, as the drive's torsion and a disc put on anew are; per pitch,
-above which the resolution of encoders is most of what there is."""
+"""Order of the shaft below which events are not searched, where the drive's torsion and a remounted disc act; order per
+pitch above which the encoders' resolution dominates."""
 
 STATIC_MESH_HZ = 500.0
-"""Mesh frequency at which a static profile counts half, ln L/(1 + f/f0): the faster teeth meet, the more gears and
-drive ring on. Of 31 faults of the independent rig at 250 to 2800 Hz, profiles that two simulators had taught named 17
-rightly of 27, none with 0.9 or more; it was not tried again with those of three."""
+"""Mesh frequency f0 at which a static profile counts half, ln L/(1 + f/f0): the faster teeth meet, the more gears and
+drive ring. Of 31 faults of the independent rig at 250 to 2800 Hz, profiles learned from two simulators identified 17 of
+27 correctly, none with a probability of 0.9 or more; the test was not repeated with three simulators."""
 
 MIN_OVER_NOISE = 1.25
-"""Of the event's rms over the standard error of one value: the loudest window of noise alone, of which the band keeps
-half, reaches 0.9."""
+"""Minimum ratio of the event's RMS to the standard error of one value: the loudest window of noise alone, of which the
+band keeps half, reaches 0.9."""
 
 BOTH_GEARS = 0.9
-"""Of the larger change, from which the other gear shows it as well."""
+"""Fraction of the larger change from which the other gear shows it as well."""
 
 FAR = 4.3
-"""Distance in standard deviations, over all descriptors, at which one known profile counts as much as none, some 0.85
-of each: of 3.5 to 5, with simulators left out, what is said with 0.9 is right 95 to 99 times in 100."""
+"""Distance in standard deviations, over all descriptors, at which one known profile counts as much as none, about 0.85
+per descriptor: for 3.5 to 5, with simulators left out, statements with a probability of 0.9 are right 95 to 99 times in
+100."""
 
 
 @dataclass(frozen=True)
 class ToothErrorChange:
-    """What changed about the transmission error while the teeth of one gear mesh.
+    """The change in the transmission error while the teeth of one gear are in mesh.
 
     Parameters
     ----------
     side : int
         0: driver, 1: driven gear.
     pattern_um : array, (z, STEPS)
-        Of its teeth in turn.
+        The change, for each of its teeth in turn.
     mesh_um : array, (STEPS,)
-        What each pair of teeth repeated when the machine was healthy.
+        The part common to all pairs of teeth when the machine was healthy.
     rms_um : float
-        Within the window that holds most.
+        Within the window with the most energy.
     noise_um : float
-        Standard error of a value.
+        Standard error of one value.
     """
 
     side: int
@@ -85,15 +86,15 @@ class ToothErrorChange:
 
     @property
     def is_clear(self) -> bool:
-        """Whether it stands out of the noise."""
+        """Whether it stands out from the noise."""
         return self.rms_um >= MIN_OVER_NOISE * self.noise_um
 
 
 def tooth_error_changes(now: TransmissionError, healthy: TransmissionError) -> list[ToothErrorChange]:
-    """Return the change on the gear that shows more of it; on both where they show it alike, as those of equal teeth.
+    """Return the change on the gear where it is larger, or on both where they are similar, as with equal teeth.
 
-    The teeth meet as the encoders count, unless another turn leaves less than half of the difference: encoders that
-    know no zero begin anywhere.
+    Teeth are aligned by the encoder counts, unless another rotation leaves less than half of the difference: encoders
+    without an index pulse start anywhere.
     """
     changes = []
     for side in (0, 1):
@@ -107,12 +108,12 @@ def tooth_error_changes(now: TransmissionError, healthy: TransmissionError) -> l
 
 
 def _resampled(rows: FloatArray) -> FloatArray:
-    """Return rows of means over equal steps at `STEPS` a row, by the lines that both have."""
+    """Return rows of means over equal steps, resampled to `STEPS` per row with the lines common to both."""
     n, m = rows.size, len(rows) * STEPS
     lines = np.fft.rfft(rows.ravel())
     kept = np.zeros(m // 2 + 1, dtype=np.complex128)
     n_kept = min(len(lines), len(kept))
-    # Both are at the middles of their steps.
+    # Both are sampled at the centres of their steps.
     kept[:n_kept] = lines[:n_kept] * np.exp(1j * pi * np.arange(n_kept) * (1.0 / m - 1.0 / n))
     resampled: FloatArray = np.fft.irfft(kept, m).reshape(-1, STEPS) * (m / n)
     return resampled
@@ -130,7 +131,7 @@ def _turned(before: FloatArray, after: FloatArray) -> FloatArray:
 
 
 def _banded(pattern: FloatArray, lowest: int) -> FloatArray:
-    """Return one revolution without its lowest orders and what encoders hardly resolve, (z STEPS,)."""
+    """Return one revolution without its lowest orders and without what encoders cannot resolve, (z STEPS,)."""
     lines = np.fft.rfft(pattern.ravel())
     orders = np.arange(len(lines))
     part = np.cos(0.5 * pi * np.clip(orders / len(pattern) / HIGHEST_PITCH_ORDER, 0.0, 1.0)) ** 2
@@ -144,16 +145,17 @@ def _window_energy(wave: FloatArray) -> FloatArray:
 
 
 def tooth_error_descriptors(change: ToothErrorChange) -> FloatArray:
-    """Return the profile of the largest event, 26 numbers on a scale that is logarithmic where they are large.
+    """Return the profile of the largest event, 26 numbers on a scale that is logarithmic for large values.
 
-    Read from the root of the damaged tooth to its tip, as the driver's contact runs: how much of all is in it, and
-    over what lies beside; its sign; how long it is above 20, 50 and 80 % of its peak, its spread, skewness and
-    kurtosis in pitches; whether it is of one sign; its steepest rise and fall; where its centre, begin and end lie from
-    where the healthy pair gives way most; its centroid over order; its area and swing over the peak; the mean of each
-    quarter from begin to end over the peak; whether the healthy pair gives way for less than half of a pitch. A crack
-    rises towards the tip, a tooth out of its place is the same from both ends; a chip ends where its pair leaves,
-    which begin and end tell better than the centre. Where tips are relieved by more than the load presses out, pairs
-    stand back while two of them carry: the longer part of a pitch then seems to give way, not the shorter.
+    It is read from the root of the damaged tooth to its tip, as contact runs on the driver. The descriptors are: the
+    event's fraction of the total energy, and its level over the background; its sign; its width at 20, 50 and 80 % of
+    its peak; its spread, skewness and kurtosis in pitches; whether it has a single sign; its steepest rise and fall;
+    the places of its centre, start and end relative to the greatest compliance of the healthy pair; its centroid over
+    order; its area and swing over the peak; the mean of each quarter from start to end over the peak; whether the
+    healthy pair is compliant for less than half a pitch. A crack rises towards the tip; a displaced tooth looks the
+    same from both ends; a chip ends where its pair leaves contact, which start and end show better than the centre.
+    With tip relief larger than the load's deflection, pairs recede while two of them carry the load: the longer part of
+    a pitch then seems compliant, not the shorter.
     """
     wave = _banded(change.pattern_um, LOWEST_ORDER)
     energy = _window_energy(wave)
@@ -210,17 +212,17 @@ def tooth_error_descriptors(change: ToothErrorChange) -> FloatArray:
 
 
 EXTENT = 0.15
-"""Of the peak, above which an event lasts: twice what torsion and noise mostly leave beside it."""
+"""Fraction of the peak above which an event lasts: twice what torsion and noise mostly reach beside it."""
 
 
 def _extent(event: FloatArray) -> tuple[int, int]:
-    """Return the first step of what holds the peak, 1, and the one behind it."""
+    """Return the first step of the part that contains the peak, 1, and the step after its last."""
     peak, low = int(np.argmax(event)), np.flatnonzero(event <= EXTENT)
     return int(max(low[low < peak], default=-1)) + 1, int(min(low[low > peak], default=len(event)))
 
 
 def _straightened(event: FloatArray) -> FloatArray:
-    """Return a window less the straight line through the quarter pitches at either end."""
+    """Return a window less the straight line through the quarter pitches at both ends."""
     quarter = STEPS // 4
     at = np.r_[np.arange(quarter), np.arange(WINDOW - quarter, WINDOW)]
     slope, level = np.polyfit(at, event[at], 1)
@@ -230,10 +232,10 @@ def _straightened(event: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class KnownToothErrors:
-    """Descriptors of events of known cause, and how likely each fault makes another: a mean of Gaussian kernels.
+    """Descriptors of events of known cause, and the likelihood of each fault as a mean of Gaussian kernels.
 
     L(x | fault) = mean_i exp(−|A (x − x_i)|²/2) + b, A the inverse root of the covariance within faults, b the weight
-    of a profile like none.
+    of an unknown profile.
 
     Source: B. W. Silverman, *Density Estimation for Statistics and Data Analysis*, 1986, chapter 4.
 
@@ -247,7 +249,7 @@ class KnownToothErrors:
     faults: NDArray[np.str_]
 
     def log_likelihoods(self, descriptors: FloatArray) -> dict[str, float]:
-        """Return fault → ln L, of each of `TOOTH_FAULTS`; equal where the profile is like none that is known."""
+        """Return ln L of each of `TOOTH_FAULTS`; equal where the profile is unlike any known one."""
         within = np.mean([_covariance(self.descriptors[self.faults == name]) for name in TOOTH_FAULTS], axis=0)
         root = np.linalg.cholesky(np.linalg.inv(within))
         apart = np.sum(((self.descriptors - descriptors) @ root) ** 2, axis=1)
@@ -256,7 +258,7 @@ class KnownToothErrors:
 
 
 SHRINKAGE = 0.2
-"""Of a covariance, towards its diagonal."""
+"""Shrinkage of a covariance towards its diagonal."""
 
 
 def _covariance(rows: FloatArray) -> FloatArray:
@@ -266,12 +268,12 @@ def _covariance(rows: FloatArray) -> FloatArray:
 
 @cache
 def load_known_tooth_errors() -> KnownToothErrors:
-    """Return those that come with this version.
+    """Return the events shipped with this version.
 
     Raises
     ------
     InputError
-        If the file is not there, or damaged.
+        If the file is missing or damaged.
     """
     arrays = read_arrays(TOOTH_ERRORS_FILE, MAX_BYTES)
     if arrays is None:
@@ -294,16 +296,16 @@ def _first_pair(recording: Recording) -> str:
 
 @dataclass(frozen=True)
 class ToothErrorEvidence:
-    """What the change of the transmission error says.
+    """The evidence from a change in transmission error.
 
     Parameters
     ----------
     log_likelihoods : mapping
         Fault → ln L.
     rms_um : float
-        Of the change, while the teeth that show it mesh.
+        RMS of the change, while the teeth that show it are in mesh.
     gear : str
-        "driver" or "driven", which shows it; empty: cannot be told.
+        Gear that shows it, "driver" or "driven"; empty if not known.
     """
 
     log_likelihoods: Mapping[str, float]
@@ -312,21 +314,21 @@ class ToothErrorEvidence:
 
     @property
     def probabilities(self) -> dict[str, float]:
-        """Return fault → probability, were all as likely beforehand, likeliest first."""
+        """Return fault → probability for equal priors, most probable first."""
         return shares_of(self.log_likelihoods)
 
     @property
     def is_unlike_any(self) -> bool:
-        """Whether the profile is like none that is known, so that nothing is told apart."""
+        """Whether the profile is unlike any known one, so that it distinguishes nothing."""
         return max(self.probabilities.values()) < UNLIKE
 
 
 UNLIKE = 0.3
-"""Probability of the likeliest of four faults, below which they are as good as equal."""
+"""Probability of the most probable of four faults below which they are practically equal."""
 
 
 def mean_log_likelihoods(evidence: Sequence[ToothErrorEvidence]) -> dict[str, float]:
-    """Return fault → mean ln L over conditions, which say nearly the same; empty where there is none."""
+    """Return fault → mean ln L over conditions, which are strongly dependent; empty where there is no evidence."""
     return {
         name: float(np.mean([at_condition.log_likelihoods[name] for at_condition in evidence]))
         for name in TOOTH_FAULTS
@@ -335,17 +337,17 @@ def mean_log_likelihoods(evidence: Sequence[ToothErrorEvidence]) -> dict[str, fl
 
 
 def tooth_error_evidence(recording: Recording, reference: Recording) -> ToothErrorEvidence | None:
-    """Return what the change of the transmission error says; None where it was not measured, or did not change.
+    """Return the evidence from a change in transmission error; None where it was not measured, or did not change.
 
     Parameters
     ----------
     recording, reference : Recording
-        With their rig; the same encoders, not moved in between.
+        Each with its rig; the encoders must be the same, and not moved in between.
 
     Raises
     ------
     InputError, RefusalError
-        If encoders are there, and the transmission error cannot be had of them; see `transmission_error`.
+        If there are encoders, but the transmission error cannot be computed; see `transmission_error`.
     """
     if not (has_encoders(recording) and has_encoders(reference)):
         return None

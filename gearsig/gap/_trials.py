@@ -1,4 +1,4 @@
-"""The likeliest effects, simulated on the rig's twin and fitted to what was observed."""
+"""Simulate the most probable effects on the rig's twin and fit them to what was observed."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ from gearsig.processes import active_cluster, can_be_sent, killed_text, run_jobs
 from gearsig.rig import SIDES
 
 # --------------------
-# The simulations of a bank, in processes of their own or in this one.
+# The simulations of a bank, in separate processes or in this one.
 # --------------------
 
 
@@ -62,7 +62,7 @@ RunKey = tuple[str, OperatingCondition, float, float]
 
 @dataclass(frozen=True)
 class TwinRun:
-    """Where and how long a twin runs: with the noise and start of its healthy run, so that only an effect differs."""
+    """Point and length of a twin's run, with noise and start as in its healthy run, so that only an effect differs."""
 
     twin: Twin
     point: OperatingCondition
@@ -71,11 +71,11 @@ class TwinRun:
 
     @property
     def key(self) -> RunKey:
-        """What its runs depend on; twins need not hash."""
+        """Everything a run depends on; twins need not be hashable."""
         return self.twin.key, self.point, self.duration_s, self.sampling_rate_hz
 
     def reduced(self, added: AddedEffect | None) -> ReducedRecording:
-        """Return a run with an effect, or healthy, reduced."""
+        """Return the reduced features of a run, with an effect or healthy."""
         recording = self.twin.run(
             self.point,
             () if added is None else (added,),
@@ -89,7 +89,7 @@ class TwinRun:
 
 @dataclass(frozen=True)
 class Task:
-    """One simulation with an effect, or healthy; each of the `further` channels is looked at by itself."""
+    """One simulation, with an effect or healthy; each of the `further` channels is evaluated by itself."""
 
     run: TwinRun
     added: AddedEffect | None
@@ -98,10 +98,10 @@ class Task:
 
 @dataclass(frozen=True)
 class Reduced:
-    """One simulation's features, of a healthy one only, and its change against the healthy run.
+    """One simulation's features (for a healthy run only) and its change against the healthy run.
 
-    `sidebands` are the change's, see `mesh_sidebands`. `alone` has each channel's own change where there are further
-    channels; they have no part in `change`.
+    `sidebands` are those of the change, see `mesh_sidebands`. Where there are further channels, `alone` has each
+    channel's own change; the further channels do not count in `change`.
     """
 
     names: tuple[str, ...]
@@ -115,10 +115,10 @@ class Reduced:
 def finished_runs(
     tasks: Sequence[Task], processes: int, on_progress: Callable[[int, int], object], *, n_together: int = 1
 ) -> list[Reduced | str]:
-    """Return what each task gave, or why it could not be simulated, in the order of the tasks.
+    """Return the result of each task, or why it could not be simulated, in the order of the tasks.
 
-    So many tasks on end go to one process: those that share a healthy run then simulate it once. A twin that other
-    processes could not know, as it is defined in the caller's script, runs in this one.
+    `n_together` consecutive tasks go to one process, so that tasks with a common healthy run simulate it once. A twin
+    that cannot be sent to other processes, because it is defined in the caller's script, runs in this one.
     """
     answers: list[Reduced | str] = [""] * len(tasks)
     if (processes == 1 and active_cluster() is None) or not can_be_sent(tasks[:1]):
@@ -128,7 +128,7 @@ def finished_runs(
             on_progress(i + 1, len(tasks))
         return answers
     batches = [tasks[i : i + n_together] for i in range(0, len(tasks), n_together)]
-    # A cluster's workers outlive a twin: what they know of its healthy runs is forgotten after each batch.
+    # A cluster's workers outlive a twin: they forget its healthy runs after each batch.
     work = reduced_in_worker if active_cluster() is None else reduce_in_worker
     done = 0
     for number, rows in run_jobs(work, batches, n_workers=processes, if_killed=_killed_batch):
@@ -143,22 +143,22 @@ def _killed_batch(tasks: Sequence[Task]) -> list[Reduced | str]:
 
 
 def run_for_a_moment(twin: Twin, added: Sequence[AddedEffect] = ()) -> None:
-    """Run a twin for no longer than it takes to see that it can, and that what it needs is loaded."""
+    """Run a twin just long enough to see that it works, and to load what it needs."""
     twin.run(twin.point, added, seed=SEED, duration_s=0.05, sampling_rate_hz=20480.0)
 
 
 Known = dict[RunKey, ReducedRecording]
 _KNOWN: Known = {}
-"""Healthy runs by twin, point and length, of the one diagnosis that a worker works for."""
+"""Healthy runs by twin, point and length, of the one diagnosis for which a worker lives."""
 
 
 def reduced_in_worker(tasks: Sequence[Task]) -> list[Reduced | str]:
-    """Return what tasks give, in a process that lives for one diagnosis only."""
+    """Return the results of tasks, in a process that lives for one diagnosis only."""
     return [_reduced(task, _KNOWN) for task in tasks]
 
 
 def reduce_in_worker(tasks: Sequence[Task]) -> list[Reduced | str]:
-    """Return what tasks give, in a process that works for several diagnoses."""
+    """Return the results of tasks, in a process that serves several diagnoses."""
     known: Known = {}
     return [_reduced(task, known) for task in tasks]
 
@@ -186,45 +186,45 @@ def _reduced(task: Task, known: Known) -> Reduced | str:
 
 
 # --------------------
-# What each effect would change on one rig at one operating point: simulated once, kept on disk.
+# The changes that each effect causes on one rig at one operating point: simulated once, kept on disk.
 # --------------------
 
 
 Progress = Callable[[int, int], object]
 POINT_DIGITS = 3
-"""Speed and torque are rounded to so many digits: recordings of one set point share a bank."""
+"""Digits to which speed and torque are rounded: recordings of one set point share a bank."""
 
 _MODULES = (
     *(f"gearsig.gap.{name}" for name in ("_reduction", "_features", "_change", "_waveform")),
     *(f"gearsig.{name}" for name in ("severity._features", "orders._average", "prepared._angle")),
     *(f"gearsig.angle.{name}" for name in ("_source", "_resample", "_tachless")),
 )
-"""Those whose code changes a feature."""
+"""Modules whose code determines the features."""
 
 
 @cache
 def features_digest() -> str:
-    """Return a short hash of the code that makes features of a recording."""
+    """Return a short hash of the code that computes features from a recording."""
     return modules_digest(_MODULES)
 
 
 @dataclass(frozen=True)
 class Bank:
-    """Simulated features of the healthy machine, and what each candidate of one effect changes in them.
+    """Simulated features of the healthy machine, and the changes that each candidate of one effect causes in them.
 
     Parameters
     ----------
     feature_names : tuple of str
-        Of `healthy`; see `feature_values`.
+        Names of `healthy`; see `feature_values`.
     change_names : tuple of str
-        Of the changes, the features' names first; see `change_feature_values`.
+        Names of the changes, those of the features first; see `change_feature_values`.
     healthy : array, (n_features,)
     added : tuple of AddedEffect
-        The candidates that could be simulated.
+        Candidates that could be simulated.
     changes : array, (n_added, n_changes)
-        Each candidate's run against the healthy run.
+        Change of each candidate's run against the healthy run.
     sidebands : complex array, (n_added, n_channels, 2, n_harmonics, n_offsets)
-        The same beside the mesh harmonics, see `mesh_sidebands`.
+        The same change in the sidebands of the mesh harmonics, see `mesh_sidebands`.
     """
 
     feature_names: tuple[str, ...]
@@ -244,22 +244,23 @@ def banks_of(
     fresh: bool = False,
     on_progress: Progress = lambda _done, _all: None,
 ) -> list[dict[str, Bank]]:
-    """Return for each operating point the effects' banks, from disk or simulated and kept.
+    """Return the effects' banks for each operating point, read from disk or simulated and kept.
 
     Parameters
     ----------
     runs : sequence of TwinRun
-        Twin, point, length of what is simulated; the point is rounded to `POINT_DIGITS` digits.
+        Twin, point and length of each simulation; the point is rounded to `POINT_DIGITS` digits.
     candidates : mapping
-        Effect → its settings that are simulated; each effect has a file of its own.
+        Effect → its settings to simulate; each effect has its own file.
     folder : Path or None
-        Where they are kept; None: nowhere.
+        Where banks are kept; None: nowhere.
     processes : int
-        1: in this process. Otherwise the twins must pickle.
+        1: in this process. Otherwise the twins must be picklable.
     fresh : bool
-        Simulate what is on disk, too, and keep it in its place.
+        Simulate again what is on disk, and replace it.
     on_progress : callable
-        Told how many of all runs are done; what it raises stops the work, and nothing is kept.
+        Called with the numbers of finished and of all runs; an exception raised in it stops the work, and nothing is
+        kept.
 
     Raises
     ------
@@ -293,12 +294,12 @@ def banks_of(
 
 
 def rounded(point: OperatingCondition, n_digits: int = POINT_DIGITS) -> OperatingCondition:
-    """Return the point with so many digits: that at which a bank is made, or one that is easily set."""
+    """Return the point rounded to so many digits, as used for a bank or easy to set on the machine."""
     return OperatingCondition(*(float(f"{value:.{n_digits}g}") for value in (point.speed_rpm, point.torque_nm)))
 
 
 def bank_key(run: TwinRun, candidates: Sequence[AddedEffect]) -> str:
-    """Return all that a bank's numbers depend on, as text."""
+    """Return everything that a bank's numbers depend on, as text."""
     settings = [_plain(added) for added in candidates]
     lengths = [run.duration_s, run.sampling_rate_hz]
     known = [run.twin.key, features_digest(), [run.point.speed_rpm, run.point.torque_nm], settings, lengths]
@@ -326,11 +327,11 @@ def _assembled(candidates: Sequence[AddedEffect], healthy: Reduced | str, rows: 
     )
 
 
-# A bank on disk: arrays without pickles, whole or not at all; a file that does not fit is made again.
+# A bank on disk: arrays without pickles, written atomically; a file that does not match is replaced.
 
 _ARRAYS = ("healthy", "changes", "sidebands")
 MAX_BYTES = 100_000_000
-"""Of a bank's arrays; a real one has less than one."""
+"""Limit of a bank's arrays; a real bank has less than one megabyte."""
 
 
 def _bank_path(folder: Path, key: str) -> Path:
@@ -338,7 +339,7 @@ def _bank_path(folder: Path, key: str) -> Path:
 
 
 def write_bank(path: Path, key: str, bank: Bank) -> None:
-    """Keep a bank for the next diagnosis of its rig, where the folder can be written."""
+    """Keep a bank for the next diagnosis of its rig, if the folder is writable."""
     names, added = [bank.feature_names, bank.change_names], [_plain(added) for added in bank.added]
     about = np.array(json.dumps({"key": key, "names": names, "added": added}))
     arrays: dict[str, Any] = {name: getattr(bank, name) for name in _ARRAYS}
@@ -346,7 +347,7 @@ def write_bank(path: Path, key: str, bank: Bank) -> None:
 
 
 def read_bank(path: Path, key: str) -> Bank | None:
-    """Return the bank that a file holds for this key, None where there is no such file, or it is damaged or foreign."""
+    """Return the bank that a file holds for this key, None where the file is missing, damaged or foreign."""
     data = read_arrays(path, MAX_BYTES)
     if data is None:
         return None
@@ -366,24 +367,24 @@ def _plain(added: AddedEffect) -> list[Any]:
 
 
 PROCESSES = 2
-"""In which one diagnosis is made."""
+"""Number of processes for one diagnosis."""
 
 
 @dataclass(frozen=True)
 class TriedEffect:
-    """One effect as it was tried.
+    """The trial of one effect.
 
     Parameters
     ----------
     name : str
     paths : tuple of EffectPath
-        On the shaft that the recordings tell by themselves, where they do.
+        On the shaft that the recordings identify by themselves, where they do.
     fit : Fit
-        To all conditions.
+        Fit to all conditions.
     shrinkage : Shrinkage
         On held-out data.
     match : WaveformMatch or None
-        Of a tooth's fault, with a reference: how well the twin shows its profile, and at which severity.
+        For a tooth fault, with a reference: how well the twin reproduces its profile, and at which severity.
     """
 
     name: str
@@ -394,22 +395,22 @@ class TriedEffect:
 
     @property
     def is_shown(self) -> bool:
-        """Whether the twin shows the profile of a tooth's fault well."""
+        """Whether the twin reproduces the profile of a tooth fault well."""
         return self.match is not None and self.match.is_good
 
     @property
     def added(self) -> AddedEffect:
-        """The setting that comes nearest: by waveform where the twin shows it well."""
+        """The best setting: by waveform where the twin reproduces it well, else by the fit."""
         return self.match.added if self.match is not None and self.match.is_good else self.fit.added
 
     @property
     def severity(self) -> Interval:
-        """The same as an interval."""
+        """Its severity as an interval."""
         return self.match.severity if self.match is not None and self.match.is_good else self.fit.severity
 
     @property
     def explains(self) -> bool:
-        """Whether the twin shows the effect and comes nearer with it: else severity and place mean nothing."""
+        """Whether the effect shows in the twin and brings it nearer; otherwise severity and place mean nothing."""
         return self.is_shown or (self.shrinkage.is_predicted and self.shrinkage.shrink.value > 0.0)
 
 
@@ -424,7 +425,7 @@ def try_effects(
 ) -> dict[str, TriedEffect]:
     """Simulate each effect at every condition, fit it, and score it on data that it was not fitted to.
 
-    Effects that the rig cannot have, for it lacks a bearing, say, are left out.
+    Effects that the rig cannot have, for example because it has no bearing, are omitted.
 
     Parameters
     ----------
@@ -436,19 +437,19 @@ def try_effects(
     cache : path or None
         Folder of simulated banks; None: nothing is kept.
     on_progress : callable
-        Takes what is done, in words, and the part of it that is, 0 to 1.
+        Called with the current step in words and the fraction completed, 0 to 1.
     fresh : bool
-        Whether kept banks are made anew.
+        Whether to simulate kept banks again.
 
     Returns
     -------
     dict
-        Effect → how it was tried: its fit, its shrinkage on held-out data, and its waveform where that is of one tooth.
+        Effect → its trial: fit, shrinkage on held-out data and, for a tooth fault, waveform match.
 
     Raises
     ------
     RefusalError
-        If the rig has a place for some of the effects, and none of them can be simulated there.
+        If the rig has a place for some of the effects, but none of them can be simulated there.
     """
     if not effects:
         return {}
@@ -498,9 +499,9 @@ def try_effects(
 
 
 def candidates_to_simulate(candidates: Sequence[AddedEffect], determined: Mapping[str, str]) -> list[AddedEffect]:
-    """Return the candidates on the shaft that the recordings tell by themselves, and the strongest on the other one.
+    """Return the candidates on the shaft that the recordings identify, and the strongest candidate on the other shaft.
 
-    That one serves as a placebo. All where nothing is told, or no candidate is there.
+    The latter serves as a placebo. Return all candidates where no shaft is identified or none of them is on it.
     """
     placed = [added for added in candidates if determined.items() <= added.options.items()]
     if not placed:
@@ -510,7 +511,7 @@ def candidates_to_simulate(candidates: Sequence[AddedEffect], determined: Mappin
 
 
 def _match(banks: Sequence[Bank], conditions: Sequence[Condition], effect: GapEffect) -> WaveformMatch | None:
-    """Return what an effect's waveforms say at the conditions that have a reference."""
+    """Return the match of an effect's waveforms at the conditions that have a reference."""
     waveforms = []
     for bank, condition in zip(banks, conditions, strict=True):
         if condition.reference is None:
@@ -549,10 +550,10 @@ def _match(banks: Sequence[Bank], conditions: Sequence[Condition], effect: GapEf
 def _settings(
     bank: Bank, effect: GapEffect, teeth: Sequence[int]
 ) -> Iterator[tuple[AddedEffect, int, ComplexArray, int]]:
-    """Yield what waveforms are compared with: a setting, its gear, sidebands of that, and how many teeth have it.
+    """Yield what to compare waveforms with: setting, gear, its sidebands, and number of teeth that have the effect.
 
-    An effect that may sit on every tooth, each by itself, was simulated on one: that stands for itself and, the first
-    of each gear, for all. 0 teeth: it sits on one.
+    An effect that may affect every tooth individually was simulated on one tooth. The simulation represents that tooth
+    and, the first one of each gear, also all teeth. 0 teeth: the effect is on one tooth.
     """
     for side in range(len(SIDES)):
         simulated = [
@@ -570,34 +571,34 @@ def _settings(
 def on_shaft(
     paths: Sequence[EffectPath], determined: Mapping[str, str]
 ) -> tuple[tuple[EffectPath, ...], tuple[EffectPath, ...]]:
-    """Return the paths on the shaft that the recordings tell by themselves, and the others; all where they do not."""
+    """Return the paths on the shaft that the recordings identify, and the others; all where they identify none."""
     kept = tuple(path for path in paths if determined.items() <= path.options.items())
     remaining = tuple(path for path in paths if not determined.items() <= path.options.items())
     return (kept, remaining) if kept else (remaining, ())
 
 
 def n_compared(conditions: Sequence[Condition]) -> int:
-    """Return how many features all conditions have and a simulation can predict; those of patterns need references."""
+    """Return how many features all conditions share and a simulation can predict; pattern features need references."""
     return min(sum(not name.startswith(UNPREDICTED) for name in c.change.names) for c in conditions)
 
 
 def observed_changes(conditions: Sequence[Condition]) -> list[ObservedChange]:
-    """Return each condition's observed distances and floors, of what is compared at all of them."""
+    """Return each condition's observed distances and floors, of the features compared at all of them."""
     n = n_compared(conditions)
     return [observed(condition, k, n) for k, condition in enumerate(conditions)]
 
 
 def trial_run(twin: Twin, facts: ConditionFacts, now: ReducedRecording) -> TwinRun:
-    """Return where an effect is simulated: without noise, if the twin can, in which what it adds would drown.
+    """Return the run in which an effect is simulated, without the noise that would mask it, if the twin allows that.
 
-    It starts as the healthy run does, so that all that differs is the effect. The machine's own baseline is put under
-    it, see `_distances`.
+    It starts as the healthy run does, so that only the effect differs. The machine's own baseline is substituted later,
+    see `_distances`.
     """
     return TwinRun(as_tried(twin), facts.point, float(f"{trial_length_s(now):.3g}"), facts.sampling_rate_hz)
 
 
 def start_healthy_trial(twin: Twin, facts: ConditionFacts, now: ReducedRecording) -> None:
-    """Let workers run the healthy machine that trials are compared with, before it is known which are made."""
+    """Let workers simulate the healthy baseline of the trials before it is known which trials are made."""
     run = trial_run(twin, facts, now)
     start_early(reduced_in_worker, [Task(replace(run, point=rounded(run.point)), None)])
 
@@ -615,12 +616,12 @@ def _paths(
 
 
 def _distances(bank: Bank, kept: Sequence[AddedEffect], condition: Condition, shows_in: tuple[str, ...]) -> FloatArray:
-    """Return what candidates would change on the healthy machine's own baseline, (n_ways, n_candidates, n).
+    """Return the changes by candidates on the healthy machine's own baseline, (n_ways, n_candidates, n).
 
-    Nothing where theory does not expect it: a simulation changes more, and that is its own.
+    Zero where theory expects no change: changes simulated there are artefacts of the simulator.
 
-    The reference shows the baseline; without one it is what the twin, as far as it is credible, lets expect of healthy
-    machines. The bank's own healthy machine may be a quiet one, and is not asked.
+    The reference shows the baseline. Without one, the baseline is what the twin, as far as it is credible, predicts for
+    healthy machines. The bank's own healthy machine is not used, as it may be a quiet one.
     """
     floor, names = condition.floor, bank.feature_names
     usual = -floor.from_centre(floor.names, np.zeros(len(floor.names)))
@@ -638,7 +639,7 @@ def _distances(bank: Bank, kept: Sequence[AddedEffect], condition: Condition, sh
 
 
 def folds_of(conditions: Sequence[Condition]) -> list[Fold]:
-    """Return what to fit to and what to score on: half of the revolutions at a condition, and all but that half."""
+    """Return the folds: half of a condition's revolutions to score on, all the rest to fit to."""
     n, whole = n_compared(conditions), observed_changes(conditions)
     folds = []
     for k, condition in enumerate(conditions):
@@ -653,7 +654,7 @@ def folds_of(conditions: Sequence[Condition]) -> list[Fold]:
 
 
 def _left_out_changes(condition: Condition, index: int, n: int) -> tuple[tuple[ObservedChange, ...], ...]:
-    """Return the condition with each block left out: blocks of the recording, then of what it is compared with."""
+    """Return the condition with each block left out in turn: those of the recording, then those of its baseline."""
     base, values = observed(condition, index, n), condition.change.values[:n]
     return tuple(
         tuple(replace(base, distances=base.distances + row[:n] - values) for row in rows)
@@ -662,15 +663,15 @@ def _left_out_changes(condition: Condition, index: int, n: int) -> tuple[tuple[O
 
 
 # --------------------
-# What is left of a gap once effects are added, one after another, on data that they were not fitted to.
+# What remains of a gap as effects are added one after another, on data that they were not fitted to.
 # --------------------
 
 
 MIN_CLOSED = 0.05
-"""Share of the gap that a further effect must take away to be shown."""
+"""Share of the gap that a further effect must remove to be shown."""
 
 MUCH_LEFT = 1.0
-"""Structural floors of the whole gap that one effect must leave for another beside it to be tried."""
+"""Structural floors of the whole gap that one effect must leave before a second one is tried."""
 
 
 def steps_of(
@@ -680,19 +681,19 @@ def steps_of(
     beside: GapCause | None,
     try_further: Callable[[str], TriedEffect | None],
 ) -> tuple[GapStep, ...]:
-    """Return the whole gap before, what is left with the likeliest effect, and with another one beside it as well.
+    """Return the whole gap before, what remains with the likeliest effect, and with another effect beside it.
 
     Parameters
     ----------
     conditions : sequence of Condition
     tried : mapping
-        Effect → how it was tried.
+        Effect → its trial.
     causes : sequence of GapCause
-        In their order.
+        In the order of the report.
     beside : GapCause or None
-        What may be there beside the likeliest, where that leaves much.
+        Effect that may accompany the most probable one, where that leaves much of the gap.
     try_further : callable
-        Effect → how it was tried, None where it cannot be: asked where `beside` was not.
+        Effect → its trial, None where it cannot be tried; called if `beside` was not tried.
     """
     folds = folds_of(conditions)
     steps = [GapStep("before", _remaining_gap(conditions, folds, []))]
@@ -715,7 +716,7 @@ def steps_of(
 
 
 def _remaining_gap(conditions: Sequence[Condition], folds: Sequence[Fold], added: Sequence[TriedEffect]) -> Interval:
-    """Return the whole gap's size, mean over folds; each effect is fitted to what the ones before it leave."""
+    """Return the size of the whole gap, mean over folds; each effect is fitted to what the previous ones leave."""
     sizes = []
     for fold in folds:
         condition = conditions[fold.scored.condition]
@@ -737,7 +738,7 @@ def _without(change: ObservedChange, fits: Sequence[Fit]) -> ObservedChange:
 
 
 def _size(condition: Condition, scored: ObservedChange, explained: FloatArray, n: int) -> Interval:
-    """Return the size of what a condition's change leaves, with the scored part's own distances."""
+    """Return the size of what remains of a condition's change, with the distances of the scored part."""
     change = condition.change
     structural = condition.floor
     whole = structural.from_centre(change.names, change.values)
@@ -752,14 +753,14 @@ def _size(condition: Condition, scored: ObservedChange, explained: FloatArray, n
 
 
 # --------------------
-# Where on the machine a fitted effect sits, in words.
+# The place of a fitted effect on the machine, in words.
 # --------------------
 
 
 def place_of(added: AddedEffect, frame: GearFrame, places: Sequence[GapPlace]) -> str:
     """Return "tooth 7 of the gear on the input shaft", "bearing 2", "order 6"; empty where the effect has no place.
 
-    The tooth is that of the recording, not of the simulation, which stands for all.
+    The tooth is that of the recording; the simulated tooth represents any of them.
     """
     options = added.options
     if "bearing" in options:
@@ -771,7 +772,7 @@ def place_of(added: AddedEffect, frame: GearFrame, places: Sequence[GapPlace]) -
         return ""
     shaft = frame.shafts[SIDES.index(str(side))]
     words = shaft_text(frame, SIDES.index(str(side)))
-    mate = " or its mate" if frame.teeth[0] == frame.teeth[1] else ""  # the same teeth meet at every revolution
+    mate = " or its mate" if frame.teeth[0] == frame.teeth[1] else ""  # the same teeth mesh at every revolution
     if "tooth" not in options:
         return f"the gear on {words}{mate}" if "gear" in options else words
     tooth_place = _tooth_place(shaft, places)
@@ -784,7 +785,7 @@ def place_of(added: AddedEffect, frame: GearFrame, places: Sequence[GapPlace]) -
 
 
 def _bearings(name: str, fitted: str, frame: GearFrame, places: Sequence[GapPlace]) -> list[str]:
-    """Return the bearings whose race stands out of the recording, or else those that look like the fitted one."""
+    """Return the bearings whose race stands out in the recording, otherwise those that match the fitted one."""
     race = RACES.get(name)
     if race is None:
         return [fitted]
@@ -801,11 +802,12 @@ def _bearings(name: str, fitted: str, frame: GearFrame, places: Sequence[GapPlac
 def cause_place(
     name: str, tried: TriedEffect | None, conditions: Sequence[Condition], places: Sequence[GapPlace]
 ) -> str:
-    """Return where a cause sits, in words; empty where it has no place or nothing is known of it.
+    """Return where a cause is, in words; empty where it has no place or the place is not known.
 
-    Which shaft, the recordings tell by themselves. Where they do not, a fit tells that is clearly better on one of them
-    than on the other; then, of a tooth's fault, that on one shaft alone a tooth stands out: in the other's average its
-    bursts are smeared. Else that is what it says. Pitch errors are of one tooth where one stands out, else of all.
+    The recordings themselves may identify the shaft. Otherwise it is taken from a fit that is clearly better on one
+    shaft than on the other; then, for a tooth fault, from a single shaft on which a tooth stands out, since on the
+    other shaft's average its bursts are smeared. If none of this decides, the text says so. Pitch errors are attributed
+    to one tooth where one stands out, else to all.
     """
     frame = conditions[0].now.frame
     changes = [condition.over_floors for condition in conditions]
@@ -823,11 +825,11 @@ def cause_place(
     if name in TOOTH_FAULTS and len(gears) == 1:
         return place_of(AddedEffect(name, 0.0, {"gear": gears.pop(), "tooth": 1.0}), frame, places)
     either = " or ".join(shaft_text(frame, side) for side in range(len(SIDES)))
-    return f"{either} (which cannot be told)"
+    return f"{either} (which one is not known)"
 
 
 def _is_clear(tried: TriedEffect, conditions: Sequence[Condition]) -> bool:
-    """Whether the fit is worse on the other shaft by more than chance."""
+    """Whether the fit on the other shaft is worse by more than chance."""
     observations = observed_changes(conditions)
     by_shaft = [
         [path for path in tried.paths if path.options.get("gear", path.options.get("shaft")) == side] for side in SIDES
@@ -837,7 +839,7 @@ def _is_clear(tried: TriedEffect, conditions: Sequence[Condition]) -> bool:
 
 
 def at_recorded_tooth(added: AddedEffect, frame: GearFrame, places: Sequence[GapPlace]) -> AddedEffect:
-    """Return the setting with the recording's tooth in place of the simulated one, where a mark gives it a number."""
+    """Return the setting with the recording's tooth instead of the simulated one, where a mark gives it a number."""
     if "tooth" not in added.options:
         return added
     tooth_place = _tooth_place(frame.shafts[SIDES.index(str(added.options["gear"]))], places)
@@ -851,7 +853,7 @@ def _tooth_place(shaft: str, places: Sequence[GapPlace]) -> GapPlace | None:
 
 
 def _order(frame: GearFrame, places: Sequence[GapPlace], fitted: float) -> str:
-    """Return the order that the recording shows, or else the fitted one."""
+    """Return the order that the recording shows, otherwise the fitted one."""
     for place in places:
         if place.kind is PlaceKind.SHAFT and place.shaft == frame.shafts[0] and place.orders:
             return f"order {place.orders[0]:.3g}"

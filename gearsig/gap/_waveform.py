@@ -1,23 +1,23 @@
-"""Which fault of a tooth changes the vibration as the recorded one did, and how severe it is: by waveform, not energy.
+"""Identify a tooth fault and its severity from the waveform, not the energy, of the recorded change.
 
-A crack, a spall and a chip of one tooth put as much energy beside the mesh harmonics as each other, with another
-profile over the engagement. That profile is in the complex sidebands of the difference from the healthy machine. Each
-is taken relative to the mesh line between them, u_k[i] = D[k z + i]/Y[k z]: that cancels a path that is smooth about a
-harmonic, and where the shaft's angle begins, but for a turn by one angle, u → u exp(−jiφ).
+A crack, a spall and a chip of one tooth put about the same energy into the sidebands of the mesh harmonics, but their
+profiles over the engagement differ. The profile is contained in the complex sidebands of the difference from the
+healthy machine. Each sideband is divided by its mesh line, u_k[i] = D[k z + i]/Y[k z]. This cancels a path that is
+smooth around a harmonic, and the origin of the shaft's angle except for a rotation, u → u exp(−jiφ).
 
-What is observed is taken for the simulated change, t, times a scale, times a gain of each harmonic, and a rest:
+The observation is modelled as the simulated change t, times a scale, times a gain of each harmonic, plus a remainder:
 
     u_k[i] = h e_k t_k[i] exp(−j(iφ + 2πkδ)) + r,  h = g √(1 − f),  e_k ~ CN(1, α²),  r ~ CN(0, n + f P_k),
 
-n the noise of the averages, P_k the power observed about harmonic k, f the share of it whose profile the twin does not
-show. φ, δ and f are averaged over: whatever has more freedom does not win by that, and a twin that is not like the
-machine leaves f near 1, where all faults are as likely as each other. How good a witness the twin is shows with the
-fault itself, then, and before that on the healthy machine: α is by how much its mesh lines miss the reference's.
+with n the noise of the averages, P_k the power observed around harmonic k, and f the fraction of it whose profile the
+twin does not reproduce. φ, δ and f are averaged over, so that a model gains nothing by its freedom. A twin that is
+unlike the machine leaves f near 1, where all faults are equally likely. The reliability of the twin thus shows in the
+fault itself, and before that in the healthy machine: α is the error of its mesh lines against the reference.
 
-Uneven pitch stands on one tooth, ahead or behind, or on every tooth. Of all of them its change is that of one tooth,
-once for each and as much as that tooth is out: order i beside all harmonics and on all channels has one unknown factor,
-u_k[i] = h b_i t_k[i] + r, b_−i = b_i*. With single deviations that are independent of each other, Σ f = 0, cumulative
-ones have b_i ~ CN(0, z/(4 sin²(πi/z))).
+A pitch error affects one tooth, leading or lagging, or every tooth. If it affects all of them, the change is the sum of
+single-tooth changes, each in proportion to that tooth's deviation: order i around all harmonics and on all channels has
+one unknown factor, u_k[i] = h b_i t_k[i] + r, b_−i = b_i*. With independent single deviations f, Σ f = 0, the
+cumulative ones have b_i ~ CN(0, z/(4 sin²(πi/z))).
 """
 
 from __future__ import annotations
@@ -39,35 +39,38 @@ from gearsig.rig import SIDES
 
 N_HARMONICS = 8
 OFFSETS = np.array([*range(-12, -2), *range(3, 13)])
-"""Orders beside a mesh harmonic: nearer lie the modulations of shafts, further what the next harmonic has."""
+"""Orders relative to a mesh harmonic: closer ones hold modulation by the shafts, further ones belong to the next
+harmonic."""
 
 MIN_GAIN_SCATTER = 0.3
-"""The least α: flanks that deviate from the drawing change each mesh line by itself."""
+"""Minimum α: flanks that deviate from the drawing change each mesh line individually."""
 
 COUNTED = 0.2
-"""Power of a sensor's likelihood, over the number of sensors, after which sidebands count as independent: they are
-smooth over order, and sensors share the engagement. Of 0.1, 0.15, 0.2, 0.25, 0.35 on 40 faults of 5 development
-machines of the simulator itself log loss is 0.66, 0.43, 0.20, 0.14, 0.43 among the four; on 32 of the independent rig
-1.39, –, 1.37, 1.39, 1.80, where saying nothing gives 1.39."""
+"""Exponent of a sensor's likelihood, divided by the number of sensors, with which sidebands count as independent: they
+are smooth over order, and sensors share the engagement. For 0.1, 0.15, 0.2, 0.25 and 0.35 on 40 faults of 5 development
+machines of the simulator itself, the log loss among the four is 0.66, 0.43, 0.20, 0.14 and 0.43; on 32 of the
+independent rig 1.39, –, 1.37, 1.39 and 1.80, where no information gives 1.39."""
 
 MISFITS = (0.1, 0.2, 0.4, 0.7, 1.0)
-"""f, none likelier than another."""
+"""Values of f, all equally likely."""
 
 LOG_SCALES = np.linspace(-3.0, 3.0, 25)
-"""ln g."""
+"""Values of ln g."""
 
 SCALE_SCATTER = 0.7
-"""Of ln g where the severity is right: mesh lines of deviating flanks, cracks at other angles, wider chips."""
+"""Standard deviation of ln g at the true severity: mesh lines of deviating flanks, cracks at other angles, wider
+chips."""
 
 PROFILE_SCATTER = 0.07
-"""Of ln s where the profile varies with the severity: flanks of another specimen meet, and part, some 0.03 pitches
-elsewhere. A chip's edge moves by a pitch for each module of its height, of which up to 0.9 are plausible."""
+"""Standard deviation of ln s where the profile varies with the severity: flanks of another specimen come into contact,
+and separate, some 0.03 pitches elsewhere. A chip's edge moves by one pitch per module of its height, of which up to 0.9
+are plausible."""
 
 MIN_CORRELATION = 0.6
-"""Correlation from which a twin is believed to show the profile of a fault."""
+"""Correlation from which a twin is considered to reproduce the profile of a fault."""
 
 BETWEEN = 3
-"""Settings that are put between two that were simulated: from one to the next a spall's profile correlates by 0.95."""
+"""Settings inserted between two simulated ones: a spall's profiles at adjacent settings correlate by 0.95."""
 
 _SHIFT_STEP_PITCHES = 0.01
 
@@ -75,20 +78,20 @@ _N_TURNS = 128
 _SHIFT_PITCHES = 0.04
 _N_SEVERITIES = 61
 _EXTENSION = 0.5
-"""Of the smallest plausible severity, from which severities are looked at."""
+"""Start of the range of severities, relative to the smallest plausible one."""
 _AS_LIKELY = 0.26
-"""Of the largest density, exp(−1.645²/2): where an end of the range has as much, nothing bounds the severity there."""
+"""exp(−1.645²/2) of the largest density: an end of the range that reaches this does not bound the severity."""
 
 
 def mesh_sidebands(now: ReducedRecording, healthy: ReducedRecording, *, is_turned: bool) -> ComplexArray:
-    """Return u, (n_channels, 2, N_HARMONICS, n_offsets); 0 where a harmonic lies above what was sampled.
+    """Return u, (n_channels, 2, N_HARMONICS, n_offsets); 0 where a harmonic is above the sampled range.
 
     Parameters
     ----------
     now, healthy : ReducedRecording
-        With the same channels.
+        Both with the same channels.
     is_turned : bool
-        Whether the shafts' angles begin elsewhere in the healthy recording; of two runs of a simulation they do not.
+        Whether the shafts' angles start elsewhere in the healthy recording; for two runs of a simulation they do not.
     """
     sidebands = np.zeros((len(now.channels), len(SIDES), N_HARMONICS, len(OFFSETS)), dtype=np.complex128)
     for side in range(len(SIDES)):
@@ -107,12 +110,12 @@ def mesh_sidebands(now: ReducedRecording, healthy: ReducedRecording, *, is_turne
 
 
 def sideband_noise(now: ReducedRecording, healthy: ReducedRecording) -> FloatArray:
-    """Return n, the power that noise leaves in u, (n_channels, 2, N_HARMONICS, n_offsets).
+    """Return n, the noise power in u, (n_channels, 2, N_HARMONICS, n_offsets).
 
     Parameters
     ----------
     now, healthy : ReducedRecording
-        As of `mesh_sidebands`.
+        As in `mesh_sidebands`.
     """
     noise = np.zeros((len(now.channels), len(SIDES), N_HARMONICS, len(OFFSETS)))
     for side in range(len(SIDES)):
@@ -126,21 +129,21 @@ def sideband_noise(now: ReducedRecording, healthy: ReducedRecording) -> FloatArr
 
 
 def _harmonics(teeth: int, n_lines: int) -> Iterator[tuple[int, int]]:
-    """Yield the place and the order of each mesh harmonic whose sidebands are among so many lines."""
+    """Yield index and order of each mesh harmonic whose sidebands are within so many lines."""
     for k in range(N_HARMONICS):
         if (k + 1) * teeth + OFFSETS[-1] < n_lines:
             yield k, (k + 1) * teeth
 
 
 def gain_scatter(healthy: ReducedRecording, simulated: ReducedRecording) -> float:
-    """Return α as the healthy machine shows it: by how much the twin's mesh lines miss its own, beside each other.
+    """Return α from the healthy machine: the error of the twin's mesh lines relative to each other.
 
-    α² = var_k ln|Y_k/Y'_k|, mean over channels; a gain that all lines of a sensor have in common does not count.
+    α² = var_k ln|Y_k/Y'_k|, mean over channels; a gain common to all lines of a sensor does not count.
 
     Parameters
     ----------
     healthy, simulated : ReducedRecording
-        The reference, and the healthy twin with its channels.
+        The reference, and the healthy twin with the same channels.
     """
     ratios = []
     for recorded, twin in zip(healthy.averages(0), simulated.averages(0), strict=True):
@@ -154,17 +157,17 @@ def gain_scatter(healthy: ReducedRecording, simulated: ReducedRecording) -> floa
 
 @dataclass(frozen=True)
 class SimulatedWaveform:
-    """How one simulated setting compares with what was observed.
+    """Agreement of one simulated setting with the observation.
 
     Parameters
     ----------
     added : AddedEffect
     levels : array, (n_scales,)
-        ln L over `LOG_SCALES`, averaged over turns, places and misfits; 0: as if it explained nothing.
+        ln L over `LOG_SCALES`, averaged over φ, δ and f; 0: no better than explaining nothing.
     correlation : float
-        ρ, 0 to 1, where it is likeliest.
+        ρ, 0 to 1, at the most likely parameters.
     log_size : float
-        ln of the simulated sidebands' rms over the observed ones'.
+        ln of the simulated sidebands' RMS over that of the observed ones.
     """
 
     added: AddedEffect
@@ -183,7 +186,7 @@ def compare_waveform(
     n_teeth: int = 0,
     gain_scatter: float = MIN_GAIN_SCATTER,
 ) -> SimulatedWaveform | None:
-    """Compare one setting's sidebands with those observed; None where nothing was observed or simulated.
+    """Compare one setting's sidebands with the observed ones; None where nothing was observed or simulated.
 
     Parameters
     ----------
@@ -192,9 +195,9 @@ def compare_waveform(
     noise : array, as `observed`
         See `sideband_noise`.
     moves_pitches : float
-        The largest |δ|.
+        Largest |δ|.
     n_teeth : int
-        Of an effect that sits on all of them, each by itself, while one is simulated; 0: it sits on one.
+        Number of teeth if the effect is on all of them, each individually, although one is simulated; 0: it is on one.
     gain_scatter : float
         α, see `gain_scatter`.
     """
@@ -209,7 +212,7 @@ def compare_waveform(
     counted = COUNTED / len(observed)
     rows, correlations = [], []
     for misfit in MISFITS:
-        # With all of it unexplained there is no room for noise beside.
+        # If everything is unexplained, no room is left for noise.
         variance = np.minimum(noise, (1.0 - misfit) * power) + misfit * power
         explained = float(np.sum(np.where(is_used, 1.0 + np.log(power / variance) - np.abs(o) ** 2 / variance, 0.0)))
         products: ComplexArray = counted * np.conj(t) * o / variance
@@ -238,9 +241,9 @@ def _moved(moves_pitches: float, n_harmonics: int) -> ComplexArray:
 def _of_one_tooth(
     products: ComplexArray, simulated_power: FloatArray, scales: FloatArray, moved: ComplexArray, gain_scatter: float
 ) -> tuple[FloatArray, float]:
-    """Return ln L beyond that of no change, (n_scales, n_places × n_turns), and the largest Re Σ.
+    """Return ln L relative to no change, (n_scales, n_places × n_turns), and the largest Re Σ.
 
-    With S = Σ t* u/σ² and T = Σ |t|²/σ² of a harmonic, and v = (h α)², integrating over its gain gives
+    With S = Σ t* u/σ² and T = Σ |t|²/σ² for a harmonic, and v = (h α)², integration over its gain gives
     2 h Re S − h² T + v |S − h T|²/(1 + v T) − ln(1 + v T).
     """
     turns = np.exp(1j * np.outer(OFFSETS, 2.0 * pi * np.arange(_N_TURNS) / _N_TURNS))
@@ -262,9 +265,9 @@ def _of_one_tooth(
 def _of_all_teeth(
     products: ComplexArray, simulated_power: FloatArray, scales: FloatArray, n_teeth: int
 ) -> tuple[FloatArray, float]:
-    """Return ln L beyond that of no change, (n_scales, 1), and the largest Re Σ; each order has a factor of its own.
+    """Return ln L relative to no change, (n_scales, 1), and the largest Re Σ; each order has its own factor.
 
-    Σ_i v |S_i|²/(1 + v T_i) − ln(1 + v T_i), v = h² E|b_i|², S_i and T_i over harmonics, channels and both sides.
+    Σ_i v |S_i|²/(1 + v T_i) − ln(1 + v T_i), v = h² E|b_i|²; S_i and T_i sum over harmonics, channels and both sides.
     """
     half = len(OFFSETS) // 2
     of_offsets, size = products.sum(axis=(0, 1)), simulated_power.sum(axis=(0, 1))
@@ -283,25 +286,26 @@ def _log_mean(values: FloatArray, axis: int | None = None) -> FloatArray:
 
 
 # --------------------
-# Profiles between those that were simulated.
+# Profiles between the simulated ones.
 #
-# Where a spall ends, or a chip's edge lies, says which orders its two steps add up or cancel at: at the seventh mesh
-# harmonic a spall longer by a fiftieth of a pitch has another profile. So fine no simulations lie.
+# The end of a spall, or the edge of a chip, determines at which orders its two steps add or cancel: at the seventh mesh
+# harmonic, lengthening a spall by a fiftieth of a pitch changes the profile. Simulations are not spaced that closely.
 # --------------------
 
 
 def with_profiles_between(
     simulated: Sequence[tuple[AddedEffect, ComplexArray]], effect: GapEffect, n_teeth: int
 ) -> Iterator[tuple[AddedEffect, ComplexArray]]:
-    """Yield the settings of one gear, and `BETWEEN` more between neighbours in what the effect's profile varies with.
+    """Yield the settings of one gear, and `BETWEEN` more between neighbours in the option that the profile varies with.
 
-    At the part s of the way, u = (1 − s) u₁ exp(2πj s δ o/z) + s u₂ exp(−2πj (1 − s) δ o/z) at order o: a mixture where
-    the profile stays in its place, which it may leave by δ pitches from one to the other where the effect moves.
+    At the fraction s of the interval, u = (1 − s) u₁ exp(2πj s δ o/z) + s u₂ exp(−2πj (1 − s) δ o/z) at order o. This
+    is a mixture where the profile keeps its place; where the effect moves, the profile shifts by δ pitches between the
+    two.
 
     Parameters
     ----------
     simulated : sequence of (Added, complex array), (n_channels, n_harmonics, n_offsets)
-        Sidebands, see `mesh_sidebands`.
+        Settings with their sidebands, see `mesh_sidebands`.
     effect : GapEffect
     n_teeth : int
         z of the gear.
@@ -329,7 +333,7 @@ def with_profiles_between(
 
 
 def _turn_between_rad(before: ComplexArray, after: ComplexArray, most_pitches: float, n_teeth: int) -> FloatArray:
-    """Return 2π δ o/z, (n_harmonics, n_offsets), with the δ by which the second is the first moved."""
+    """Return 2π δ o/z, (n_harmonics, n_offsets), for the shift δ that best maps the first onto the second."""
     orders = np.arange(1, before.shape[-2] + 1)[:, None] + OFFSETS / n_teeth
     n = round(most_pitches / _SHIFT_STEP_PITCHES)
     turns_rad = 2.0 * pi * _SHIFT_STEP_PITCHES * np.arange(-n, n + 1)[:, None, None] * orders
@@ -341,7 +345,7 @@ def _turn_between_rad(before: ComplexArray, after: ComplexArray, most_pitches: f
 
 
 # --------------------
-# All settings of one effect together: how likely it is, how severe, on which gear.
+# All settings of one effect together: its likelihood, severity and gear.
 # --------------------
 
 
@@ -352,13 +356,13 @@ class WaveformMatch:
     Parameters
     ----------
     correlation : float
-        ρ, 0 to 1, of the likeliest setting at its turn.
+        ρ, 0 to 1, of the most likely setting.
     log_likelihood : float
-        Mean over severities and other options: more freedom is no advantage. 0: nothing explained.
+        Mean over severities and other options, so that more freedom is no advantage. 0: nothing explained.
     added : AddedEffect
-        The likeliest setting, at the middle of the severities.
+        The most likely setting, at the median severity.
     severity : Interval
-        The likely ones: 90 %.
+        The median and the 90 % interval.
     """
 
     correlation: float
@@ -368,26 +372,26 @@ class WaveformMatch:
 
     @property
     def is_good(self) -> bool:
-        """Whether the twin shows the profile of the fault well enough to tell which it is, and on which gear."""
+        """Whether the twin reproduces the profile well enough to identify the fault and its gear."""
         return self.correlation >= MIN_CORRELATION
 
 
 def waveform_match(
     waveforms: Sequence[SimulatedWaveform], min_severity: float, max_severity: float, *, severity_scatter: float = 0.0
 ) -> WaveformMatch | None:
-    """Return what all settings of an effect say together; None where there are none.
+    """Return the joint result of all settings of an effect; None where there are none.
 
-    p(u | s) is that of the settings simulated next to severity s, scaled to the size that sidebands have there, with
-    ln g off by `SCALE_SCATTER`; ln s is even over what is plausible. A set of options with one severity alone gets
-    larger as that set does which has most, or in proportion.
+    p(u | s) is that of the settings simulated next to severity s, scaled to the sidebands' size there, with a standard
+    deviation of `SCALE_SCATTER` for ln g; the prior of ln s is uniform over the plausible range. For a set of options
+    with a single severity, the sidebands grow as in the set with the most severities, or in proportion.
 
     Parameters
     ----------
     waveforms : sequence of SimulatedWaveform
     min_severity, max_severity : float
-        Severities that are plausible.
+        Range of plausible severities.
     severity_scatter : float
-        Standard deviation of ln s with which a profile tells it.
+        Standard deviation of the ln s that a profile indicates.
     """
     groups: dict[tuple[tuple[str, float | str], ...], list[SimulatedWaveform]] = {}
     for waveform in sorted(waveforms, key=lambda waveform: waveform.added.severity):
@@ -423,7 +427,7 @@ def _over_severity(
     size = _straight(log_severity, shape)
     if len(group) == 1:
         size = size - float(_straight(at, shape)[0]) + sizes[0]
-    # ln g is that of the severity, but for its scatter.
+    # ln g is that of the severity, except for its scatter.
     off = (LOG_SCALES[None, :] - (size[:, None, None] - sizes[None, :, None]).reshape(-1, 1)) / SCALE_SCATTER
     weights = np.exp(-0.5 * off**2) + 1e-300
     weights /= weights.sum(axis=1, keepdims=True)
@@ -437,12 +441,12 @@ def _over_severity(
 
 
 def _log_sizes(group: Sequence[SimulatedWaveform]) -> tuple[FloatArray, FloatArray]:
-    """Return ln of the severities that were simulated, and ln of the sidebands' sizes there."""
+    """Return ln of the simulated severities, and ln of the sidebands' sizes there."""
     return np.log([c.added.severity for c in group]), np.array([c.log_size for c in group])
 
 
 def _straight(log_severity: FloatArray, shape: Sequence[SimulatedWaveform]) -> FloatArray:
-    """Return ln of the sidebands' size over ln s, straight between simulations and beyond them."""
+    """Return ln of the sidebands' size over ln s, interpolated linearly and extrapolated."""
     at, size = _log_sizes(shape)
     if len(at) == 1:
         return np.asarray(size[0] + (log_severity - at[0]))
@@ -453,7 +457,7 @@ def _straight(log_severity: FloatArray, shape: Sequence[SimulatedWaveform]) -> F
 
 
 def _interval(severities: FloatArray, density: FloatArray) -> Interval:
-    """Return median and 5th to 95th percentile; no end where the largest or the least is as likely as any."""
+    """Return median and 5th to 95th percentile; unbounded where an end of the range is as likely as any."""
     below = np.cumsum(density) / density.sum()
     low, value, high = (float(severities[int(np.searchsorted(below[:-1], q))]) for q in (0.05, 0.5, 0.95))
     as_likely = density >= _AS_LIKELY * density.max()
@@ -461,12 +465,12 @@ def _interval(severities: FloatArray, density: FloatArray) -> Interval:
 
 
 def joined_waveforms(conditions: Sequence[Sequence[SimulatedWaveform]]) -> list[SimulatedWaveform]:
-    """Return the settings of several operating conditions, ln L averaged: one machine's conditions say nearly the same.
+    """Return the settings of several conditions of one machine with ln L averaged, as they are strongly dependent.
 
     Parameters
     ----------
     conditions : sequence of sequences of SimulatedWaveform
-        Settings that one of them lacks are left out.
+        Settings of each condition; those missing in any of them are omitted.
     """
     by_setting: dict[tuple[float, tuple[tuple[str, float | str], ...]], list[SimulatedWaveform]] = {}
     for waveforms in conditions:

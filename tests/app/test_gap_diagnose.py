@@ -108,7 +108,7 @@ def test_a_healthy_run_up_measures_the_path_and_that_is_said(report: GapReport) 
     assert min(report.path.credibility.values()) > 0.5
     assert report.path.low_hz < 900.0 / 60.0 * 29.0 * 1.1 < 1600.0 / 60.0 * 29.0 < report.path.high_hz
     assert report.path.text in report.notes
-    with pytest.raises(InputError, match="a run-up is given, and no healthy reference"):
+    with pytest.raises(InputError, match="a run-up is given, but no healthy reference"):
         diagnose_gap([run(noise=1)], gap_simulator("cracked"), run_up=run_up())
 
 
@@ -147,7 +147,7 @@ def test_accelerations_in_g_are_compared_in_si_units_and_unknown_units_are_told(
     assert seen == pytest.approx(expected, abs=1e-6)
     bare = replace(recording, channels=tuple(replace(c, unit="") for c in recording.channels))
     _, notes = conditions_of([PreparedRecording(bare)], (), gap_simulator("cracked").twin_of(rig()))
-    assert any("is no acceleration in a known unit" in notice for notice in notes)
+    assert any("is not an acceleration in a known unit" in notice for notice in notes)
 
 
 def test_a_channel_that_the_reference_lacks_is_left_out_and_told() -> None:
@@ -156,7 +156,7 @@ def test_a_channel_that_the_reference_lacks_is_left_out_and_told() -> None:
     reference = now.with_channels({first: now.channels[first]})
     healthy = [HealthyReference(reference, PreparedRecording(run(noise=1)))]
     assert list(with_common_channels(now, reference, healthy, "now", notes).channels) == [first]
-    assert notes == [f"now: {', '.join(others)} is left out, for the reference has no such channel."]
+    assert notes == [f"now: {', '.join(others)} is left out, because the reference has no such channel."]
 
 
 def test_what_does_not_bring_the_twin_nearer_says_neither_place_nor_severity(report: GapReport) -> None:

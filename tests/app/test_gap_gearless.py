@@ -80,7 +80,7 @@ def test_a_damaged_race_is_named_with_its_place(order: str, name: str) -> None:
     assert cause.severity is None
     assert any("harmonics of" in text for text in cause.notes)
     assert "at most" in report.verdict[1]
-    assert report.verdict[2].startswith("How far: cannot be told")
+    assert report.verdict[2].startswith("How far: not known")
     assert len(report.spectra[0].before) == 0
 
 
@@ -207,7 +207,7 @@ def test_one_of_several_that_is_too_short_is_left_out() -> None:
     ("rig", "said"),
     [
         (Rig("bare", (Shaft("shaft"),), speed=RIG.speed), "neither a gear pair nor a bearing"),
-        (replace(RIG, bearings=(Bearing("b", "shaft"),)), "of no bearing"),
+        (replace(RIG, bearings=(Bearing("b", "shaft"),)), "for no bearing"),
         (replace(RIG, speed=None), "speed"),
         (
             replace(RIG, shafts=(Shaft("shaft"), Shaft("output")), pairs=(GearPair("stage", "shaft", "output", 23),)),

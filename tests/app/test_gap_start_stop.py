@@ -139,7 +139,7 @@ def test_a_second_recording_without_torque_is_told_about():
     first, second = made(7, ("backlash", 150.0)), without_torque(made(8, ("backlash", 150.0)))
     report = diagnose_gap([first.with_name("first"), second.with_name("second")], SIMULATOR, references=[made(9)])
     assert {c.name for c in report.causes if c.severity is not None} == WITHOUT_TORQUE
-    told = next(text for text in report.notes if text.startswith("Not considered, as no torque was recorded in"))
+    told = next(text for text in report.notes if text.startswith("Not considered, because no torque was recorded in"))
     assert "crack in a tooth root" in told
 
 

@@ -102,7 +102,7 @@ def test_the_teeth_of_another_rig_are_noticed_and_the_right_number_is_told() -> 
         assert teeth_mismatch_text(right, "now") == []
         assert tooth_count_mismatch_text(right, "now") == []
     (doubt,) = tooth_count_mismatch_text(with_wrong_teeth(), "now")
-    assert "29 times a revolution" in doubt
+    assert "29 times per revolution" in doubt
     assert "37 teeth" in doubt
 
 

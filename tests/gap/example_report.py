@@ -286,7 +286,7 @@ def causes() -> tuple[GapCause, ...]:
                 Evidence("kurtosis of the input shaft's residual average", 11.8, 12.4, 1.1, speaks_for=True),
                 Evidence("sidebands of the input shaft, 1 to 6 orders away", 8.0, 9.1, 1.4, speaks_for=True),
                 Evidence("envelope line at 1 × input shaft", 5.9, 6.8, 1.9, speaks_for=True),
-                Evidence("middle of the spectrum", 2.0, 7.0, 1.3, speaks_for=False, is_further=True),
+                Evidence("centroid of the spectrum", 2.0, 7.0, 1.3, speaks_for=False, is_further=True),
                 Evidence("level of the mesh harmonics", 0.4, 2.3, 1.2, speaks_for=False),
             ),
         ),

@@ -167,7 +167,7 @@ def test_a_further_sensor_is_named_only_if_it_shows_more_than_those_there_are() 
     assert simulated.answer(Placed()) == [(HERE, "the far end", 3.0, 2.0)]
     (one,) = simulated.recordings(Placed())
     assert one.text == (
-        "at the same speed and load, add a further sensor at the far end: there a crack and a spall lie 3 structural "
+        "at the same speed and load, add a further sensor at the far end: there a crack and a spall are 3 structural "
         "floors apart, 2 so far."
     )
     assert Simulated({(1.0, 1.0): 2.0}, further_db=2.2).answer(Placed()) == []

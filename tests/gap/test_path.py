@@ -94,7 +94,7 @@ def test_a_steady_run_and_one_whose_angle_nothing_tells_are_refused() -> None:
     with pytest.raises(InputError, match="from 1202 to 1436 rpm"):
         measured(run_up(20.0, 24.0))
     recording = run_up(8.0, 26.0)
-    with pytest.raises(RefusalError, match="nothing tells the angle"):
+    with pytest.raises(RefusalError, match="no shaft's angle is known"):
         measured(Recording(recording.samples, RATE_HZ, recording.channels, speed=ConstantSpeed(960.0), rig=RIG))
     with pytest.raises(RefusalError, match="cannot run up"):
         measured_path(PreparedRecording(recording), object(), seed=0)  # type: ignore[arg-type]

@@ -236,7 +236,7 @@ def test_clipping_is_told_from_a_stray_peak() -> None:
     recording = record(seed=1)
     clipped = reduce_recording(replace(recording, samples=np.clip(recording.samples, -4.0, 4.0)), RIG)
     figures = {"raw.near_the_extreme": 20.0, "raw.kurtosis": -1.0}
-    assert "as clipping makes them" in gap_places(compared(figures, clipped))[0].title
+    assert "as clipping causes them" in gap_places(compared(figures, clipped))[0].title
     assert "clipping" not in gap_places(compared(figures))[0].title
 
 
@@ -254,10 +254,10 @@ def test_the_figure_of_a_place_is_the_one_that_was_scored() -> None:
     level, apart = "tooth.driven.level", "change.driven.elsewhere"
     round_it = distributed_place(compared({level: 0.18, apart: 6.0}), DRIVEN, "shaft out", "a1")
     assert round_it.change_db == 6.0
-    assert "up by 6 dB against what healthy machines change by" in round_it.title
+    assert "up by 6 dB relative to changes of healthy machines" in round_it.title
     assert "0.18" not in round_it.title
     louder = distributed_place(compared({level: -4.0, apart: 2.0}), DRIVEN, "shaft out", "a1")
-    assert louder.title == "pattern of the teeth of shaft out all round, down by 4 dB"
+    assert louder.title == "tooth pattern of shaft out all round, down by 4 dB"
     shape = distributed_place(compared({level: 0.5, "tooth.driven.kurtosis": 3.0}), DRIVEN, "shaft out", "a1")
     assert shape.follows
     assert "dB" not in shape.title
@@ -268,4 +268,4 @@ def test_mesh_lines_that_hardly_moved_give_way_to_what_was_scored() -> None:
     assert (spot.title, spot.change_db) == ("mesh harmonic 2 over all, down by 4 dB", -4.0)
     assert spot.orders == (2.0 * TEETH[0],)
     (spread,) = gap_places(compared({"mesh.total": 0.2, "alike.mesh.spread": 3.0, "line.half_mesh": 0.0}))
-    assert spread.title == "what lies beside the mesh harmonics, which themselves hardly moved"
+    assert spread.title == "orders around the mesh harmonics, which themselves hardly changed"

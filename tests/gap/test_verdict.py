@@ -44,7 +44,7 @@ def test_a_severity_has_a_unit_for_people_and_no_exponent() -> None:
 def test_causes_that_cannot_be_told_apart_are_named_even_if_one_is_not_among_them() -> None:
     report = replace(cannot_separate_report(), inseparable=("root_crack", "torque_ripple"))
     assert report.verdict[1] == (
-        "Which: a damaged tooth, tooth 21 of the driver (93 %): crack in a tooth root (48 %); else "
+        "Which: a damaged tooth, tooth 21 of the driver (93 %): crack in a tooth root (48 %); otherwise "
         "torque ripple; these recordings cannot tell them apart."
     )
 
@@ -136,7 +136,7 @@ def test_what_comes_nearest_to_an_unknown_cause_is_told_with_its_probability() -
     known = replace(effect_report().causes[0], probability=0.4)
     unknown = next(cause for cause in report.causes if cause.name == UNKNOWN)
     line = replace(report, causes=(replace(unknown, probability=0.2), known)).verdict[1]
-    assert line == f"Which: unknown; {known.title} comes nearest (40 %), too little to be named."
+    assert line == f"Which: unknown; {known.title} comes nearest (40 %), not enough to be named."
 
 
 def test_without_a_gap_nothing_is_asked_for_that_would_separate_causes() -> None:
@@ -144,7 +144,7 @@ def test_without_a_gap_nothing_is_asked_for_that_would_separate_causes() -> None
     assert report.outcome is GapOutcome.NO_GAP
     assert report.references
     assert (
-        report.verdict[3] == "Next: nothing is needed; keep these recordings, later ones are best compared with them."
+        report.verdict[3] == "Next: nothing is needed; keep these recordings as references for later ones."
     )
 
 
@@ -160,7 +160,7 @@ def test_a_gap_that_an_effect_explains_ends_within_the_floor() -> None:
 
 def test_an_effect_that_takes_what_the_first_leaves_is_told_beside_it() -> None:
     report = effect_report()
-    beside = "housing and sensor resonances beside it takes the whole gap from 3.9 to 1.6 structural floors"
+    beside = "adding housing and sensor resonances takes the whole gap from 3.9 to 1.6 structural floors"
     assert beside in report.verdict[2]
     assert "beside it" not in replace(report, steps=report.steps[:2]).verdict[2]
 

@@ -91,7 +91,7 @@ def test_a_tooth_that_stands_out_on_one_shaft_alone_puts_a_tooths_fault_there() 
     assert cause_place("pitch_error", None, [told], bursts) == "tooth 4 of the gear on the output shaft"
     assert cause_place("pitch_error", None, [told], bursts[1:]) == "the gear on the output shaft"
     for name, places in (("tooth_spall", bursts), ("eccentricity", bursts[:1]), ("tooth_spall", [all_round])):
-        assert cause_place(name, None, [condition], places).endswith("(which cannot be told)")
+        assert cause_place(name, None, [condition], places).endswith("(which one is not known)")
 
 
 def test_every_sign_is_a_feature() -> None:

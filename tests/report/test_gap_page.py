@@ -92,7 +92,7 @@ def test_everything_about_an_effect_is_said(pages):
         "In a wrong place (placebo) it removes at most 6 %.",
         "kurtosis of the input shaft's residual average ✓ speaks for it +11.8 +12.4 1.1",
         "level of the mesh harmonics ✗ speaks against it",
-        "middle of the spectrum ↗ further than predicted +2.0 +7.0 1.3",
+        "centroid of the spectrum ↗ further than predicted +2.0 +7.0 1.3",
         "+ crack in a tooth root 3.9 3.2 to 4.7 −4.0",
         "900 rpm and 120 N·m crack in a tooth root / spall on a tooth flank 5.4 1.6",
         "condition_2.h5 1998.7 60 199.9 6 20000",

@@ -1,4 +1,4 @@
-"""Which cause explains a start–stop change: its severity, the evidence for it, and how far it shrinks what is left."""
+"""Attribution of a start–stop change: each cause's severity, its evidence, and how far it shrinks the gap."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from gearsig.motion import median_deviation
 
 FLOORS_FILE = Path(__file__).with_name("floors.json")
 HALF = float(np.sqrt(2.0))
-"""By which half of the cycles scatter more."""
+"""Factor by which the scatter is larger for half of the cycles."""
 RIPPLE = "torque_ripple"
-"""Sits at an order, as a crack does at a tooth: a placebo is the same cause elsewhere."""
+"""It is at an order, as a crack is at a tooth: its placebo is the same cause elsewhere."""
 N_PLACEBOS = 4
 NORMAL_90 = 1.645
 
 
 @dataclass(frozen=True)
 class DriveFloor:
-    """Middle and scale of each change of healthy drives: the structural floor of start–stop changes.
+    """Centre and scale of each change of healthy drives: the structural floor of start–stop changes.
 
     Parameters
     ----------
@@ -47,18 +47,18 @@ class DriveFloor:
 
     @property
     def limit(self) -> FloatArray:
-        """What 19 of 20 healthy drives stay below, in dB from the middle, (n,)."""
+        """Limit of 19 of 20 healthy drives, in dB from the centre, (n,)."""
         return FLOOR_IN_DEVIATIONS * self.scale
 
     @classmethod
     def of_healthy(cls, rows: FloatArray, scatters: FloatArray | None = None) -> DriveFloor:
-        """Return the floor of a table of changes of healthy drives, (n_drives, n); nan where a change is not known.
+        """Return the floor from a table of changes of healthy drives, (n_drives, n); nan where a change is not known.
 
         Parameters
         ----------
         rows : array, (n_drives, n)
         scatters : array or None, (n_drives, n)
-            Standard errors of the changes; None: none.
+            Standard errors of the changes; None: zero.
         """
         table = np.asarray(rows, dtype=np.float64)
         errors = np.zeros_like(table) if scatters is None else np.nan_to_num(scatters)
@@ -67,7 +67,7 @@ class DriveFloor:
             known = np.isfinite(table[:, i])
             values, value_errors = table[known, i], errors[known, i]
             if len(values) >= 5:
-                # 2 % of a level; a fifth of the step of what is ordinarily near zero
+                # 2 % of a level; a fifth of the step for changes that are normally near zero
                 centre[i], min_scale = _centre(values, value_errors), 0.15 if FEATURES[name].is_level else 0.87
                 scale[i] = max(_scale(values - centre[i], value_errors), min_scale)
         unscaled = cls(centre, scale, 1.0)
@@ -75,22 +75,22 @@ class DriveFloor:
         return replace(unscaled, whole=float(np.quantile(sizes, 0.95)))
 
     def widened(self, scatter: FloatArray) -> DriveFloor:
-        """Return the floor of a recording whose changes have standard errors of their own, (n,)."""
+        """Return the floor widened by the standard errors of a recording's changes, (n,)."""
         return replace(self, scale=np.hypot(self.scale, np.nan_to_num(scatter)))
 
     def size(self, change: FloatArray) -> float:
-        """Return the size of a whole change, (Σ z⁴)^(1/4) in floors; 1: one healthy drive in twenty is that far."""
+        """Return the size of a whole change, (Σ z⁴)^(1/4) in floors; one healthy drive in twenty exceeds 1."""
         z = np.abs((change - self.centre) / self.limit)
         return float(np.sum(z[np.isfinite(z)] ** 4.0) ** 0.25) / self.whole
 
     def size_interval(self, changes: Sequence[FloatArray], left_out: Sequence[FloatArray]) -> Interval:
-        """Return the mean size of some changes, its 90 % interval by the jackknife within each.
+        """Return the mean size of some changes, with its 90 % interval from the jackknife within each.
 
         Parameters
         ----------
         changes : sequence of array, (n,)
         left_out : sequence of array, (n_blocks, n)
-            Each of the changes without each of its cycles.
+            Each of the changes with each of its cycles left out.
         """
         value = float(np.mean([self.size(change) for change in changes]))
         variance = sum(float(jackknife_variance(np.array([self.size(row) for row in rows]))) for rows in left_out)
@@ -99,13 +99,13 @@ class DriveFloor:
     def log_density(self, change: FloatArray, predicted: FloatArray, widen: FloatArray | float = 0.0) -> FloatArray:
         """Return the logarithm of Student's density of each change around centre + predicted, (n,); 0 where unknown.
 
-        It has four degrees of freedom: a feature lies far off oftener than a normal one.
+        It has four degrees of freedom, since outliers are more frequent than under a normal density.
 
         Parameters
         ----------
         change, predicted : array, (n,)
         widen : array or float
-            dB that the scale is widened by: an error of the prediction.
+            Error of the prediction in dB, by which the scale is widened.
         """
         scale, tail = np.hypot(self.scale, widen), 4.0
         z = np.nan_to_num((change - self.centre - predicted) / scale)
@@ -113,20 +113,20 @@ class DriveFloor:
         return np.where(np.isfinite(change), logs, 0.0)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as plain values by name."""
+        """Return plain values by name."""
         columns = {"centre_db": self.centre, "scale_db": self.scale}
         tables = {k: {n: round(float(v), 4) for n, v in zip(NAMES, c, strict=True)} for k, c in columns.items()}
         return {**tables, "whole": round(self.whole, 4)}
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> DriveFloor:
-        """Return what `to_dict` made."""
+        """Return the floor from the output of `to_dict`."""
         centre, scale = (np.array([float(content[key][name]) for name in NAMES]) for key in ("centre_db", "scale_db"))
         return cls(centre, scale, float(content["whole"]))
 
 
 def _centre(values: FloatArray, errors: FloatArray) -> float:
-    """Return the median, precise values counting more."""
+    """Return the median, weighted by precision."""
     order = np.argsort(values)
     spread = median_deviation(values - np.median(values))
     weights = np.cumsum(1.0 / (spread**2 + errors[order] ** 2 + 1e-6))
@@ -134,7 +134,7 @@ def _centre(values: FloatArray, errors: FloatArray) -> float:
 
 
 def _scale(distances: FloatArray, errors: FloatArray) -> float:
-    """Return the s at which four of five distances are below 1.28 √(s² + e²); 0 where the errors alone are enough."""
+    """Return the s for which four of five distances are below 1.28 √(s² + e²); 0 where the errors alone suffice."""
     low, high = 0.0, float(np.max(np.abs(distances))) + 1e-9
     for _ in range(40):
         middle = 0.5 * (low + high)
@@ -145,9 +145,9 @@ def _scale(distances: FloatArray, errors: FloatArray) -> float:
 
 @cache
 def load_floors(*, with_reference: bool) -> tuple[tuple[DriveFloor, DriveFloor], GapCalibration]:
-    """Return the floors of whole recordings and of half their cycles, and the calibration, that come with this version.
+    """Return the floors of whole recordings and of half their cycles, and the calibration, shipped with this version.
 
-    The calibration's first probabilities are the shares of the evidence.
+    The calibration's uncalibrated probabilities are the shares of the evidence.
     """
     content = calibration_values(FLOORS_FILE)["with_reference" if with_reference else "without_reference"]
     whole, half = (DriveFloor.from_dict(content[part]) for part in ("whole", "half"))
@@ -156,21 +156,21 @@ def load_floors(*, with_reference: bool) -> tuple[tuple[DriveFloor, DriveFloor],
 
 @dataclass(frozen=True)
 class PredictedCause:
-    """What the simulator predicts of one cause.
+    """The simulator's predictions for one cause.
 
     Parameters
     ----------
     name : str
     severities : array, (k,)
-        Rising; 0 is not in it.
+        Ascending, without 0.
     changes : array, (k, n)
         dB by `NAMES`.
     may_move : array of bool, (n,)
-        Changes that the cause moves in a way that the simulator does not know.
+        Changes that the cause affects in a way unknown to the simulator.
     direct : array of bool, (n,), or None
         Changes that measure the severity itself, if there are any.
     options : mapping
-        Where it was put: gear and tooth, or order.
+        Its place: gear and tooth, or order.
     """
 
     name: str
@@ -181,7 +181,7 @@ class PredictedCause:
     options: Mapping[str, float | str] = field(default_factory=dict)
 
     def fine(self) -> tuple[FloatArray, FloatArray]:
-        """Return many severities and their changes: straight lines between those simulated, and to 0."""
+        """Return many severities and their changes, by linear interpolation between those simulated and 0."""
         order = np.argsort(np.append(self.severities, 0.0))
         knots = np.append(self.severities, 0.0)[order]
         values = np.vstack([self.changes, np.zeros(self.changes.shape[1])])[order]
@@ -191,7 +191,7 @@ class PredictedCause:
         return grid, np.stack([np.interp(grid, knots, column) for column in values.T], axis=1)
 
     def minimum_severity(self, floor: DriveFloor) -> float:
-        """Return the least severity above 0 whose change exceeds the floor; infinite where none that was tried does."""
+        """Return the minimum severity above 0 whose change exceeds the floor; infinite where none tried does."""
         severities, changes = self.fine()
         sizes = np.max(np.abs(changes) / floor.limit, axis=1, initial=0.0)
         return float(severities[(sizes >= 1.0) & (severities > 0.0)].min(initial=np.inf))
@@ -207,11 +207,11 @@ class FittedDriveCause:
     severity : Interval
         90 %.
     predicted : array, (n,)
-        At that severity.
+        Predicted changes at that severity.
     log_evidence : float
         Logarithm of the likelihood, averaged over severities on a logarithmic scale.
     shrinkage : Shrinkage or None
-        On cycles that it was not fitted to; None: not looked at.
+        On cycles that it was not fitted to; None: not computed.
     """
 
     name: str
@@ -222,17 +222,18 @@ class FittedDriveCause:
 
 
 def fit(cause: PredictedCause, change: FloatArray, floor: DriveFloor) -> FittedDriveCause:
-    """Fit a cause's severity to a change; what would change less than healthy machines differ by is none, not a cause.
+    """Fit a cause's severity to a change; severities with changes below the floor of healthy machines are excluded.
 
-    How much is read from what measures it directly, as far as anything does; whether it is this cause, from all changes
-    with the same margin, since machines of one drawing answer differently.
+    The severity comes from changes that measure it directly, if there are any. The evidence for the cause comes from
+    all changes with the same tolerance, since machines of one drawing respond differently.
     """
     grid, predicted = cause.fine()
     sizes = np.max(np.abs(predicted) / floor.limit, axis=1, initial=0.0)
     clear = sizes >= min(1.0, float(sizes.max(initial=0.0)))
     grid, predicted = grid[clear], predicted[clear]
-    # Another machine of the same drawing answers by a quarter more or less. But 100 µm more play are 100 µm on any, as
-    # far as straight lines between the simulated severities follow it. What a cause may move is hardly looked at.
+    # Another machine of the same drawing responds with a quarter more or less. But 100 µm more play are 100 µm on any
+    # machine, except for the error of interpolating between the simulated severities. Changes that a cause may affect
+    # in an unknown way hardly count.
     model_error, direct_error = 0.25, 0.08
     free = np.where(cause.may_move, 6.0 * floor.scale, 0.0)
 
@@ -250,9 +251,10 @@ def fit(cause: PredictedCause, change: FloatArray, floor: DriveFloor) -> FittedD
 
 
 def evidences(change: FloatArray, floor: DriveFloor, fits: Sequence[FittedDriveCause]) -> dict[str, float]:
-    """Return the logarithm of the evidence of every cause, of none and of unknown.
+    """Return the logarithm of the evidence for every cause, for "none" and for "unknown".
 
-    Unknown: one change, whichever, is ten times wider than healthy machines', or two are, or all of them four times.
+    Under "unknown", any one change has ten times the scale of healthy machines, or any two have, or all have four
+    times.
     """
     nothing = np.zeros(len(change))
     healthy = floor.log_density(change, nothing)
@@ -270,7 +272,7 @@ def evidences(change: FloatArray, floor: DriveFloor, fits: Sequence[FittedDriveC
 
 
 def affected_features(predicted: FloatArray, change: FloatArray, floor: DriveFloor) -> NDArray[np.intp]:
-    """Return the places of changes that the effect predicts to exceed the floor; its largest where none does."""
+    """Return the indices of changes that the effect predicts to exceed the floor; the largest one where none does."""
     sizes = np.where(np.isfinite(change), np.abs(predicted) / floor.limit, -1.0)
     features = np.flatnonzero(sizes >= 1.0)
     return features if len(features) else np.array([int(np.argmax(sizes))], dtype=np.intp)
@@ -279,14 +281,14 @@ def affected_features(predicted: FloatArray, change: FloatArray, floor: DriveFlo
 def shrink(
     change: FloatArray, predicted: FloatArray, floor: DriveFloor, features: NDArray[np.intp]
 ) -> tuple[float, float, float, float]:
-    """Return root mean squares before and after in floors, 1 − after²/before², and the slope, on an effect's features.
+    """Return RMS before and after in floors, 1 − after²/before², and the slope, on an effect's features.
 
-    A shrink below −1, where the gap doubles in power, is not told from −1.
+    The shrink is limited to −1, at which the gap doubles in power.
 
     Parameters
     ----------
     change : array
-        Of cycles that the severity was not fitted to.
+        Change of cycles that the severity was not fitted to.
     """
     z, p = ((change - floor.centre) / floor.limit)[features], (predicted / floor.limit)[features]
     known = np.isfinite(z)
@@ -300,18 +302,18 @@ def shrink(
 
 @dataclass(frozen=True)
 class CycleFold:
-    """One half of the cycles to fit to, and the other to score on; as `Fold` is of recordings at constant speed.
+    """One half of the cycles to fit to, and the other to score on; corresponds to `Fold` at constant speed.
 
     Parameters
     ----------
     fitted : array
-        Change of one half, where it is largest.
+        Change of one half, at the tooth and order where it is largest.
     scored : array
         Change of the other half, at the same tooth and order.
     again : array, (n_blocks, n)
-        `scored` without each of its cycles.
+        `scored` with each of its cycles left out.
     elsewhere : mapping
-        Placed cause → changes of the other half at other places, (k, n).
+        Cause with a place → changes of the other half at other places, (k, n).
     """
 
     fitted: FloatArray
@@ -322,7 +324,7 @@ class CycleFold:
 
 @dataclass(frozen=True)
 class DriveEvidence:
-    """All that attribution needs of one recording.
+    """All inputs of the attribution from one recording.
 
     Parameters
     ----------
@@ -332,7 +334,7 @@ class DriveEvidence:
         Standard errors of `whole`.
     folds : tuple of CycleFold
     predicted : mapping
-        Cause → what the simulator predicts.
+        Cause → predictions of the simulator.
     """
 
     whole: FloatArray
@@ -344,17 +346,17 @@ class DriveEvidence:
 def attribute_drive(
     every: Sequence[DriveEvidence], *, with_reference: bool, floors: tuple[DriveFloor, DriveFloor] | None = None
 ) -> Attribution[FittedDriveCause]:
-    """Weigh the causes on one or several recordings of one machine.
+    """Compute the probabilities of the causes from one or several recordings of one machine.
 
-    Several recordings share a machine and its tolerances: their evidence is averaged, not added.
+    The recordings share a machine and its tolerances, so their evidence is averaged, not added.
 
     Parameters
     ----------
     every : sequence of DriveEvidence
     with_reference : bool
-        Whether they are compared with a healthy recording.
+        Whether the baseline is a healthy recording.
     floors : (DriveFloor, DriveFloor) or None
-        Of other drives' whole recordings and halves; None: those that come with this version.
+        Floors of other drives for whole recordings and for halves; None: those shipped with this version.
     """
     shipped, calibration = load_floors(with_reference=with_reference)
     whole, half = floors or shipped
@@ -384,7 +386,7 @@ def attribute_drive(
 
 
 def _shrinkage(name: str, folds: Sequence[tuple[Mapping[str, PredictedCause], DriveFloor, CycleFold]]) -> Shrinkage:
-    """Fit to one half, check on the other, and the other way round; the mean of both."""
+    """Fit to one half, score on the other, and vice versa; return the mean of both."""
     values, placebos, variances = [], [], []
     for predicted, floor, fold in folds:
         guess = fit(predicted[name], fold.fitted, floor).predicted

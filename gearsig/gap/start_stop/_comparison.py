@@ -1,4 +1,4 @@
-"""A start–stop recording beside its reference or its simulated drive: what changed, and what a cause changes."""
+"""A start–stop recording compared with its reference or its simulated drive: observed and predicted changes."""
 
 from __future__ import annotations
 
@@ -43,20 +43,20 @@ TORQUE_GAIN, WEAR = "torque_gain", "tooth_wear"
 
 
 class SeverityGrid(NamedTuple):
-    """Severities of a cause that are simulated.
+    """Simulated severities of a cause.
 
     Parameters
     ----------
     severities : tuple of float
-        Rising, in the effect's unit.
+        Ascending, in the effect's unit.
     may_move : tuple of str
-        Changes that it moves on real teeth and not in the simulated drive: they speak neither for nor against it.
+        Changes that it causes on real teeth but not in the simulated drive: they count neither for nor against it.
     direct : tuple of str
         Changes that measure the severity itself.
     needs_torque : bool
-        Whether it cannot be told without a torque channel.
+        Whether it cannot be identified without a torque channel.
     needs_reference : bool
-        Whether the healthy value stands in no drawing.
+        Whether the healthy value is not in the drawing.
     """
 
     severities: tuple[float, ...]
@@ -79,13 +79,13 @@ TRIED: Mapping[str, SeverityGrid] = {
     TORQUE_GAIN: SeverityGrid((-40.0, -20.0, 25.0, 60.0), ("flank_friction", *_ROUGH)),
     RIPPLE: SeverityGrid((1.5, 5.0, 15.0), ("next_ripple", *_ROUGH)),
 }
-"""Of each cause. Which changes it is expected in stands in its `GapEffect.shows_in`, names of
-`gearsig.gap.start_stop.NAMES`: what it moves of the others is the simulated run's own chance."""
+"""Settings of each cause. The changes in which it is expected are in its `GapEffect.shows_in`, as names of
+`gearsig.gap.start_stop.NAMES`: other changes are accidents of the simulated run."""
 
 
 @dataclass(frozen=True)
 class SimulatedDrive:
-    """A drive's twin with what the cycles of its runs tell; the healthy run is simulated once.
+    """A drive's twin with the features of its runs; the healthy run is simulated once.
 
     Parameters
     ----------
@@ -104,12 +104,12 @@ class SimulatedDrive:
 
     @cached_property
     def healthy(self) -> CycleFeatures:
-        """What the healthy drive's cycles tell."""
+        """Features of the healthy drive's cycles."""
         return _of_all(self.healthy_run)
 
     @cached_property
     def shape(self) -> FloatArray:
-        """Profile of the compression over the mesh cycle that flanks worn by 50 µm give, its mean taken off."""
+        """Profile of the compression over the mesh cycle with flanks worn by 50 µm, with its mean removed."""
         curve = self.worn_curve_um(50.0)
         return curve - np.mean(curve)
 
@@ -118,11 +118,11 @@ class SimulatedDrive:
         return self.twin.worn_curve_um(self.healthy.deflection_um, depth_um, N_PLACES)
 
     def features(self, *added: AddedEffect) -> CycleFeatures:
-        """Run the drive with effects and return what its cycles tell."""
+        """Run the drive with effects and return the features of its cycles."""
         return _of_all(self._cycles(added))
 
     def at_torque(self, factor: float) -> SimulatedDrive:
-        """Return the drive with another torque of the motor."""
+        """Return the drive with another motor torque."""
         return replace(self, twin=self.twin.at_torque(factor))
 
     def _cycles(self, added: Sequence[AddedEffect]) -> PreparedCycles:
@@ -130,7 +130,7 @@ class SimulatedDrive:
 
 
 def _of_all(run: PreparedCycles) -> CycleFeatures:
-    """Return what all cycles of a run tell; teeth that a short run does not pass are like the others."""
+    """Return the features of all cycles of a run; teeth that a short run does not pass are taken as average."""
     features = run.features()
     return replace(features, teeth_um=np.nan_to_num(features.teeth_um))
 
@@ -138,18 +138,18 @@ def _of_all(run: PreparedCycles) -> CycleFeatures:
 def simulated_drive(simulator: DriveSimulator, cycles: PreparedCycles, healthy: CycleFeatures | None) -> SimulatedDrive:
     """Set a simulated drive to a rig and a recording.
 
-    Geometry, inertias, contact, friction of the flanks and play are the rig's; where a healthy recording tells play,
-    inertia and friction better, they are that recording's. Times of valve and brake, friction of the load and the speed
-    that the flow allows are the recording's own: how the machine is driven is no gap.
+    Geometry, inertias, contact, flank friction and play are the rig's; play, inertia and load friction are taken from a
+    healthy recording where it shows them. Times of valve and brake, the speed limited by the flow and, without a
+    healthy recording, the load friction are the recording's own, since the way the machine is driven is not a gap.
     """
     m = cycles.motion
     contact, ratio = m.contact, m.path.teeth[1] / m.path.teeth[0]
-    inertia = contact.driven_inertia_kg_m2 or 45.0  # usual, where the rig states none
-    if m.torque_nm is None:  # usual torques, which carry the load's inertia
+    inertia = contact.driven_inertia_kg_m2 or 45.0  # usual value where the rig states none
+    if m.torque_nm is None:  # usual torques for the load's inertia
         fastest = float(np.quantile(m.driven_acceleration_rad_s2, 0.98))
         torque_nm = 2.0 * inertia * max(fastest, 1.0) / ratio
         brake_nm = 0.6 * torque_nm
-    else:  # in a stop the back flanks must carry, for the play to be told
+    else:  # the play shows only if the back flanks are loaded in a stop
         forward, backward = np.quantile(m.torque_nm, [0.97, 0.01])
         torque_nm = max(float(forward), 1e-3)
         brake_nm = float(np.clip(-backward, 0.5 * torque_nm, 3.0 * torque_nm))
@@ -169,7 +169,7 @@ def simulated_drive(simulator: DriveSimulator, cycles: PreparedCycles, healthy: 
 
 
 def _module_mm(m: PairMotion) -> float:
-    """Module from the base pitch: 20° is what the path was made with, unless the rig says otherwise."""
+    """Return the module from the base pitch; the path has a pressure angle of 20° unless the rig states another."""
     r1 = m.path.base_radii_m[0]
     pitch_radius = m.path.length_m * r1 / sum(m.path.base_radii_m)  # tan α times the base radius
     return round(2e3 * float(np.hypot(r1, pitch_radius)) / m.path.teeth[0], 6)
@@ -186,7 +186,7 @@ def _on_and_off_s(cycles: PreparedCycles) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class DriveComparison:
-    """One recording beside its healthy reference, or beside the simulated drive.
+    """One recording with its healthy reference, or with the simulated drive.
 
     Parameters
     ----------
@@ -203,12 +203,12 @@ class DriveComparison:
 
     @property
     def baseline(self) -> CycleFeatures:
-        """What it is compared with."""
+        """Features of the baseline."""
         return self.drive.healthy if self.reference is None else self.reference.features()
 
     @property
     def features(self) -> CycleFeatures:
-        """What all cycles tell."""
+        """Features of all cycles."""
         return self.now.features()
 
     @cached_property
@@ -227,12 +227,12 @@ class DriveComparison:
 
     @cached_property
     def change(self) -> FloatArray:
-        """Of all cycles."""
+        """Change of all cycles."""
         return self.change_in()
 
     @cached_property
     def without(self) -> FloatArray:
-        """Changes without each cycle (or each of eight blocks of them), (n_blocks, n): the tooth and order stay."""
+        """Changes with each cycle (or each of eight blocks) left out, (n_blocks, n), at the same tooth and order."""
         return np.array([self.change_in(kept, self.spot) for kept in _leave_one_out(self.now.every)])
 
     @cached_property
@@ -249,12 +249,12 @@ class DriveComparison:
         return scatter
 
     def floor(self, *, of_half: bool = False) -> DriveFloor:
-        """Return how far healthy drives lie from what this is compared with, as far as it can be told of this one."""
+        """Return the structural floor of this comparison, widened by the scatter of the recording."""
         (whole, half), _ = load_floors(with_reference=self.reference is not None)
         return half.widened(HALF * self.scatter) if of_half else whole.widened(self.scatter)
 
     def evidence(self, predicted: Mapping[str, PredictedCause]) -> DriveEvidence:
-        """Reduce the recording to its changes, beside what causes are predicted to change."""
+        """Return the recording's changes together with the predicted ones."""
         first, second = self.now.halves
         folds = (self._fold(first, second), self._fold(second, first))
         return DriveEvidence(self.change, self.scatter, folds, predicted)
@@ -277,28 +277,28 @@ class DriveComparison:
 
 
 def _leave_one_out(every: tuple[int, ...]) -> list[tuple[int, ...]]:
-    """Return all cycles but one, for each; or but one of eight blocks."""
+    """Return all cycles with each one left out in turn, or each of at most eight blocks."""
     blocks = np.array_split(np.array(every), min(len(every), 8))
     return [tuple(c for c in every if c not in block) for block in blocks]
 
 
 def read_cycles(recording: Recording) -> PreparedCycles:
-    """Measure a recording's motion, by the rig that it carries, and cut it into cycles.
+    """Measure a recording's motion with the rig that it carries, and cut it into cycles.
 
     Raises
     ------
     RefusalError
-        If neither gear's motion was recorded: vibration alone.
+        If neither gear's motion was recorded, only vibration.
     """
     rig = recording.rig
     if rig is not None and rig.pairs:
         roles = find_roles(recording, contact_pair(rig)) if rig.contact or len(rig.pairs) == 1 else {}
         if not any(role.endswith((" angle", " speed")) for role in roles):
             raise RefusalError(
-                f"{recording.name} holds no angle or speed of pinion and wheel, and "
+                f"{recording.name} has no angle or speed of pinion and wheel, but "
                 "the model forging compares their starts and stops",
-                remedy="compare vibration of stationary running with --model cracked; else name the channels' shafts "
-                "in the rig file's [[sensor]] tables",
+                remedy="compare vibration of stationary running with --model cracked; otherwise name the channels' "
+                "shafts in the rig file's [[sensor]] tables",
             )
     motion = measure_motion(recording, rig)
     check_turns(motion)
@@ -308,10 +308,10 @@ def read_cycles(recording: Recording) -> PreparedCycles:
 def compare_drive(
     now: PreparedCycles, references: Sequence[PreparedCycles], simulator: DriveSimulator, name: str = "recording"
 ) -> DriveComparison:
-    """Set a recording beside the healthy one at the nearest torque, or beside the drive simulated by its rig."""
+    """Compare a recording with the healthy one at the nearest torque, or with the drive simulated from its rig."""
 
     def apart(reference: PreparedCycles) -> float:
-        """By how much the largest torques differ; where one has none, the top speeds rank recordings likewise."""
+        """Return the difference of the largest torques or, where one is missing, of the top speeds."""
         a, b = now.motion, reference.motion
         first, second = a.torque_nm, b.torque_nm
         if first is None or second is None:
@@ -324,7 +324,7 @@ def compare_drive(
 
 
 def tellable(compared: DriveComparison, effects: Mapping[str, GapEffect]) -> tuple[str, ...]:
-    """Causes that the channels and the reference there are can tell."""
+    """Return the causes that can be identified with the available channels and reference."""
     has_torque = compared.now.motion.torque_nm is not None
     return tuple(
         name
@@ -340,20 +340,20 @@ def predict(
     effects: Mapping[str, GapEffect],
     on_stage: Callable[[str, float], object] = lambda *_: None,
 ) -> dict[str, PredictedCause]:
-    """Simulate every cause that the recording can tell at some severities.
+    """Simulate every cause that the recording can identify at some severities.
 
-    Worn flanks and a cracked tooth move the gears against each other by hundredths of a millimetre; that is added to
-    what the healthy drive tells, without the noise of a run: the play by the mean depth over the mesh cycle, the curve
-    by its shape (the drive in motion agrees, see the tests), a tooth by what its lost stiffness lets it yield. A sensor
-    that misreads changes no motion. All others are run.
+    Worn flanks and a cracked tooth move the gears relative to each other by hundredths of a millimetre. This is added
+    to the features of the healthy drive, without the noise of a run: to the play by the mean depth over the mesh cycle,
+    to the curve by its shape (which agrees with the drive in motion, see the tests), to a tooth by the deflection due
+    to its lost stiffness. A sensor with a wrong gain changes no motion. All other causes are simulated.
 
     Parameters
     ----------
     compared : DriveComparison
-        It tells where a crack or a ripple is put: where the recording changed most.
+        It determines where a crack or a ripple is placed: where the recording changed most.
     effects : mapping
     on_stage : callable
-        Is told the cause and the share that is done.
+        Called with the cause and the fraction completed.
     """
     drive, spot, names = compared.drive, compared.spot, tellable(compared, effects)
     places: dict[str, dict[str, float | str]] = {
@@ -369,10 +369,10 @@ def predict(
         for severity in grid.severities:
             try:
                 features = _features_with(compared, AddedEffect(name, severity, options))
-            except GearsigError:  # it cannot run: a load that cannot be moved, say
+            except GearsigError:  # it cannot run, for example because the load cannot be moved
                 continue
             change = change_of(features, drive.healthy, drive.shape, spot)
-            if np.isfinite(change[shown]).any():  # else it stands still
+            if np.isfinite(change[shown]).any():  # otherwise it stands still
                 changes[severity] = change
         if changes:
             table = np.where(shown, np.nan_to_num(np.array(list(changes.values()))), 0.0)
@@ -381,22 +381,22 @@ def predict(
 
 
 def _features_with(compared: DriveComparison, added: AddedEffect) -> CycleFeatures:
-    """Return what a drive with a cause tells."""
+    """Return the features of a drive with a cause."""
     drive, spot = compared.drive, compared.spot
     healthy, teeth = drive.healthy, drive.healthy.teeth_um.copy()
     if added.name == WEAR:
         curve = drive.worn_curve_um(added.severity)
         mean = float(np.mean(curve))
         return replace(healthy, play_um=healthy.play_um + mean, curve_um=healthy.curve_um + curve - mean)
-    if added.name == CRACK:  # g grows as (1 − loss)^{−1/λ}, among teeth that differ as the recording's do
+    if added.name == CRACK:  # g grows as (1 − loss)^{−1/λ}; teeth differ as in the recording
         softer = (1.0 - drive.twin.crack_stiffness_loss(added)) ** (-1.0 / drive.exponent) - 1.0
         teeth[(spot.tooth + len(teeth) // 2) % len(teeth)] += spot.next_tooth_um
         teeth[spot.tooth] += max(healthy.deflection_um * softer, spot.next_tooth_um)
         return replace(healthy, teeth_um=teeth)
     if added.name == TORQUE_GAIN:
-        # Inertia and friction of the load follow from the torque, and grow with the reading. What the teeth yield does
-        # not: it stays as in a healthy recording, and falls behind a simulated drive, which is driven by the torque
-        # that was read. That one also takes the friction of its load from the recording.
+        # Inertia and friction of the load follow from the torque, and scale with its reading. The deflection of the
+        # teeth does not: it stays as in a healthy recording, but is smaller than in a simulated drive, which is driven
+        # by the torque as read. That drive also takes its load friction from the recording.
         gain = 1.0 + 0.01 * added.severity
         misread = replace(healthy, inertia_kg_m2=gain * healthy.inertia_kg_m2)
         if compared.reference is not None:

@@ -1,4 +1,4 @@
-"""Features of start–stop cycles from their equations of motion, and how they differ between machines."""
+"""Features of start–stop cycles from their equations of motion, and their changes between machines."""
 
 from __future__ import annotations
 
@@ -20,48 +20,49 @@ Mask = NDArray[np.bool_]
 NAN = float("nan")
 PHASES = ("start", "run", "stop", "rest")
 N_PLACES = 20
-"""Parts of the mesh cycle."""
+"""Number of parts of the mesh cycle."""
 FULL_TURN = 0.7
-"""Revolutions from which on a wave of one cycle per revolution is told from a straight line."""
+"""Revolutions from which a wave of one cycle per revolution can be distinguished from a straight line."""
 MIN_RUN_SAMPLES = 50
 
 
 @dataclass(frozen=True)
 class CycleFeatures:
-    """What the equations of motion give for some cycles; nan where it cannot be told.
+    """Quantities from the equations of motion over some cycles; nan where they cannot be determined.
 
     Parameters
     ----------
     play_um, deflection_um : float
-        Along the line of action: without load; of one pair under the ordinary load.
+        Along the line of action: play without load; deflection of one pair under the ordinary load.
     teeth_um : array, (n_teeth,)
-        How much further each tooth of the driver lets the gears turn than the median one, while it carries alone.
+        Additional rotation that each tooth of the driver allows compared with the median one, while it carries the load
+        alone.
     waves_um : array, (4,)
         Cosine and sine of the driver's revolution, then of the driven gear's.
     curve_um : array, (N_PLACES,)
-        Profile of the compression over the mesh cycle on the drive flank, its mean taken off.
+        Profile of the compression over the mesh cycle on the drive flank, with its mean removed.
     contact_scatter_um : float
-        Root mean square of the flanks' residual.
+        RMS of the residual of the flanks' equation.
     zero_m : float
         Compression in the middle of the play.
     ripple : array, (n_orders,)
-        Amplitude over mean torque.
+        Amplitude relative to the mean torque.
     ripple_waves : array, (n_orders,)
-        How many waves of each order an ordinary run holds.
+        Number of waves of each order in an ordinary run.
     inertia_kg_m2 : float
         Of the load.
     friction_nm : float
-        Of the load at half the ordinary speed, sliding and viscous together.
+        Of the load at half the ordinary speed, sliding and viscous friction together.
     flank_friction : float
         Coefficient μ.
     off_centre_nm : array, (2,)
-        Torque of the load by sine and cosine of the driven gear's angle.
+        Load torque by sine and cosine of the driven gear's angle.
     drive_nm : float
         Ordinary torque on the driven gear, for comparison.
     load_scatter_nm : float
-        Size of the load's residual, as a torque.
+        Size of the residual of the load's equation, as a torque.
     impact_mps : float
-        Median over the cycles of the hardest impact.
+        Speed of the hardest impact of a cycle, median over the cycles.
     """
 
     teeth_um: FloatArray
@@ -84,7 +85,7 @@ class CycleFeatures:
 
 @dataclass(frozen=True)
 class PreparedCycles:
-    """A start–stop motion cut into its cycles, with all that is prepared of it once, on demand.
+    """A start–stop motion cut into cycles, with all derived data computed once, on demand.
 
     Parameters
     ----------
@@ -92,9 +93,9 @@ class PreparedCycles:
     segments : MotionSegments
         Of the driver.
     number : array of int, (n,)
-        Cycle of each sample, from 0; −1 ahead of the first start.
+        Cycle of each sample, from 0; −1 before the first start.
     phase : array of int, (n,)
-        Place in `PHASES`.
+        Index in `PHASES`.
     """
 
     motion: motions.PairMotion
@@ -104,7 +105,7 @@ class PreparedCycles:
 
     @property
     def n_cycles(self) -> int:
-        """Starts with what follows them, up to the next."""
+        """Number of starts, each with what follows up to the next."""
         return int(self.number.max()) + 1
 
     @property
@@ -114,24 +115,24 @@ class PreparedCycles:
 
     @property
     def halves(self) -> tuple[tuple[int, ...], tuple[int, ...]]:
-        """Every second cycle, and the others: what drifts is in both."""
+        """Every second cycle, and the others, so that drift is in both."""
         return self.every[::2], self.every[1::2]
 
     @cached_property
     def flanks(self) -> Flanks:
-        """Samples that tell where the flanks are."""
+        """Samples from which the position of the flanks follows."""
         return prepare_flanks(self.motion)
 
     @cached_property
     def equation(self) -> LoadEquation | None:
-        """Of the driven gear; None without torque."""
+        """Equation of the driven gear; None without torque."""
         return prepare_load(self.motion)
 
     @cached_property
     def orders(self) -> NDArray[np.int64]:
-        """Whole orders of the driver that are looked at: not those of the mesh and beside it.
+        """Whole orders of the driver that are evaluated, without those of the mesh and adjacent ones.
 
-        Below the fourth, a start and a stop look like a ripple.
+        Below the fourth order, a start and a stop look like a ripple.
         """
         z, orders = self.motion.path.teeth[0], np.arange(4, 44)
         return orders[np.abs((orders + z // 2) % z - z // 2) > 1]
@@ -145,7 +146,7 @@ class PreparedCycles:
 
     @cached_property
     def _impacts(self) -> tuple[motions.Impact, ...]:
-        """Flanks that met; none where they cannot be seen."""
+        """Impacts between flanks; empty where they cannot be detected."""
         whole = contact_features(self.motion, self.flanks, np.ones(len(self.number), dtype=bool))
         play_um = float(whole.get("play_um", NAN))
         if not np.isfinite(play_um):
@@ -160,7 +161,7 @@ class PreparedCycles:
         return {}
 
     def features(self, cycles: tuple[int, ...] | None = None) -> CycleFeatures:
-        """Return what some cycles tell, or all of them; halves and blocks are asked for again and again."""
+        """Return the features of some cycles, or of all; cached, as halves and blocks are used repeatedly."""
         cycles = self.every if cycles is None else cycles
         if cycles not in self._by_cycles:
             self._by_cycles[cycles] = self._computed(cycles)
@@ -187,9 +188,9 @@ class PreparedCycles:
     def _ripple(self, cycles: tuple[int, ...]) -> FloatArray:
         """Return amplitude over mean torque at each order, (n,); nan without torque.
 
-        A_n = |Σ w (τ − trend) e^{−i n θ1}|/(½ Σ w |τ|) over the runs of the cycles, w a Hann window over each: the
-        angle goes on from one cycle to the next, so that a ripple adds up and what a start excites does not. The trend
-        is a least-squares polynomial, a degree more for each quarter of a second, 3 to 6.
+        A_n = |Σ w (τ − trend) e^{−i n θ1}|/(½ Σ w |τ|) over the runs of the cycles, w a Hann window over each run. The
+        angle continues from one cycle to the next, so a ripple adds up and oscillations excited by a start do not. The
+        trend is a least-squares polynomial with one degree per quarter of a second, limited to 3 … 6.
         """
         m, nothing = self.motion, np.full(len(self.orders), NAN)
         if m.torque_nm is None:
@@ -199,7 +200,7 @@ class PreparedCycles:
             torque, window, x = m.torque_nm[rows], np.hanning(len(rows)), np.linspace(-1.0, 1.0, len(rows))
             degree = int(np.clip(len(rows) / m.sampling_rate_hz / 0.25, 3, 6))
             ripple = torque - Legendre.fit(x, torque, degree, w=np.sqrt(window))(x)
-            limit = 6.0 * motions.median_deviation(ripple)  # of an impact no more counts
+            limit = 6.0 * motions.median_deviation(ripple)  # limits the weight of impacts
             total += np.exp(-1j * self.orders[:, None] * m.driver_angle_rad[rows]) @ (
                 window * np.clip(ripple, -limit, limit)
             )
@@ -219,32 +220,32 @@ class PreparedCycles:
 def cut_cycles(motion: motions.PairMotion) -> PreparedCycles:
     """Cut a motion into cycles: start, run, stop, rest.
 
-    Phases begin and end with 0.15 s of a start that rings, and 0.1 s of a stop; the fits do not rest on these times.
+    The start phase includes 0.15 s of ringing, the stop phase 0.1 s; the fits do not depend on these times.
 
     Raises
     ------
     RefusalError
-        If it does not start and stop, or hardly ever: nothing would be left to check a fit on.
+        If it has no starts and stops, or so few that nothing would be left to check a fit on.
     """
     motion = thin(motion)
     rate, where = motion.sampling_rate_hz, motion.source or "the recording"
     segments = motions.motion_segments(motion.driver_angle_rad, rate)
     if not motions.is_start_stop(segments) and segments.standing_part < 0.05:
         raise RefusalError(
-            f"{where} turns all the time: it holds none of the starts and stops that the start–stop diagnosis rests on",
+            f"{where} turns all the time: it has none of the starts and stops that the start–stop diagnosis needs",
             remedy="record starts and stops; compare stationary running with --model cracked or reduced-fe",
         )
     n = len(segments.moving)
     if n < 2:
         raise RefusalError(
             f"{where} has {n} start{'' if n == 1 else 's'}: what is fitted to one cycle must be checked on another",
-            remedy="record several starts and stops; six or more tell most",
+            remedy="record several starts and stops; preferably six or more",
         )
     number = np.full(len(motion.driver_angle_rad), -1, dtype=np.int64)
     phase = np.full(len(number), PHASES.index("rest"), dtype=np.int64)
     for i, segment in enumerate(segments.moving):
         first, last = segment.first, segment.last
-        # From the last sample at 90 % of the top speed on, the driver only slows down.
+        # The driver only slows down after the last sample at 90 % of the top speed.
         speed = np.abs(motion.driver_speed_rad_s[first:last])
         fast = np.flatnonzero(speed > 0.9 * np.quantile(speed, 0.98))
         stop = first + int(fast[-1]) + 1 if len(fast) else last
@@ -256,9 +257,9 @@ def cut_cycles(motion: motions.PairMotion) -> PreparedCycles:
 
 
 def thin(motion: motions.PairMotion) -> motions.PairMotion:
-    """Return every n-th sample of a motion that is sampled faster than 2 kHz: instants stay instants.
+    """Return every n-th sample, without averaging, of a motion sampled faster than 2 kHz.
 
-    Motion of shafts is slower; vibration is not looked at here.
+    The motion of shafts is slower, and vibration is not evaluated here.
     """
     step = max(1, int(motion.sampling_rate_hz / 2000.0 + 1e-9))
     values = {field.name: getattr(motion, field.name) for field in fields(motion)}
@@ -269,10 +270,10 @@ def thin(motion: motions.PairMotion) -> motions.PairMotion:
 def robust_least_squares(
     design: FloatArray, y: FloatArray, usable: Mask, groups: tuple[Mask, ...] = (), *, far: float = 4.0, rounds: int = 4
 ) -> tuple[FloatArray, Mask]:
-    """Solve y = A x by least squares without samples far off: impacts, slipped counts.
+    """Solve y = A x by least squares without outliers, such as impacts and slipped counts.
 
-    Far off is said by the scatter of a sample's own group: the back flank impacts while the drive flank runs smoothly,
-    and without noise all of it would lie far off.
+    Outliers are judged by the scatter of a sample's own group: the back flank impacts while the drive flank runs
+    smoothly, and against the latter's scatter all of its samples would be outliers.
 
     Parameters
     ----------
@@ -280,15 +281,15 @@ def robust_least_squares(
     y : array, (n,)
     usable : array of bool, (n,)
     groups : tuple of array of bool, (n,)
-        Which samples scatter alike; empty: all do.
+        Groups of samples with similar scatter; empty: a single group.
     far : float
-        Standard deviations, by the median, from which a sample is left out.
+        Standard deviations, from the median deviation, beyond which a sample is an outlier.
     rounds : int
 
     Returns
     -------
     (array (k,), array of bool (n,))
-        The solution, and the samples that it rests on.
+        The solution, and the samples used for it.
     """
     keep, groups = usable, groups or (np.ones(len(y), dtype=bool),)
     size = np.sqrt(np.mean(design[keep] ** 2, axis=0)) + 1e-30
@@ -310,27 +311,27 @@ def _spread(residual: FloatArray) -> float:
 
 
 # --------------------
-# What the loaded flanks tell: play, deflection, single teeth, the shape of worn flanks, run-out.
+# From the loaded flanks: play, deflection, single teeth, the shape of worn flanks, run-out.
 # --------------------
 
 PARTED_M = 5e-5
-"""A sample further from one level for all places lies in the play: the flanks have just parted. Worn flanks differ by
-less from place to place, as the least worn pair decides."""
+"""Samples further than this from a common level for all places are in the play: the flanks have just separated. Worn
+flanks differ by less from place to place, as the least worn pair determines the position."""
 
 
 class Flanks(NamedTuple):
-    """Samples that tell where the flanks are.
+    """Samples from which the position of the flanks follows.
 
     Parameters
     ----------
     design : array, (n, k)
         Columns: side, deflection (0 without torque), and waves of the shafts.
     loaded, alone : array of bool, (n,)
-        One of the flanks carries; a single pair carries on the drive flank.
+        Whether one of the flanks carries load; whether a single pair carries it on the drive flank.
     place : array of int, (n,)
-        Of a sample within the mesh cycle, 0 to `N_PLACES` − 1.
+        Position of a sample within the mesh cycle, 0 to `N_PLACES` − 1.
     tooth : array of int, (n,)
-        Of the driver, from 0.
+        Tooth of the driver, from 0.
     """
 
     design: FloatArray
@@ -341,23 +342,23 @@ class Flanks(NamedTuple):
 
 
 def prepare_flanks(m: motions.PairMotion) -> Flanks:
-    """Find the samples that tell where the flanks are: by the torque, or by the compression where there is none."""
+    """Find the samples with loaded flanks by the torque, or by the compression where there is no torque."""
     path, force, speed = m.path, m.tooth_force_from_torque_n, np.abs(m.driver_speed_rad_s)
     turning = speed > 0.05 * float(np.quantile(speed, 0.95))
-    if force is not None:  # a tenth of the ordinary load tells where a flank is; (|F|/n)^{1/λ} deflects it
+    if force is not None:  # from a tenth of the ordinary load; deflection (|F|/n)^{1/λ}
         loaded = np.abs(force) > 0.1 * float(np.quantile(np.abs(force), 0.95))
         side = np.where(force < 0.0, -1.0, 1.0)
         n_pairs = path.n_pairs(m.driver_angle_rad, side)
         elastic = side * (np.abs(force) / n_pairs) ** (1.0 / m.contact.exponent)
-    else:  # a flank carries where the compression is near the ends of its range
+    else:  # loaded where the compression is near the ends of its range
         q = m.compression_m
         low, high = np.quantile(q[turning], [0.01, 0.99])
         side = np.where(q > 0.5 * (low + high), 1.0, -1.0)
         loaded = turning & (np.minimum(high - q, q - low) < 0.25 * (high - low))
-        if high - low < 1e-6 * m.contact.half_backlash_um:  # only one flank: the motion goes forwards, so it drives
+        if high - low < 1e-6 * m.contact.half_backlash_um:  # one flank only: the drive flank, as motion is forwards
             side, loaded = np.ones(len(q)), turning
         elastic = np.zeros(len(q))
-    # Base pitches around the entry and exit of pairs are left out.
+    # Base pitches around the entry and exit of pairs are excluded.
     u, edge = path.position(m.driver_angle_rad, side), 0.07
     clear = (u > edge) & (u < 1.0 - edge) & (np.abs(u - (path.contact_ratio - 1.0)) > edge)
     columns = [side, elastic, np.cos(m.driver_angle_rad), np.sin(m.driver_angle_rad)]
@@ -373,15 +374,16 @@ def prepare_flanks(m: motions.PairMotion) -> Flanks:
 
 
 def _turned(m: motions.PairMotion) -> float:
-    """Revolutions of the driven gear."""
+    """Return the revolutions of the driven gear."""
     return float(np.ptp(m.driven_angle_rad)) / (2.0 * np.pi)
 
 
 def contact_features(m: motions.PairMotion, flanks: Flanks, rows: Mask) -> dict[str, Any]:
     """Fit q = b on the back flank, d_p at place p of the mesh cycle on the drive flank, deflection and waves to both.
 
-    q = b [s < 0] + Σ_p d_p [s > 0, p] + s κ (|F|/n)^{1/λ} + waves; what is left is sorted by tooth. Play is d̄ − b. A
-    level for each place leaves the deflection to what the load changes there, and shows the shape of worn flanks.
+    q = b [s < 0] + Σ_p d_p [s > 0, p] + s κ (|F|/n)^{1/λ} + waves; the residual is sorted by tooth. Play is d̄ − b.
+    With a level for each place, the deflection follows only from changes of load there, and the levels show the shape
+    of worn flanks.
 
     Returns
     -------
@@ -404,7 +406,7 @@ def contact_features(m: motions.PairMotion, flanks: Flanks, rows: Mask) -> dict[
     x, keep = robust_least_squares(design, q, keep, (drive, ~drive))
     residual = q - design @ x
     of = dict(zip(known_columns, x[len(places) : len(places) + len(known_columns)], strict=True))
-    # A place whose samples all lay far off has a level that nothing rests on.
+    # The level of a place whose samples were all outliers has no basis.
     rests = np.bincount(flanks.place[keep & drive], minlength=N_PLACES)[places] > 0
     at_places = np.where(rests, x[: len(places)], NAN)
     middle = float(np.nanmean(at_places))
@@ -431,13 +433,13 @@ def contact_features(m: motions.PairMotion, flanks: Flanks, rows: Mask) -> dict[
 
 
 def _known_columns(flanks: Flanks, keep: Mask) -> list[int]:
-    """Columns of the design beside the side; the deflection only where there is a torque."""
+    """Return the columns of the design other than the side; the deflection only where there is a torque."""
     has_torque = bool(np.any(flanks.design[keep, 1]))
     return [c for c in range(1, flanks.design.shape[1]) if c != 1 or has_torque]
 
 
 def _touching(flanks: Flanks, q: FloatArray, keep: Mask, drive: Mask) -> Mask:
-    """Say which samples are near one level for each flank: a place's own level would follow what flies past it."""
+    """Return which samples are near a common level of each flank; separate levels for places would follow outliers."""
     sides = np.stack([drive, ~drive], axis=1).astype(np.float64)
     design = np.concatenate([sides, flanks.design[:, _known_columns(flanks, keep)]], axis=1)
     if np.sum(keep) < 4 * design.shape[1]:
@@ -449,23 +451,23 @@ def _touching(flanks: Flanks, q: FloatArray, keep: Mask, drive: Mask) -> Mask:
 
 
 # --------------------
-# What the driven gear's motion tells: inertia, friction of its bearings and of the flanks, a load off centre.
+# From the driven gear's motion: inertia, friction of its bearings and of the flanks, an eccentric load.
 # --------------------
 
 
 class LoadEquation(NamedTuple):
-    """α2 = (r_b2 F (1 + μ G) − T sgn ω2 − c ω2 − U sin θ2 − V cos θ2)/J2, smoothed on both sides alike.
+    """α2 = (r_b2 F (1 + μ G) − T sgn ω2 − c ω2 − U sin θ2 − V cos θ2)/J2, with the same smoothing on both sides.
 
     Parameters
     ----------
     response : array, (n,)
         α2.
     columns : array, (n, 6)
-        What 1/J2, μ/J2, T/J2, c/J2, U/J2, V/J2 multiply.
+        Factors of 1/J2, μ/J2, T/J2, c/J2, U/J2, V/J2.
     turning : array of bool, (n,)
-        Where friction slides: from 15 % of the ordinary speed on.
+        Samples with sliding friction: from 15 % of the ordinary speed on.
     flank_loss : array or None
-        (τ − J1 α1)/r_b1 less the measured force, over it, per unit of μ; where a force was measured.
+        (τ − J1 α1)/r_b1 less the measured force, and its derivative by μ; None where no force was measured.
     """
 
     response: FloatArray
@@ -479,7 +481,7 @@ def prepare_load(m: motions.PairMotion) -> LoadEquation | None:
     force = m.tooth_force_from_torque_n
     if force is None:
         return None
-    # Below 40 Hz, masses that swing behind the driven gear are stiff.
+    # Below 40 Hz, masses that are coupled elastically to the driven gear move with it.
     smoother = motions.local_polynomial(m.sampling_rate_hz, min(40.0, 0.1 * m.sampling_rate_hz))
     mu = 0.05
     rubbing = replace(m, contact=replace(m.contact, friction_coefficient=mu))
@@ -506,7 +508,7 @@ def prepare_load(m: motions.PairMotion) -> LoadEquation | None:
 
 
 def load_features(m: motions.PairMotion, equation: LoadEquation | None, rows: Mask) -> dict[str, Any]:
-    """Solve the equation of the driven gear on some samples; empty where they cannot tell it."""
+    """Solve the equation of the driven gear on some samples; empty where they do not determine it."""
     if equation is None or np.sum(keep := rows & equation.turning) < 100:
         return {}
     columns = equation.columns[:, : 6 if _turned(m) > FULL_TURN else 4]
@@ -517,7 +519,7 @@ def load_features(m: motions.PairMotion, equation: LoadEquation | None, rows: Ma
     half = 0.5 * float(np.quantile(np.abs(m.driven_speed_rad_s), 0.95))
     residual = equation.response[keep] - columns[keep] @ x
     friction = float(inertia * x[1])
-    if equation.flank_loss is not None:  # a measured force feels the driver's side alone
+    if equation.flank_loss is not None:  # a measured force reflects the driver's side alone
         y, per_friction = (values[keep] for values in equation.flank_loss)
         distance = np.abs(y - np.median(y))
         near = distance < 5.0 * (_spread(distance) + 1e-12)
@@ -534,12 +536,12 @@ def load_features(m: motions.PairMotion, equation: LoadEquation | None, rows: Ma
 
 
 # --------------------
-# How far what is told changes from one machine to another.
+# Changes of these features from one machine to another.
 # --------------------
 
 
 class DriveFeature(NamedTuple):
-    """A change that is compared: its words, its kind of place, if it is a level, if it follows from others."""
+    """A compared change: its words, its kind of place, whether it is a level, whether it follows from others."""
 
     words: str
     kind: PlaceKind = PlaceKind.SPEED
@@ -562,29 +564,29 @@ FEATURES: Mapping[str, DriveFeature] = {
     "driven_wave": DriveFeature("wave of the compression once per revolution of the driven gear", PlaceKind.SHAFT),
     "off_centre": DriveFeature("torque of the load once per revolution", PlaceKind.SHAFT),
     "impact": DriveFeature("hardest impact of the flanks in a cycle", is_level=True, follows=True),
-    "contact_scatter": DriveFeature("what the loaded flanks' equation leaves over", is_level=True, follows=True),
-    "load_scatter": DriveFeature("what the load's equation of motion leaves over", is_level=True, follows=True),
+    "contact_scatter": DriveFeature("residual of the loaded flanks' equation", is_level=True, follows=True),
+    "load_scatter": DriveFeature("residual of the load's equation of motion", is_level=True, follows=True),
 }
 NAMES = tuple(FEATURES)
-"""Of the changes, see `change_of`."""
+"""Names of the changes, see `change_of`."""
 
 
 @dataclass(frozen=True)
 class LocatedDriveChange:
-    """Where a change was found, and what teeth and orders differ by ordinarily.
+    """Tooth and order of a change, and the ordinary differences between teeth and between orders.
 
     Parameters
     ----------
     tooth : int
-        Of the driver, from 0.
+        Tooth of the driver, from 0.
     order : int
-        Place among the orders of the ripple.
+        Index among the orders of the ripple.
     tooth_step_um : float
         Scatter of the changes of all teeth.
     ripple_step : array, (n_orders,)
-        Part of the mean torque that a run's own variation may put there.
+        Fraction of the mean torque that a run's own variation may contribute at each order.
     next_tooth_um : float
-        Change of the tooth that changed next most: a cracked one must yield more to be seen.
+        Change of the tooth with the second largest change, which a cracked tooth must exceed to be seen.
     """
 
     tooth: int
@@ -595,11 +597,12 @@ class LocatedDriveChange:
 
 
 def spot_of(now: CycleFeatures, baseline: CycleFeatures) -> LocatedDriveChange:
-    """Return the tooth and the order that changed most over what the others did.
+    """Return the tooth and the order with the largest change relative to the others.
 
-    Teeth: the scatter of their changes, 1.4826 of the median deviation, so that a tooth is judged by the other teeth
-    and not by what another make differs by; 1 % of the deflection at least. Orders: f (1 + (w₀/w)³), f = 1 % of the
-    mean torque, w₀ = 6, w the waves of an order in one run: with fewer, the trend of a start and a stop passes for it.
+    Teeth: relative to the scatter of their changes, 1.4826 times the median deviation and at least 1 % of the
+    deflection, so that a tooth is judged by the other teeth and not by the differences between makes. Orders: relative
+    to f (1 + (w₀/w)³), f = 1 % of the mean torque, w₀ = 6, w the waves of an order in one run: with fewer waves, the
+    trend of a start and a stop looks like a ripple.
     """
     teeth, ripple = now.teeth_um - baseline.teeth_um, now.ripple - baseline.ripple
     known = teeth[np.isfinite(teeth)]
@@ -614,20 +617,20 @@ def spot_of(now: CycleFeatures, baseline: CycleFeatures) -> LocatedDriveChange:
 def change_of(
     now: CycleFeatures, baseline: CycleFeatures, curve_shape: FloatArray, at: LocatedDriveChange | None = None
 ) -> FloatArray:
-    """Return how far what is told changed, (n,) by `NAMES`; nan where it cannot be told.
+    """Return the changes of all features, (n,) by `NAMES`; nan where they cannot be determined.
 
-    Levels (play, deflection, inertia, friction of the load, impact, scatter) in dB. What is ordinarily near zero and
-    may have a sign is given as 20 lg e · asinh(x/2f), f what healthy machines differ by: for large x in dB over it.
-    Tooth and ripple are given over the next largest, f as `spot_of` says.
+    Levels (play, deflection, inertia, friction of the load, impact, scatter) are in dB. Quantities that are normally
+    near zero and may have a sign are given as 20 lg e · asinh(x/2f), f the difference between healthy machines: for
+    large x this is in dB over f. Tooth and ripple are relative to the next largest, with f from `spot_of`.
 
     Parameters
     ----------
     now, baseline : CycleFeatures
-        Of two machines, or one machine at two times; or measured and simulated.
+        Of two machines, or of one machine at two times; or measured and simulated.
     curve_shape : array
-        Profile of the compression over the mesh cycle that worn flanks give; its mean is 0.
+        Profile of the compression over the mesh cycle due to worn flanks; its mean is 0.
     at : LocatedDriveChange or None
-        Tooth and order to look at, and their steps. None: those that changed most.
+        Tooth and order to evaluate, and their steps. None: those that changed most.
     """
     spot = at or spot_of(now, baseline)
     teeth = (now.teeth_um - baseline.teeth_um) / spot.tooth_step_um
@@ -637,7 +640,7 @@ def change_of(
 
     def level(name: str, minimum: float = 0.0) -> float:
         a, b = getattr(now, name), getattr(baseline, name)
-        if minimum != 0.0:  # below it nothing is told from nothing
+        if minimum != 0.0:  # smaller values are indistinguishable from zero
             a, b = np.hypot(a, minimum), np.hypot(b, minimum)
         return 20.0 * float(np.log10(a / b)) if a > 0.0 and b > 0.0 else NAN
 
@@ -647,7 +650,7 @@ def change_of(
     next_tooth = signed(_largest_except(teeth, spot.tooth), 1.0)
     next_ripple = signed(
         _largest_except(ripple, spot.order, 2), 1.0
-    )  # a run is short: a ripple leaks into orders beside
+    )  # in a short run, a ripple leaks into adjacent orders
     values = {
         "play": level("play_um"),
         "deflection": level("deflection_um"),
@@ -670,12 +673,12 @@ def change_of(
 
 
 def _deflection(now: CycleFeatures, baseline: CycleFeatures) -> float:
-    """Return what a pair of teeth yields under the ordinary load; 20 µm where no torque tells it."""
+    """Return the deflection of a pair of teeth under the ordinary load; 20 µm where it is not known without torque."""
     return next((d for d in (baseline.deflection_um, now.deflection_um) if np.isfinite(d)), 20.0)
 
 
 def _projected(curve: FloatArray, shape: FloatArray) -> float:
-    """Return how far a curve runs along a shape of the same length, as the span between its ends."""
+    """Return the projection of a curve on a shape of the same length, as its peak-to-peak value."""
     known = np.isfinite(curve)
     if np.sum(known) < len(curve) // 2:
         return NAN
@@ -685,7 +688,7 @@ def _projected(curve: FloatArray, shape: FloatArray) -> float:
 
 
 def _largest_except(values: FloatArray, place: int, n_neighbours: int = 0) -> float:
-    """Return the largest of the others, those beside it left out."""
+    """Return the largest of the other values, without its neighbours."""
     remaining = np.delete(values, np.arange(max(place - n_neighbours, 0), min(place + n_neighbours + 1, len(values))))
     return float(np.nanmax(remaining)) if np.any(np.isfinite(remaining)) else NAN
 
@@ -695,16 +698,16 @@ UNITS = {COMPRESSION: "µm", TORQUE: "N·m"}
 
 
 def prediction_errors(cycles: PreparedCycles, known: CycleFeatures) -> dict[tuple[str, str, str], float]:
-    """Return the root mean square error of prediction by quantity, phase of motion and flank.
+    """Return the RMS error of prediction by quantity, phase of motion and flank.
 
-    Compression: q − q₀ − s(a + κ(|F|/n)^{1/λ}), a and κ those known, q₀ so that the drive flank lies right on average.
-    Torque: τ − J1 α1 − (r_b1/r_b2)(J2 α2 + T sgn ω2)/(1 + μ G) within 40 Hz, while the load turns. Each is that of an
-    offset and a normal scatter about it, both by medians: single impacts do not decide.
+    Compression: q − q₀ − s(a + κ(|F|/n)^{1/λ}), a and κ the known ones, q₀ such that the drive flank is right on
+    average. Torque: τ − J1 α1 − (r_b1/r_b2)(J2 α2 + T sgn ω2)/(1 + μ G) within 40 Hz, while the load turns. Each error
+    combines an offset and a normal scatter about it, both from medians, so that single impacts hardly count.
 
     Parameters
     ----------
     cycles : PreparedCycles
-        Whose motion is predicted.
+        Their motion is predicted.
     known : CycleFeatures
         Of the healthy machine, or of its simulation.
 
@@ -712,7 +715,7 @@ def prediction_errors(cycles: PreparedCycles, known: CycleFeatures) -> dict[tupl
     -------
     dict
         Keys are "compression" (µm along the line of action) or "torque" (of the driver's shaft, N m); a phase of
-        `PHASES`; "drive", "back" or, for either, nothing.
+        `PHASES`; "drive", "back" or, for either flank, "".
     """
     m, flanks, equation = cycles.motion, cycles.flanks, cycles.equation
     residuals: list[tuple[str, str, FloatArray, Mask]] = []

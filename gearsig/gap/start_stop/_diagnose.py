@@ -1,16 +1,17 @@
 """The gap between start–stop recordings and a simulated drive: where, which cause, how far it shrinks, what next.
 
-Orders and sidebands mean nothing where the speed crosses zero. What a start–stop machine tells is in its equations:
-play and deflection of the flanks, tooth by tooth and over the mesh cycle, under a torque that is measured; inertia and
-friction of the load from torque against acceleration; ripple of the torque over the pinion's angle; impacts. They hold
-whatever the valve and the brake do, so that a simulated drive need not repeat the very motion.
+Orders and sidebands have no meaning where the speed crosses zero. The evidence of a start–stop machine is in its
+equations: play and deflection of the flanks, tooth by tooth and over the mesh cycle, under a measured torque; inertia
+and friction of the load, from torque against acceleration; ripple of the torque over the pinion's angle; impacts. They
+hold whatever the valve and the brake do, so a simulated drive need not repeat the same motion.
 
-1. Those equations are fitted to the cycles of a recording, to a healthy recording's, or to a run of the simulated drive
-   by the rig's drawing (its valve, brake and load friction read off the recording: nuisances).
-2. Each cause is run in the simulated drive at some severities; between them runs a straight line. What it changes is
-   compared with what changed, over the floor: what healthy drives of another make differ by (`floors.json`).
-3. Severity and evidence come from all cycles; the shrink from every second cycle checked on the others and the other
-   way round, against the same cause at wrong teeth and orders. Both go into probabilities calibrated on blind cases.
+1. These equations are fitted to the cycles of a recording, and to those of its baseline: a healthy recording, or a run
+   of the drive simulated from the rig's drawing (with valve, brake and load friction taken from the recording:
+   nuisances).
+2. Each cause is simulated at some severities, with linear interpolation between them. The predicted change is compared
+   with the observed one, relative to the floor: the differences between healthy drives (`floors.json`).
+3. Severity and evidence come from all cycles. The shrink comes from every second cycle, checked on the others and vice
+   versa, against the same cause at wrong teeth and orders. Both enter probabilities calibrated on blind cases.
 """
 
 from __future__ import annotations
@@ -83,22 +84,22 @@ def diagnose_start_stop(
     Parameters
     ----------
     recordings, references : sequence of Recording
-        With the angles (or speeds) of pinion and wheel, better with the torque between motor and pinion. Each is
+        With the angles (or speeds) of pinion and wheel, and preferably the torque between motor and pinion. Each is
         compared with the reference at the nearest torque. Each carries its rig, with a [contact] table.
     simulator : DriveSimulator
     effects : mapping
-        Those that may be named.
+        Effects that may be named.
     tell : callable
 
     Returns
     -------
     GapReport
-        Places, curves and steps are of the recording that differs most.
+        Places, curves and steps are those of the recording with the largest difference.
 
     Raises
     ------
     RefusalError
-        If a recording holds no start and stop, or no motion of both gears, or the rig no contact.
+        If a recording has no start and stop, or no motion of both gears, or the rig has no contact.
     """
     tell("reading the motion", 0.02)
     healthy = [read_cycles(reference) for reference in references]
@@ -143,7 +144,7 @@ def diagnose_start_stop(
 
 
 def _repeatability_limit(compared: DriveComparison) -> FloatArray:
-    """What the recording's own cycles scatter by, 19 times of 20, in dB, (n,)."""
+    """Return the limit of the scatter between the recording's own cycles, for 19 of 20, in dB, (n,)."""
     return FLOOR_IN_DEVIATIONS * np.maximum(compared.scatter, 0.05)
 
 
@@ -183,7 +184,7 @@ def _cause(
 
 
 def _evidence(fitted: FittedDriveCause, compared: DriveComparison) -> tuple[Evidence, ...]:
-    """Return what it predicts and what was observed: its own changes, and those that it leaves unexplained."""
+    """Return predicted and observed changes: the cause's own, and those that it leaves unexplained."""
     floor, change, predicted = compared.floor(), compared.change, fitted.predicted
     limit, observed = floor.limit, np.nan_to_num(change - floor.centre)
     free = np.isin(NAMES, TRIED[fitted.name].may_move)
@@ -203,7 +204,7 @@ def _evidence(fitted: FittedDriveCause, compared: DriveComparison) -> tuple[Evid
 
 
 def _steps(compared: DriveComparison, evidence: DriveEvidence, cause: GapCause) -> tuple[GapStep, ...]:
-    """Return what is left of the whole gap: before, and with an effect, fitted to the other half of the cycles."""
+    """Return what remains of the whole gap: before, and with an effect fitted to the other half of the cycles."""
     floor, predicted = compared.floor(of_half=True), evidence.predicted[cause.name]
     fitted = [fit(predicted, fold.fitted, floor).predicted for fold in evidence.folds]
 
@@ -220,25 +221,25 @@ def _messages(
     clearest: DriveComparison,
     evidence: DriveEvidence,
 ) -> Iterator[str]:
-    """Say what could not be told, what was taken for granted, and what the recording would not show."""
+    """Yield messages about causes not considered, assumptions made, and effects too small for the recording to show."""
     known = set.intersection(*(set(tellable(c, effects)) for c in every))
     missing = [effects[name].title for name in TRIED if name in effects and name not in known]
     if missing:
         lacking = [c.name for c in every if c.now.motion.torque_nm is None]
-        why = "only a healthy reference tells what is ordinary"
+        why = "only a healthy reference shows what is normal"
         if lacking:
             why = f"no torque was recorded in {', '.join(lacking)}"
-        yield f"Not considered, as {why}: {', '.join(missing)}. Such a cause ends in none or unknown."
+        yield f"Not considered, because {why}: {', '.join(missing)}. Such a cause would appear as none or unknown."
     if every[0].reference is not None:
         yield (
             "Tooth and order count from the zero of the pinion's encoder, which must be the same in both recordings. "
-            "In the figures of torque and teeth the healthy reference stands for the simulation before."
+            "In the figures of torque and teeth, the healthy reference takes the place of the simulation before."
         )
     for c in every:
         if c.now.n_cycles < 4:
             yield f"{c.name} has {c.now.n_cycles} starts: how far the gap shrinks rests on few cycles."
         if not c.features.play_um > 0.0:
-            yield f"{c.name} loads one flank only: its play cannot be told; record a stop with the brake."
+            yield f"{c.name} loads one flank only: its play is not known; record a stop with the brake."
     hidden = []
     for name, cause in evidence.predicted.items():
         min_severity = cause.minimum_severity(clearest.floor())
@@ -253,9 +254,10 @@ def _messages(
 
 
 def drive_places(compared: DriveComparison) -> tuple[GapPlace, ...]:
-    """Return where a recording differs, largest share first; then the phases of motion that are predicted worst.
+    """Return where a recording differs, largest share first; then the phases of motion with the worst predictions.
 
-    Size of a change over its floor z; share max(z² − 1, 0)/Σ max(z² − 1, 0), from 1 % on.
+    With z a change over its floor, the share is max(z² − 1, 0)/Σ max(z² − 1, 0); places with more than 1 % are
+    returned.
     """
     floor, spot, m = compared.floor(), compared.spot, compared.now.motion
     distance = compared.change - floor.centre
@@ -291,7 +293,7 @@ def drive_places(compared: DriveComparison) -> tuple[GapPlace, ...]:
 
 
 def _titles(compared: DriveComparison) -> dict[str, str]:
-    """Return changes in one sentence each, with their numbers."""
+    """Return each change as a phrase with its values."""
     now, baseline, spot = compared.features, compared.baseline, compared.spot
 
     def pair(name: str, unit: str) -> str:
@@ -325,7 +327,7 @@ def _titles(compared: DriveComparison) -> dict[str, str]:
 
 
 def _phases(compared: DriveComparison) -> list[GapPlace]:
-    """Return the phases in which motion or torque are predicted worse than the healthy machine's own, by 3 dB."""
+    """Return the phases whose motion or torque is predicted worse, by 3 dB, than for the healthy machine itself."""
     healthy = compared.drive.healthy_run if compared.reference is None else compared.reference
     now, baseline = (prediction_errors(cycles, compared.baseline) for cycles in (compared.now, healthy))
     nothing = float("nan")
@@ -336,7 +338,7 @@ def _phases(compared: DriveComparison) -> list[GapPlace]:
         if np.isfinite(change_db) and change_db > 3.0:
             title = (
                 f"{phase}{f', {flank} flank' if flank else ''}: measured {quantity} is {readable(rms, 2)} "
-                f"{UNITS[quantity]} off its prediction, {readable(usual, 2)} ordinarily"
+                f"{UNITS[quantity]} off its prediction, normally {readable(usual, 2)}"
             )
             channel = "" if quantity == COMPRESSION else quantity
             kind = PlaceKind.SPEED
@@ -345,7 +347,7 @@ def _phases(compared: DriveComparison) -> list[GapPlace]:
 
 
 def _torque_curves(compared: DriveComparison, fitted: AddedEffect | None) -> tuple[SpectrumCurves, ...]:
-    """Return the torque by order of the pinion while running; none without torque."""
+    """Return the torque by order of the pinion while running; empty without torque."""
     cycles, now, baseline = compared.now, compared.features.ripple, compared.baseline.ripple
     if cycles.motion.torque_nm is None or not np.all(np.isfinite(now)) or not np.all(np.isfinite(baseline)):
         return ()
@@ -356,7 +358,7 @@ def _torque_curves(compared: DriveComparison, fitted: AddedEffect | None) -> tup
     after = baseline.copy() if fitted is not None else np.zeros(0)
     if fitted is not None and fitted.name == RIPPLE:
         after[compared.spot.order] = np.hypot(after[compared.spot.order], 0.01 * fitted.severity)
-    # How far a line of healthy drives may rise: the floor of the ripple, from its scale to a part of the mean torque.
+    # The limit for a line of healthy drives: the floor of the ripple, converted to a fraction of the mean torque.
     limit = float(compared.floor().limit[NAMES.index("ripple")])
     part = 2.0 * compared.spot.ripple_step * float(np.sinh(limit * np.log(10.0) / 20.0))
     return (
@@ -376,7 +378,7 @@ def _torque_curves(compared: DriveComparison, fitted: AddedEffect | None) -> tup
 def _tooth_curves(
     compared: DriveComparison, fitted: AddedEffect | None, fits: Mapping[str, FittedDriveCause]
 ) -> tuple[AngleCurves, ...]:
-    """Return what each tooth of the pinion yields beyond the median one, 1 + (extra/floor)²: healthy ones are 1."""
+    """Return each tooth's yield beyond the median tooth as 1 + (extra/floor)², which is 1 for healthy teeth."""
     now, baseline, spot = compared.features.teeth_um, compared.baseline.teeth_um, compared.spot
     n = len(now)
     if np.sum(np.isfinite(now)) < 0.8 * n:
@@ -409,7 +411,7 @@ def _next_recordings(
     healthy_friction_nm = compared.drive.healthy.friction_nm
 
     def predicted(name: str, drive: SimulatedDrive) -> FloatArray:
-        """Return the predicted change of another drive, where the cause is expected to show."""
+        """Return the change predicted for another drive, where the cause is expected to show."""
         if name in (WEAR, CRACK, TORQUE_GAIN):
             return fits[name].predicted
         added = AddedEffect(name, fits[name].severity.value, evidence.predicted[name].options)
@@ -423,7 +425,7 @@ def _next_recordings(
     recordings = []
     for factor in (0.7, 1.5):
         drive = compared.drive.at_torque(factor)
-        # Where the healthy drive turns its load at another torque, what its cycles tell is the same.
+        # The features are comparable only if the healthy drive gives the same load friction at the other torque.
         if not abs(drive.healthy.friction_nm - healthy_friction_nm) < 0.1 * healthy_friction_nm:
             continue
         try:
@@ -441,12 +443,12 @@ def _next_recordings(
 
 
 def refuse_start_stop(recordings: Sequence[Recording], model: str) -> None:
-    """Refuse recordings of starts and stops for a model of running that goes on.
+    """Refuse recordings of starts and stops for a model of continuous running.
 
     Raises
     ------
     RefusalError
-        With the model that they are for.
+        It names the model to use instead.
     """
     for recording in recordings:
         if recording.rig is None or recording.rig.contact is None:
@@ -458,7 +460,7 @@ def refuse_start_stop(recordings: Sequence[Recording], model: str) -> None:
             continue
         if starts:
             raise RefusalError(
-                f"{recording.name} starts and stops: orders, which the model {model} is compared by, need a shaft that "
-                "goes on turning",
+                f"{recording.name} starts and stops: the model {model} is compared by orders, which need a shaft that "
+                "turns continuously",
                 remedy="--model forging",
             )
