@@ -77,7 +77,7 @@ def gap(
             "--learn",
             metavar="FOLDER",
             help="Labelled recordings of this rig, or of your own simulation of it: labels.csv in it lists file, "
-            "effect, reference, severity. Two of each effect help most.",
+            "effect, reference. Two of each effect help most.",
         ),
     ] = None,
     cache: Annotated[

@@ -503,7 +503,7 @@ def _tooth_error_evidences(
         if c.facts.reference
     ]
     known = [evidence for evidence in evidences if evidence is not None]
-    return known, [f"No transmission error despite encoders: {refusal}." for refusal in refusals]
+    return known, [f"No evidence from the encoders: {refusal}." for refusal in refusals]
 
 
 def _encoder_messages(evidences: Sequence[ToothErrorEvidence], known: Mapping[str, GapEffect]) -> list[str]:

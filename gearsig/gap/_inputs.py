@@ -224,7 +224,7 @@ def _names(paths: Sequence[Path]) -> tuple[str, ...]:
 # --------------------
 
 
-TABLE, COLUMNS = "labels.csv", ("file", "effect", "reference", "severity")
+TABLE, COLUMNS = "labels.csv", ("file", "effect", "reference")
 HEALTHY_LABELS = ("healthy", NONE, "no_fault", "ok")
 MAX_LABELLED = 500
 
@@ -239,7 +239,7 @@ def read_labelled(
     """Read the recordings named in a folder's `labels.csv`.
 
     The table has a line for each recording: `file`, `effect` (a name from the catalogue, "healthy", or a name of your
-    own), and optionally `reference` (a file of the same rig when it was healthy) and `severity`.
+    own), and optionally `reference` (a file of the same rig when it was healthy). Further columns are ignored.
 
     Parameters
     ----------
@@ -254,8 +254,7 @@ def read_labelled(
     Raises
     ------
     InputError
-        With the table's name and line: if it cannot be read, a column is missing, or a file, a label or a number is not
-        valid.
+        With the table's name and line: if it cannot be read, a column is missing, or a file or a label is not valid.
     """
     references: dict[Path, Recording] = {}
 
@@ -275,14 +274,14 @@ def read_labelled(
     labelled = []
     for where, line in _lines(folder / TABLE):
         path = _named(folder, line["file"], where, "file")
-        label, severity = _label(line["effect"], where), _severity(line.get("severity", ""), where)
+        label = _label(line["effect"], where)
         healthy = None
         if line.get("reference"):
             reference_path = _named(folder, line["reference"], where, "reference")
             if reference_path == path:
                 raise InputError("a recording is its own reference", where=where, remedy="name a healthy one, or none")
             healthy = references[reference_path] = references.get(reference_path) or read(reference_path)
-        labelled.append(LabelledRecording(read(path), label, healthy, severity))
+        labelled.append(LabelledRecording(read(path), label, healthy))
     return tuple(labelled)
 
 
@@ -291,7 +290,7 @@ def _lines(path: Path) -> list[tuple[str, Mapping[str, str]]]:
     try:
         text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
-        example = "a line of names, file,effect,reference,severity, and a line for each recording"
+        example = "a line of names, file,effect,reference, and a line for each recording"
         raise InputError(
             f"cannot be read ({error.strerror})", where=str(path), remedy=f"put {TABLE} there: {example}"
         ) from None
@@ -347,18 +346,6 @@ def _label(text: str, where: str) -> str:
             allowed="a name of `gearsig gap --list-effects`, healthy, or a name of your own of letters and digits",
         )
     return label
-
-
-def _severity(text: str, where: str) -> float | None:
-    if not text:
-        return None
-    try:
-        value = float(text)
-    except ValueError:
-        value = float("nan")
-    if not 0.0 <= value < float("inf"):
-        raise InputError(f"the severity is {text!r}", where=where, allowed="a number from 0, or nothing")
-    return value
 
 
 # --------------------

@@ -37,14 +37,11 @@ class LabelledRecording:
         Name of an effect, "none" (healthy), or a name of your own, which becomes a separate class.
     reference : Recording or None
         The same rig when healthy; None: the diagnosis's own reference at the same speed and torque, if any.
-    severity : float or None
-        In the effect's unit; kept for the report.
     """
 
     recording: Recording
     effect: str
     reference: Recording | None = None
-    severity: float | None = None
 
 
 # --------------------

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from gearsig.cache import read_arrays
 from gearsig.checks import FloatArray
-from gearsig.errors import InputError
+from gearsig.errors import InputError, RefusalError
 from gearsig.gap._evidence import TOOTH_FAULTS
 from gearsig.gap._report import shares_of
 from gearsig.motion import TransmissionError, transmission_error
@@ -337,7 +337,7 @@ def mean_log_likelihoods(evidence: Sequence[ToothErrorEvidence]) -> dict[str, fl
 
 
 def tooth_error_evidence(recording: Recording, reference: Recording) -> ToothErrorEvidence | None:
-    """Return the evidence from a change in transmission error; None where it was not measured, or did not change.
+    """Return the evidence from a change in transmission error; None where it was not measured.
 
     Parameters
     ----------
@@ -347,14 +347,20 @@ def tooth_error_evidence(recording: Recording, reference: Recording) -> ToothErr
     Raises
     ------
     InputError, RefusalError
-        If there are encoders, but the transmission error cannot be computed; see `transmission_error`.
+        If there are encoders, but the transmission error cannot be computed, see `transmission_error`, or did not
+        change by more than its noise.
     """
     if not (has_encoders(recording) and has_encoders(reference)):
         return None
     now, healthy = (transmission_error(measured, pair=_first_pair(measured)) for measured in (recording, reference))
-    changes = [change for change in tooth_error_changes(now, healthy) if change.is_clear]
+    largest = tooth_error_changes(now, healthy)
+    changes = [change for change in largest if change.is_clear]
     if not changes:
-        return None
+        noise_um = MIN_OVER_NOISE * max(change.noise_um for change in largest)
+        raise RefusalError(
+            f"the transmission error did not change by more than its noise, {noise_um:.2g} µm rms",
+            remedy="finer encoders, or a longer recording, show smaller changes",
+        )
     weight = 1.0 / (1.0 + now.mesh_hz / STATIC_MESH_HZ)
     per_gear = [load_known_tooth_errors().log_likelihoods(tooth_error_descriptors(change)) for change in changes]
     log_likelihoods = {

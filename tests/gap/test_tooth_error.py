@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gearsig.errors import RefusalError
 from gearsig.gap import TOOTH_FAULTS, KnownToothErrors, ToothErrorChange, tooth_error_descriptors, tooth_error_evidence
 from gearsig.recording import Recording
 from sims.cracked import CrackedPair
@@ -92,4 +93,5 @@ def test_encoders_name_a_crack_at_low_speed() -> None:
     assert said.gear == "driver"
     assert max(said.probabilities, key=said.probabilities.__getitem__) == "root_crack"
     assert said.probabilities["root_crack"] > 0.7
-    assert tooth_error_evidence(healthy.between(0.0, 2.5), healthy.between(2.5, 5.0)) is None
+    with pytest.raises(RefusalError, match="did not change"):
+        tooth_error_evidence(healthy.between(0.0, 2.5), healthy.between(2.5, 5.0))

@@ -143,9 +143,7 @@ def test_without_a_gap_nothing_is_asked_for_that_would_separate_causes() -> None
     report = no_gap_report()
     assert report.outcome is GapOutcome.NO_GAP
     assert report.references
-    assert (
-        report.verdict[3] == "Next: nothing is needed; keep these recordings as references for later ones."
-    )
+    assert report.verdict[3] == "Next: nothing is needed; keep these recordings as references for later ones."
 
 
 def test_a_gap_that_an_effect_explains_ends_within_the_floor() -> None:

@@ -277,7 +277,7 @@ WITHOUT_FLOORS = (
     "noise around it, or above the reference where that shows the line as well."
 )
 NOT_SIMULATED = (
-    "No simulator could be set to this rig: no effect was added, no severity was fitted, and there is no twin."
+    "No simulator could be set up for this rig: no effect was added, no severity was fitted, and there is no twin."
 )
 
 

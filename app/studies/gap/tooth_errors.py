@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from math import exp, floor, log
 from pathlib import Path
 from typing import Annotated, Any
@@ -33,7 +33,7 @@ from app.studies.gap.quasi_static import (
 )
 from gearsig.cache import write_whole
 from gearsig.checks import FloatArray
-from gearsig.errors import InputError, RefusalError
+from gearsig.errors import InputError, RefusalError, answer_or_none
 from gearsig.gap import (
     TOOTH_ERRORS_FILE,
     TOOTH_FAULTS,
@@ -381,7 +381,7 @@ def name_blindly(n_each: int) -> None:
         case = draw_case(rng, "development", kind="single", effect=fault, level=level, with_reference=True)
         recorded = record_case(case, encoder_counts=ENCODER_COUNTS)
         for now, reference in zip(recorded.conditions, recorded.references, strict=True):
-            evidence = tooth_error_evidence(now, reference)
+            evidence = answer_or_none(partial(tooth_error_evidence, now, reference), now.name, [])
             if evidence is None or evidence.is_unlike_any:
                 unlike += 1
                 continue
