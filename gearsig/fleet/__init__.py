@@ -4,7 +4,7 @@
 `fleet_changes` returns what is new since the last report, and `watch` adds new files as they appear.
 """
 
-from gearsig.fleet._add import FAILED, AddedRecording, AddResult, AnalysisOptions
+from gearsig.fleet._add import AddedRecording, AddResult, AnalysisOptions
 from gearsig.fleet._changes import (
     AlarmChange,
     FleetChanges,
@@ -42,25 +42,19 @@ from gearsig.fleet._statistics import (
 )
 from gearsig.fleet._trends import (
     CONDITIONS,
-    LEVEL_NAMES,
-    STATUS_LEVELS,
     AlarmEvent,
     Baseline,
     OperatingTrend,
     PointTrends,
     Trend,
     TrendSettings,
-    events_of,
 )
 from gearsig.fleet._watch import WatchEvent, watch
 
 __all__ = [
     "ALARM",
     "CONDITIONS",
-    "FAILED",
-    "LEVEL_NAMES",
     "OK",
-    "STATUS_LEVELS",
     "TABLES",
     "WARNING",
     "AddResult",
@@ -86,7 +80,6 @@ __all__ = [
     "counts_text",
     "cusum_threshold",
     "date_in_name",
-    "events_of",
     "excluded_text",
     "find_recordings",
     "fleet_changes",

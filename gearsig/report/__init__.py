@@ -24,7 +24,6 @@ from gearsig.report._files import (
     page_names,
     recording_mark,
     write_folder,
-    write_pdf,
 )
 from gearsig.report._fleet import write_fleet_page
 from gearsig.report._gap_page import (
@@ -197,6 +196,5 @@ __all__ = [
     "write_index",
     "write_json",
     "write_page",
-    "write_pdf",
     "zero_text",
 ]

@@ -18,7 +18,6 @@ from gearsig.severity._estimate import (
 )
 from gearsig.severity._features import (
     FEATURES,
-    LARGEST_MARK_SHIFT,
     LARGEST_SPEED_DIFFERENCE,
     RELIEF,
     RISING,
@@ -72,7 +71,6 @@ __all__ = [
     "FILE",
     "KINDS",
     "KIND_FEATURES",
-    "LARGEST_MARK_SHIFT",
     "LARGEST_SPEED_DIFFERENCE",
     "LARGEST_TORQUE_CHANGE",
     "MIN_SPREAD",

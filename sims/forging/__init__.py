@@ -25,7 +25,6 @@ from sims.forging._respond import (
 )
 from sims.forging._simulator import (
     NAME,
-    WITH_MEANING,
     ForgingManipulator,
     ForgingTwin,
     PreparedDrive,
@@ -38,7 +37,6 @@ __all__ = [
     "MODES",
     "NAME",
     "PARAMETERS",
-    "WITH_MEANING",
     "Bristle",
     "Cycle",
     "DriveResponse",

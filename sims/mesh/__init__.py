@@ -35,7 +35,6 @@ from sims.mesh._flank import (
     wear_profile,
 )
 from sims.mesh._friction import (
-    COEFFICIENTS,
     MAX_FRICTION,
     MeshFriction,
     contact_friction_n,
@@ -102,7 +101,6 @@ from sims.mesh._stiffness import (
 
 __all__ = [
     "BODIES",
-    "COEFFICIENTS",
     "CRACK_LAWS",
     "HEALTHY",
     "MAX_CYCLES",
