@@ -15,6 +15,7 @@ from contextvars import ContextVar
 from itertools import islice
 from multiprocessing import connection, parent_process
 from multiprocessing.context import SpawnContext, SpawnProcess
+from multiprocessing.util import Finalize
 from pathlib import Path
 from threading import Lock, Thread
 from typing import Any, TypeVar
@@ -148,6 +149,9 @@ def call_apart(
     with _CALLING:
         if _APART is None:
             _APART = ProcessPoolExecutor(1, mp_context=_Context(), initializer=_start_worker)
+            # A worker waits for its own processes before the executor's exit handler would end them. They end when they
+            # are told through its queues, which close with priority 10.
+            Finalize(None, _APART.shutdown, exitpriority=20)
         try:
             _APART.submit(_nothing).result()  # wait for the start: the time from here on is the function's
             longest_wait_s = 20.0 * longest_s if hasattr(signal, "setitimer") else longest_s

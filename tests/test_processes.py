@@ -34,6 +34,23 @@ def test_a_script_without_a_guard_runs_once(tmp_path: Path) -> None:
     assert done.stderr == ""
 
 
+APART_IN_A_WORKER = """
+from functools import partial
+from gearsig.processes import call_apart, process_pool
+
+with process_pool(1) as pool:
+    print(pool.submit(partial(call_apart, abs, -2, longest_s=30.0)).result())
+print("ended")
+"""
+
+
+def test_a_worker_that_called_a_function_apart_ends(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(APART_IN_A_WORKER)
+    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=True, timeout=120)
+    assert done.stdout.split() == ["2", "ended"]
+
+
 def test_what_cannot_be_pickled_cannot_be_sent() -> None:
     assert not can_be_sent(lambda: None)
     assert not can_be_sent(sys.stdout)
