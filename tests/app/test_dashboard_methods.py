@@ -175,7 +175,7 @@ def test_the_depth_of_a_crack_against_the_healthy_sample_at_the_torque_that_is_s
     assert len(page.error) == 1
     at_110 = page.error[0].value
     assert "tooth 21" in at_110
-    assert "Torque 110 N·m, of the rig" in shown_text(page)
+    assert "Torque 110 N·m, from the rig" in shown_text(page)
     interval = re.search(r"\*\*([\d.]+) to ([\d.]+) mm\*\*", shown_text(page))
     assert interval is not None
     low, high = (float(text) for text in interval.groups())

@@ -38,8 +38,8 @@ def test_the_path_is_shown_in_space_with_its_own_dimension():
 
 @pytest.mark.slow
 def test_a_run_up_is_warned_of():
-    assert "at a steady speed" in shown_text(opened_at("Phase plane", "run_up"))
-    assert "at a steady speed" not in shown_text(opened_at("Phase plane"))
+    assert "at steady speed" in shown_text(opened_at("Phase plane", "run_up"))
+    assert "at steady speed" not in shown_text(opened_at("Phase plane"))
 
 
 def test_the_lowest_frequency_lies_below_the_mesh():
