@@ -93,11 +93,11 @@ OF_THE_WAVEFORM = (
 )
 
 BY_THE_CRACK_ESTIMATE = (
-    "The crack estimate (`gearsig crack`) says about {name}: {text} {depth}It rests on the shape of one tooth's event, "
+    "The crack estimate says about {name}: {text} {depth}It rests on the shape of one tooth's event, "
     "the probability here on all features and on trials on the twin, so the two can differ."
 )
 NO_CRACK_ESTIMATE = (
-    "The crack estimate (`gearsig crack`) says nothing about a crack in {name}: {reason}. The probability here rests "
+    "The crack estimate says nothing about a crack in {name}: {reason}. The probability here rests "
     "on all features and on trials on the twin."
 )
 OF_THE_DEPTH = (
