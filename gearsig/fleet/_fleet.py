@@ -238,10 +238,11 @@ class Fleet:
         """Return a row per measuring point, the worst first.
 
         Columns: machine, point, n_recordings, n_failed, first, last, outcome and verdict of the last conclusive
-        recording (a fault remains until a recording shows that it is gone, which "cannot tell" does not), level (of
-        `STATUS_LEVELS`: the worse of diagnosis and trends, "unknown" without either), n_alarms, n_warnings, since,
-        worst (indicator), worst_place (its gear, bearing or shaft), change (its deviation from the expected value, in
-        dB if change_in_db), changed (since when the level of some indicator has changed).
+        recording (a fault remains until a recording shows that it is gone, which "cannot tell" does not), level
+        ("alarm", "warning", "unknown" or "ok": the worse of diagnosis and trends, "unknown" without either), n_alarms,
+        n_warnings, since, worst (indicator), worst_place (its gear, bearing or shaft), change (its deviation from the
+        expected value, in dB if change_in_db), changed (since when the level of some indicator has changed), n_baseline
+        (recordings in the longest baseline).
         """
         self._refreshed()
         sql = f"""

@@ -209,7 +209,7 @@ def without_clock(
                 allowed="the waveform, sample by sample",
                 remedy="export the time waveform; if column 1 is the time, say so in a header: time [s]",
             )
-        note = f"{first.name!r} has no name of its own, increases uniformly and was taken as the time in seconds"
+        note = f"{first.name!r} increases uniformly and was taken as the time in seconds"
         return columns[1:], RawColumn("time", first.values, "s"), [note]
     return columns, None, []
 

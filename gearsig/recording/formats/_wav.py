@@ -120,7 +120,7 @@ _SCALES = {"uint8": (128.0, 128.0), "int16": (0.0, 2.0**15), "int32": (0.0, 2.0*
 def read_wav(path: Path, part: slice | None = None) -> RawTable:
     """Return the channels of a WAV file, scaled to ±1 full scale.
 
-    Integers of 8 to 32 bit are divided by their full scale, floats are kept. Channels are named "ch1", "ch2", … with
+    Integers of 8 to 64 bit are divided by their full scale, floats are kept. Channels are named "ch1", "ch2", … with
     the unit "FS" (full scale), unless a LEA chunk states names, scales and units; otherwise a rig's sensors give
     scales.
 
@@ -185,7 +185,9 @@ def _to_full_scale(values: NumberArray) -> NumberArray:
     if values.dtype.kind == "f":
         return values
     if values.dtype.name not in _SCALES:
-        raise InputError(f"coding {values.dtype} is not known", allowed="8, 16, 24, 32 bit integer, 32, 64 bit float")
+        raise InputError(
+            f"coding {values.dtype} is not known", allowed="8, 16, 24, 32, 64 bit integer, 32, 64 bit float"
+        )
     zero, full = _SCALES[values.dtype.name]
     narrow = values.dtype.itemsize <= 2 or (values.dtype == np.int32 and not np.any(values & 0xFF))
     scaled: NumberArray = values.astype(np.float32 if narrow else np.float64)
