@@ -351,7 +351,7 @@ def show_gears(healthy: LaboratoryRun, faulty: LaboratoryRun | None, channel: st
             "colours": {"measured": colours.measured, "fault": colours.fault},
         },
     )
-    st.caption("Slowed down a few hundred times. The line with a dot is the mesh force; the coloured tooth is the faulty one.")
+    st.caption("A few hundred times slower. The line with a dot is the mesh force; the coloured tooth is faulty.")
     largest = max(float(np.abs(run.recording.values(channel)).max()) for run in both) or 1.0
     for column, run, name in zip(st.columns(2), both, ("Healthy", "Faulty"), strict=False):
         with column:
