@@ -696,23 +696,20 @@ def steps_of(
         Effect → its trial, None where it cannot be tried; called if `beside` was not tried.
     """
     folds = folds_of(conditions)
-    steps = [GapStep("before", _remaining_gap(conditions, folds, []))]
-    added: list[TriedEffect] = []
-
-    def add(cause: GapCause, effect: TriedEffect | None) -> None:
-        if effect is None:
-            return
-        remaining = _remaining_gap(conditions, folds, [*added, effect])
-        if not added or remaining.value <= (1.0 - MIN_CLOSED) * steps[-1].remaining.value:
-            added.append(effect)
-            steps.append(GapStep(cause.title, remaining))
-
+    before = GapStep("before", _remaining_gap(conditions, folds, []))
     first = next((cause for cause in causes if cause.name in tried), None)
-    if first is not None:
-        add(first, tried[first.name])
-    if beside is not None and added and steps[-1].remaining.value > MUCH_LEFT:
-        add(beside, tried.get(beside.name) or try_further(beside.name))
-    return tuple(steps)
+    if first is None:
+        return (before,)
+    effect = tried[first.name]
+    alone = GapStep(first.title, _remaining_gap(conditions, folds, [effect]))
+    further = None
+    if beside is not None and alone.remaining.value > MUCH_LEFT:
+        further = tried.get(beside.name) or try_further(beside.name)
+    if beside is None or further is None:
+        return before, alone
+    both = GapStep(beside.title, _remaining_gap(conditions, folds, [effect, further]))
+    closes = both.remaining.value <= (1.0 - MIN_CLOSED) * alone.remaining.value
+    return (before, alone, both) if closes else (before, alone)
 
 
 def _remaining_gap(conditions: Sequence[Condition], folds: Sequence[Fold], added: Sequence[TriedEffect]) -> Interval:
@@ -772,16 +769,15 @@ def place_of(added: AddedEffect, frame: GearFrame, places: Sequence[GapPlace]) -
         return ""
     shaft = frame.shafts[SIDES.index(str(side))]
     words = shaft_text(frame, SIDES.index(str(side)))
-    mate = " or its mate" if frame.teeth[0] == frame.teeth[1] else ""  # the same teeth mesh at every revolution
-    if "tooth" not in options:
-        return f"the gear on {words}{mate}" if "gear" in options else words
-    tooth_place = _tooth_place(shaft, places)
+    if "tooth" not in options and "gear" not in options:
+        return words
+    if frame.teeth[0] == frame.teeth[1]:  # the same teeth mesh at every revolution
+        words += " or its mate"
+    tooth_place = _tooth_place(shaft, places) if "tooth" in options else None
     if tooth_place is None or (tooth_place.tooth is None and tooth_place.angle_deg is None):
-        return f"one tooth of the gear on {words}{mate}"
+        return f"{'one tooth of ' if 'tooth' in options else ''}the gear on {words}"
     tooth = f"tooth {tooth_place.tooth} of the gear on"
-    return (
-        f"{tooth} {words}{mate}" if tooth_place.tooth is not None else f"{tooth_place.angle_deg:.0f}° of {words}{mate}"
-    )
+    return f"{tooth} {words}" if tooth_place.tooth is not None else f"{tooth_place.angle_deg:.0f}° of {words}"
 
 
 def _bearings(name: str, fitted: str, frame: GearFrame, places: Sequence[GapPlace]) -> list[str]:

@@ -169,18 +169,19 @@ def _units_of(path: Path, datasets: list[tuple[str, Any]]) -> dict[str, str]:
     """
     import h5py
 
-    held: dict[str, tuple[str, str]] = {}
+    held: dict[str, tuple[Any, str]] = {}
     kinds = set()
     for place, dataset in datasets:
         for name in UNIT_ATTRIBUTES:
             if name in dataset.attrs and (kind := h5py.check_string_dtype(dataset.attrs.get_id(name).dtype)):
-                held[place] = dataset.name, name
+                held[place] = dataset, name
                 kinds.add(kind.length)
                 break
     if None not in kinds:
-        return _texts_of(path, held)
+        return _texts_of(held)
+    names = {place: (dataset.name, name) for place, (dataset, name) in held.items()}
     try:
-        return call_apart(_texts_of, path, held, longest_s=2.0, most_bytes=FREE_BYTES)
+        return call_apart(_texts_in, path, names, longest_s=2.0, most_bytes=FREE_BYTES)
     except (BrokenProcessPool, MemoryError):
         raise InputError(
             "is damaged: the units of its datasets cannot be read",
@@ -190,11 +191,16 @@ def _units_of(path: Path, datasets: list[tuple[str, Any]]) -> dict[str, str]:
         ) from None
 
 
-def _texts_of(path: Path, held: dict[str, tuple[str, str]]) -> dict[str, str]:
+def _texts_in(path: Path, names: dict[str, tuple[str, str]]) -> dict[str, str]:
     import h5py
 
     with h5py.File(path, "r", locking=False) as file:
-        values = {place: file[dataset].attrs[name] for place, (dataset, name) in held.items()}
+        return _texts_of({place: (file[dataset], name) for place, (dataset, name) in names.items()})
+
+
+def _texts_of(held: dict[str, tuple[Any, str]]) -> dict[str, str]:
+    """Return the texts of datasets' attributes."""
+    values = {place: dataset.attrs[name] for place, (dataset, name) in held.items()}
     return {k: v.decode("utf-8", errors="replace") if isinstance(v, bytes) else str(v) for k, v in values.items()}
 
 
