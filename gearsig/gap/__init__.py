@@ -72,7 +72,6 @@ from gearsig.gap._curves import (
 from gearsig.gap._diagnose import diagnose_gap, effects_without_setting
 from gearsig.gap._evidence import (
     SIGNS,
-    TOOTH_FAULTS,
     determined_options,
     evidence_of,
     evidence_of_feature,
@@ -183,13 +182,6 @@ from gearsig.gap._simulator import (
     point_text,
     same_condition,
 )
-from gearsig.gap._tooth_error import (
-    TOOTH_ERRORS_FILE,
-    KnownToothErrors,
-    ToothErrorChange,
-    tooth_error_descriptors,
-    tooth_error_evidence,
-)
 from gearsig.gap._trials import (
     PROCESSES,
     Bank,
@@ -229,8 +221,6 @@ __all__ = [
     "SIDEBAND_OFFSETS",
     "SIDES",
     "SIGNS",
-    "TOOTH_ERRORS_FILE",
-    "TOOTH_FAULTS",
     "UNKNOWN",
     "AddedEffect",
     "AngleCurves",
@@ -265,7 +255,6 @@ __all__ = [
     "HasFurtherPlaces",
     "HealthyReference",
     "Interval",
-    "KnownToothErrors",
     "LabelSpace",
     "LabelledFacts",
     "LabelledRecording",
@@ -287,7 +276,6 @@ __all__ = [
     "SpeedFigures",
     "StructuralFloor",
     "Task",
-    "ToothErrorChange",
     "TriedEffect",
     "Twin",
     "TwinRun",
@@ -380,8 +368,6 @@ __all__ = [
     "textbook_strengths",
     "too_small_to_judge_text",
     "tooth_count_mismatch_text",
-    "tooth_error_descriptors",
-    "tooth_error_evidence",
     "tooth_load_n_per_mm",
     "try_effects",
     "twin_rig",

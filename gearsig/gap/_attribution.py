@@ -19,7 +19,6 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 
 from gearsig.gap._conditions import LIGHT_LOAD_N_PER_MM, Condition
-from gearsig.gap._evidence import TOOTH_FAULTS
 from gearsig.gap._floors import kinds_of
 from gearsig.gap._labelled import LabelledChange, LabelledEvidence, labelled_evidence, with_labelled
 from gearsig.gap._places import SAME_ORDER
@@ -41,6 +40,7 @@ from gearsig.gap._report import (
 )
 from gearsig.gap._simulator import GapEffect, Twin
 from gearsig.gap._trials import TriedEffect, try_effects
+from gearsig.severity import OTHER, TOOTH_FAULTS
 
 CALIBRATION_FILE = Path(__file__).with_name("calibration.json")
 
@@ -254,7 +254,7 @@ class Attribution(Generic[TriedT]):
     labelled : LabelledEvidence or None
         Evidence from labelled recordings of the rig.
     tooth_error_log_likelihoods : mapping
-        Tooth fault → log-likelihood of the change in transmission error; empty without encoders.
+        Tooth fault or `OTHER` → log-likelihood of the change in transmission error; empty without encoders.
     """
 
     uncalibrated: Mapping[str, float]
@@ -297,7 +297,8 @@ def with_likelihoods(probabilities: Mapping[str, float], matches: Mapping[str, f
     """Return the probabilities with those of tooth faults redistributed by likelihood, most probable first.
 
     p_i ∝ p_i L_i among those that have a likelihood; their sum is kept. The waveform distinguishes how a tooth is
-    damaged; that a tooth is damaged follows from the features.
+    damaged; that a tooth is damaged follows from the features. The transmission error shows that as well: `OTHER` gives
+    the likelihood of all causes without one of their own, and the sum changes.
 
     Parameters
     ----------
@@ -306,11 +307,13 @@ def with_likelihoods(probabilities: Mapping[str, float], matches: Mapping[str, f
     matches : mapping
         Effect → ln L.
     """
-    if len(matches) < 2:
+    others = dict.fromkeys(probabilities, matches[OTHER]) if OTHER in matches else {}
+    counted = {name: value for name, value in {**others, **matches}.items() if name in probabilities}
+    if len(counted) < 2:
         return dict(probabilities)
-    together = sum(probabilities[name] for name in matches)
-    top = max(matches.values())
-    weights = {name: probabilities[name] * exp(value - top) for name, value in matches.items()}
+    together = sum(probabilities[name] for name in counted)
+    top = max(counted.values())
+    weights = {name: probabilities[name] * exp(value - top) for name, value in counted.items()}
     total = sum(weights.values())
     parted = {name: together * weight / total for name, weight in weights.items()} if total > 0.0 else {}
     return likeliest_first({**probabilities, **parted})
@@ -368,7 +371,7 @@ def attribute(
     labelled : sequence of LabelledChange
         Changes in labelled recordings of the same rig.
     tooth_error_log_likelihoods : mapping
-        Tooth fault → ln L of the change in transmission error; empty without encoders.
+        Tooth fault or `OTHER` → ln L of the change in transmission error; empty without encoders.
 
     Returns
     -------
@@ -385,7 +388,7 @@ def attribute(
     size = max(condition.size.structural.value for condition in conditions)
     calibration = load_gap_calibration(with_reference=with_reference)
     evidence = labelled_evidence(conditions, labelled) if labelled else None
-    log_likelihoods = {name: value for name, value in tooth_error_log_likelihoods.items() if name in forest}
+    log_likelihoods = {n: value for n, value in tooth_error_log_likelihoods.items() if n in forest or n == OTHER}
     attribution = Attribution[TriedEffect](
         forest, {}, calibration, size, len(conditions), labelled=evidence, tooth_error_log_likelihoods=log_likelihoods
     )

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.cache import read_arrays, write_whole
+from gearsig.cache import read_arrays, write_arrays
 from gearsig.checks import FloatArray, closest_match_hint
 from gearsig.errors import InputError
 from gearsig.gap._change import change_relative_to_mesh, contrast_rows, counted_from_the_mesh
@@ -489,7 +489,7 @@ def write_learned(learned: Learned, path: Path) -> None:
         if classifier.linear is not None:
             arrays_of_classifier |= {key: getattr(classifier.linear, key).astype(np.float16) for key in _LINEAR}
         arrays |= {f"{way}/{key}": array for key, array in arrays_of_classifier.items()}
-    write_whole(path, lambda file: np.savez_compressed(file, allow_pickle=False, **arrays))
+    write_arrays(path, arrays)
 
 
 def read_learned(path: Path) -> Learned | None:

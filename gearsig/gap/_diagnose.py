@@ -24,7 +24,7 @@ from gearsig.gap._attribution import (
 )
 from gearsig.gap._conditions import Condition, Stage, conditions_of, simulated, warnings_of
 from gearsig.gap._curves import angle_curves, average_curves, spectrum_curves
-from gearsig.gap._evidence import CRACK, evidence_of
+from gearsig.gap._evidence import evidence_of
 from gearsig.gap._gearless import diagnose_gearless, place_of_unexpected, unexpected_findings, with_unexpected
 from gearsig.gap._inputs import is_gearless, twin_rig, with_stage
 from gearsig.gap._labelled import LabelledRecording, labelled_changes
@@ -52,7 +52,6 @@ from gearsig.gap._report import (
     unbounded_fits,
 )
 from gearsig.gap._simulator import CanRunUp, DriveSimulator, GapEffect, GapSimulator, Twin, as_tried
-from gearsig.gap._tooth_error import ToothErrorEvidence, has_encoders, mean_log_likelihoods, tooth_error_evidence
 from gearsig.gap._trials import (
     PROCESSES,
     TriedEffect,
@@ -69,7 +68,17 @@ from gearsig.prepared import PreparedRecording
 from gearsig.processes import one_pool, start_early
 from gearsig.recording import Recording, check_recording, metres_per_second_squared
 from gearsig.rig import Rig
-from gearsig.severity import TEETH_COUNT, CrackEstimate, NoCrackSeen, estimate_crack
+from gearsig.severity import (
+    CRACK,
+    TEETH_COUNT,
+    CrackEstimate,
+    NoCrackSeen,
+    ToothErrorEvidence,
+    estimate_crack,
+    has_encoders,
+    mean_log_likelihoods,
+    tooth_error_evidence,
+)
 
 USER_EFFECT_MESSAGE = (
     "Recognition was not trained on “{title}”: it was simulated, fitted and scored on held-out data like the likeliest "
@@ -515,11 +524,20 @@ def _encoder_messages(evidences: Sequence[ToothErrorEvidence], known: Mapping[st
     if all(evidence.is_unlike_any for evidence in evidences):
         slower = "At a few revolutions per second or less its profile distinguishes crack, spall and chip."
         return [f"{changed}, which at this speed does not distinguish faults: the drive oscillates too. {slower}"]
-    levels = ToothErrorEvidence(mean_log_likelihoods(evidences), clearest.rms_um, clearest.gear).probabilities
-    shown = {known[name].title: p for name, p in levels.items() if p >= 0.05 and name in known}
+    together = ToothErrorEvidence(mean_log_likelihoods(evidences), clearest.rms_um, clearest.gear)
+    shown = {known[name].title: p for name, p in together.probabilities.items() if p >= 0.05 and name in known}
     likely = ", ".join(f"{title} {odds_text(p)}" for title, p in shown.items())
     where = {"driver": ", on the driver", "driven": ", on the driven gear"}.get(clearest.gear, "")
-    return [f"{changed}{where}; by its profile alone, with all tooth faults equally likely before: {likely}."]
+    return [f"{changed}{where}. {_odds_text(together.odds_of_a_tooth)}; among tooth faults, equally likely: {likely}."]
+
+
+def _odds_text(odds: float) -> str:
+    """Return how much likelier a profile is with a damaged tooth than with any other change, or less likely."""
+    if 1.0 / 1.5 < odds < 1.5:
+        return "Such a profile is as likely with a damaged tooth as with wear, run-out or another load"
+    first, second = "with a damaged tooth", "with wear, run-out or another load"
+    first, second = (first, second) if odds > 1.0 else (second, first)
+    return f"Such a profile is {max(odds, 1.0 / odds):.0f} times as likely {first} as {second}"
 
 
 def _fit_messages(named: GapCause | None, tried: Mapping[str, TriedEffect], crack: CrackAnswer) -> list[str]:

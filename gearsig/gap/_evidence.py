@@ -12,6 +12,7 @@ from gearsig.gap._prediction import Fit, ObservedChange
 from gearsig.gap._reduction import GearFrame, shaft_text
 from gearsig.gap._report import Evidence
 from gearsig.rig import SIDES
+from gearsig.severity import SINGLE_TOOTH_FAULTS
 
 MAX_SHOWN, MAX_OF_A_FAMILY = 10, 3
 CLEAR = 1.0
@@ -95,14 +96,6 @@ def evidence_of_feature(
 # of each cause there are compared between the shafts. No simulation is needed, so this serves any way of naming causes.
 # --------------------
 
-
-CRACK = "root_crack"
-SINGLE_TOOTH_FAULTS = (CRACK, "tooth_spall", "chipped_tooth")
-"""Causes on a single tooth."""
-
-TOOTH_FAULTS = (*SINGLE_TOOTH_FAULTS, "pitch_error")
-"""Causes that each change one engagement with a characteristic profile, which waveforms and encoders distinguish. A
-pitch error may affect one tooth or all."""
 
 _BURST = ("change.{}.peak", "change.{}.prominence", "tooth.{}.peak", "tooth.{}.prominence", "tooth.{}.kurtosis")
 _ALL_ROUND = ("change.{}.level", "change.{}.elsewhere", "tooth.{}.level", "tooth.{}.elsewhere", "shaft.{}.low")

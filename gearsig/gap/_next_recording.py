@@ -8,7 +8,6 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 from gearsig.gap._conditions import Condition
-from gearsig.gap._evidence import TOOTH_FAULTS
 from gearsig.gap._floors import family_members
 from gearsig.gap._report import (
     NEXT_STEPS,
@@ -23,6 +22,7 @@ from gearsig.gap._report import (
 )
 from gearsig.gap._simulator import HasFurtherPlaces, OperatingCondition, Twin, point_text, same_condition
 from gearsig.gap._trials import PROCESSES, Reduced, Task, TriedEffect, TwinRun, finished_runs, n_compared, rounded
+from gearsig.severity import TOOTH_FAULTS
 
 FACTORS = ((1.0, 0.3), (1.0, 0.6), (0.6, 1.0), (1.4, 1.0))
 """Speeds and torques evaluated in addition to the recordings' own, relative to those of the first recording."""

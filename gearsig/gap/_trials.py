@@ -18,7 +18,7 @@ from gearsig.checks import FloatArray, positive
 from gearsig.errors import GearsigError, RefusalError
 from gearsig.gap._change import change_feature_values
 from gearsig.gap._conditions import SEED, Condition, observed, trial_length_s
-from gearsig.gap._evidence import SIGNS, SINGLE_TOOTH_FAULTS, TOOTH_FAULTS, determined_options
+from gearsig.gap._evidence import SIGNS, determined_options
 from gearsig.gap._features import feature_values, whole_and_parts
 from gearsig.gap._floors import UNPREDICTED, gap_size, shown_in
 from gearsig.gap._places import RACES, SAME_ORDER
@@ -51,6 +51,7 @@ from gearsig.gap._waveform import (
 )
 from gearsig.processes import active_cluster, can_be_sent, killed_text, run_jobs, start_early
 from gearsig.rig import SIDES
+from gearsig.severity import SINGLE_TOOTH_FAULTS, TOOTH_FAULTS
 
 # --------------------
 # The simulations of a bank, in separate processes or in this one.

@@ -143,10 +143,19 @@ class DepthModel:
         higher = len(self.healthy_scores) - int(np.searchsorted(self.healthy_scores, score, side="left"))
         return (1.0 + higher) / (1.0 + len(self.healthy_scores))
 
+    def is_weaker(self, features: FloatArray) -> bool:
+        """Return whether an event is weaker, over the mesh, than those of the shallowest cracks in the calibration."""
+        sizes = [FEATURES.index(name) for name in ("band_excess", "line_excess")]
+        return bool(np.any(self._beyond(features)[0][sizes] > 0))
+
+    def _beyond(self, features: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return how far each feature lies below and above the calibration's range and a margin; negative inside."""
+        margin = 0.05 * (self.highest - self.lowest)
+        return self.lowest - margin - features, features - self.highest - margin
+
     def unlike(self, features: FloatArray) -> str:
         """Return how a feature vector is unlike the calibration's cracks; empty if it is not."""
-        margin = 0.05 * (self.highest - self.lowest)
-        beyond = np.maximum(self.lowest - margin - features, features - self.highest - margin)
+        beyond = np.maximum(*self._beyond(features))
         beyond[np.diag(self.precision) == 0] = 0.0  # an event may be clearer than any in the calibration
         i = int(np.argmax(beyond))
         if beyond[i] > 0:

@@ -12,9 +12,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache, partial
-from math import exp, floor, log
+from math import exp, floor, log, nan, pi
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import typer
@@ -31,14 +31,17 @@ from app.studies.gap.quasi_static import (
     meeting,
     static_contact,
 )
-from gearsig.cache import write_whole
+from gearsig.cache import write_arrays
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError, RefusalError, answer_or_none
-from gearsig.gap import (
+from gearsig.severity import (
+    OTHER,
     TOOTH_ERRORS_FILE,
     TOOTH_FAULTS,
     KnownToothErrors,
     ToothErrorChange,
+    event_rms_um,
+    percent_per_mm,
     tooth_error_descriptors,
     tooth_error_evidence,
 )
@@ -77,9 +80,22 @@ MIN_LOAD_N_PER_MM = 15.0
 """Minimum load of quasi-static machines; below it, teeth hardly deflect."""
 NOISE, TORSION = (0.002, 0.05), (0.002, 0.08)
 """Relative to the peak-to-peak change: noise of the resolution, and drift by torsion of the drive over many pitches."""
+OTHER_NOISE = 0.3
+"""The same upper limit where no tooth is damaged: there noise may be most of the change."""
+WEAR_UM, RUN_OUT_UM, LOAD_CHANGE = (1.0, 20.0), (2.0, 40.0), 0.2
+"""Other changes: wear of all teeth, run-out, and the natural logarithm of the ratio of both loads."""
 FAULTY_TOOTH = 5
 
-Drawn = Callable[[str, np.random.Generator], ToothErrorChange]
+
+class DrawnChange(NamedTuple):
+    """A change of transmission error; the load, and a crack's depth in percent of the root, where they are known."""
+
+    change: ToothErrorChange
+    load_n_per_mm: float = nan
+    depth_percent: float = nan
+
+
+Drawn = Callable[[str, np.random.Generator], DrawnChange]
 
 
 # --------------------
@@ -87,7 +103,7 @@ Drawn = Callable[[str, np.random.Generator], ToothErrorChange]
 # --------------------
 
 
-def shared_load(fault: str, rng: np.random.Generator) -> ToothErrorChange:
+def shared_load(fault: str, rng: np.random.Generator) -> DrawnChange:
     """Return the change by a fault if rack-shaped teeth share the load.
 
     Raises
@@ -102,16 +118,17 @@ def shared_load(fault: str, rng: np.random.Generator) -> ToothErrorChange:
     driver, driven = (GearGeometry(z, module, face_width_mm=width) for z in teeth)
     healthy, load = _loaded(PairGeometry(driver, driven), rng)
     side = int(rng.integers(2))
-    faulty = replace(healthy, **_fault(fault, healthy, side, rng))
+    healthy, faulty, load_now = _states(fault, healthy, side, load, rng)
 
-    def error_um(mesh: GearMesh) -> FloatArray:
+    def error_um(mesh: GearMesh, load: float) -> FloatArray:
         table, cycles = table_with_corners(mesh), _cycles(teeth[side]) + CORNERS
         return 1e6 * share_torque(mesh, _torque_nm(mesh, load), cycles, table=table).transmission_error_m
 
-    return _change(side, error_um(faulty), error_um(healthy), rng)
+    change = _change(fault, side, error_um(faulty, load_now), error_um(healthy, load), rng)
+    return DrawnChange(change, load, _depth_percent(faulty, side))
 
 
-def finite_elements(fault: str, rng: np.random.Generator) -> ToothErrorChange:
+def finite_elements(fault: str, rng: np.random.Generator) -> DrawnChange:
     """Return the change by a fault if finite-element gears share the load, with independent slices of the face.
 
     A crack adds the compliance of the finite elements. At spalls and chips, slices are recessed; the neighbouring ones
@@ -128,18 +145,17 @@ def finite_elements(fault: str, rng: np.random.Generator) -> ToothErrorChange:
     driver, driven = (gear.blank.geometry for gear in gears)
     healthy, load = _loaded(PairGeometry(driver, driven), rng)
     side = int(rng.integers(2))
-    fields = _fault(fault, healthy, side, rng)
+    healthy, faulty, load_now = _states(fault, healthy, side, load, rng)
     in_slice = np.ones(len(gears[0].grid.z_m), dtype=bool)
     for name in (f"spalls_{side + 1}", f"chips_{side + 1}"):
-        if name in fields:
-            (damage,) = fields[name]
+        for damage in getattr(faulty, name):
             n_lost = max(1, round(len(in_slice) * (damage.width_mm or 0.0) / driver.face_width_mm))
             first = int(rng.integers(len(in_slice) - n_lost + 1)) if name.startswith("spalls") else 0
             in_slice = np.isin(np.arange(len(in_slice)), np.arange(first, first + n_lost))
-            fields = {name: (replace(damage, width_mm=driver.face_width_mm),)}
-    faulty = replace(healthy, **fields)
+            whole: dict[str, Any] = {name: (replace(damage, width_mm=driver.face_width_mm),)}
+            faulty = replace(faulty, **whole)
 
-    def error_um(mesh: GearMesh) -> FloatArray:
+    def error_um(mesh: GearMesh, load: float) -> FloatArray:
         # Only a crack changes the compliance of the elements.
         cracked = replace(mesh.healthy, cracks_1=mesh.cracks_1, cracks_2=mesh.cracks_2)
         table = static_table(gears, cracked)
@@ -153,7 +169,8 @@ def finite_elements(fault: str, rng: np.random.Generator) -> ToothErrorChange:
         torque, cycles = np.array([_torque_nm(mesh, load)]), _cycles(mesh.side(side + 1).gear.teeth)
         return 1e6 * mesh_maps(gears, mesh, torque, cycles, table=table).transmission_error_m[:, 0]
 
-    return _change(side, error_um(faulty), error_um(healthy), rng)
+    change = _change(fault, side, error_um(faulty, load_now), error_um(healthy, load), rng)
+    return DrawnChange(change, load, _depth_percent(faulty, side))
 
 
 ELEMENT_TEETH = (19, 22, 26, 31, 37, 44, 52, 62, 74)
@@ -177,6 +194,26 @@ def _loaded(pair: PairGeometry, rng: np.random.Generator) -> tuple[GearMesh, flo
 
 def _torque_nm(mesh: GearMesh, load_n_per_mm: float) -> float:
     return load_n_per_mm * mesh.pair.face_width_mm * mesh.pair.driver.base_radius_mm * 1e-3
+
+
+def _states(
+    fault: str, mesh: GearMesh, side: int, load_n_per_mm: float, rng: np.random.Generator
+) -> tuple[GearMesh, GearMesh, float]:
+    """Return the mesh before and after, and the load after, in N/mm.
+
+    Only a fault of a tooth comes alone. Any other change is one of teeth with tolerances, which another load, wear and
+    run-out show in another way.
+    """
+    if fault != OTHER:
+        return mesh, replace(mesh, **_fault(fault, mesh, side, rng)), load_n_per_mm
+    name, flank, teeth = f"flank_{side + 1}", mesh.side(side + 1).flank, mesh.side(side + 1).gear.teeth
+    pitch = rng.uniform(0.5, 8.0) * cumulative_pitch(teeth, rng)
+    wear, run_out = (log_uniform(rng, *span) * (rng.uniform() < 0.5) for span in (WEAR_UM, RUN_OUT_UM))
+    turned = pitch + run_out * np.cos(2.0 * pi * (np.arange(teeth) / teeth + rng.uniform()))
+    before: dict[str, Any] = {name: replace(flank, pitch_um=tuple(pitch.tolist()))}
+    after: dict[str, Any] = {name: replace(flank, pitch_um=tuple(turned.tolist()), wear_um=wear)}
+    load_now = load_n_per_mm * exp(rng.uniform(-LOAD_CHANGE, LOAD_CHANGE))
+    return replace(mesh, **before), replace(mesh, **after), load_now
 
 
 def _fault(name: str, mesh: GearMesh, side: int, rng: np.random.Generator) -> dict[str, Any]:
@@ -269,7 +306,7 @@ def _row_of_teeth(mesh: GearMesh, number: int) -> NDArray[np.int64]:
 # --------------------
 
 
-def quasi_static(fault: str, rng: np.random.Generator) -> ToothErrorChange:
+def quasi_static(fault: str, rng: np.random.Generator) -> DrawnChange:
     """Return the change by a fault on a random quasi-static machine whose other gear has identical teeth.
 
     Raises
@@ -281,7 +318,13 @@ def quasi_static(fault: str, rng: np.random.Generator) -> ToothErrorChange:
     if machine.load_n < MIN_LOAD_N_PER_MM * machine.nominal.face_width_mm:
         raise InputError("the teeth carry almost no load")
     healthy, faulty = machine.healthy(), machine.healthy()
-    EFFECTS[fault](machine, faulty, rng)
+    load_now = machine.load_n
+    if fault != OTHER:
+        EFFECTS[fault](machine, faulty, rng)
+    else:
+        load_now *= exp(rng.uniform(-LOAD_CHANGE, LOAD_CHANGE))
+        if rng.uniform() < 0.5:
+            EFFECTS["tooth_wear"](machine, faulty, rng)
     moved = [
         float(np.abs(faulty.gaps_m[s] - healthy.gaps_m[s]).sum() + np.abs(faulty.weak[s] - healthy.weak[s]).sum())
         for s in (0, 1)
@@ -291,23 +334,25 @@ def quasi_static(fault: str, rng: np.random.Generator) -> ToothErrorChange:
     reached = is_in_reach(cycles, path)
     pair_stiffness = at_places(cycles, path, machine.stiffness_n_per_m)
 
-    def error_um(state: QuasiStaticState) -> FloatArray:
+    def error_um(state: QuasiStaticState, load_n: float) -> FloatArray:
         def met(tables: Sequence[FloatArray]) -> FloatArray:
             only = tuple(table if s == side else np.zeros_like(table) for s, table in enumerate(tables))
             return meeting(cycles, path, only, (0, 0))  # type: ignore[arg-type]  # two of them
 
         stiffness = np.where(reached, pair_stiffness / (1.0 + met(state.weak)), 1e-3)
         gaps = np.where(reached, met(state.gaps_m), OUT_OF_REACH_M)
-        return 1e6 * static_contact(stiffness, gaps, np.full(len(cycles), machine.load_n))[0]
+        return 1e6 * static_contact(stiffness, gaps, np.full(len(cycles), load_n))[0]
 
-    return _change(side, error_um(faulty), error_um(healthy), rng)
+    return DrawnChange(_change(fault, side, error_um(faulty, load_now), error_um(healthy, machine.load_n), rng))
 
 
 def _cycles(teeth: int) -> FloatArray:
     return (np.arange(teeth * STEPS) + 0.5) / STEPS
 
 
-def _change(side: int, faulty_um: FloatArray, healthy_um: FloatArray, rng: np.random.Generator) -> ToothErrorChange:
+def _change(
+    fault: str, side: int, faulty_um: FloatArray, healthy_um: FloatArray, rng: np.random.Generator
+) -> ToothErrorChange:
     """Return the change as measured by encoders: starting at a random angle, with noise."""
     change, start = faulty_um - healthy_um, int(rng.integers(STEPS))
     size = float(np.ptp(change))
@@ -316,11 +361,21 @@ def _change(side: int, faulty_um: FloatArray, healthy_um: FloatArray, rng: np.ra
     white = rng.standard_normal((2, len(change)))
     lines = np.fft.rfft(white[1])
     slow = np.fft.irfft(lines / np.maximum(np.arange(len(lines)) * STEPS / len(change), 0.05), len(change))
-    noise, torsion = (exp(rng.uniform(log(low), log(high))) for low, high in (NOISE, TORSION))
+    most_noise = OTHER_NOISE if fault == OTHER else NOISE[1]
+    noise, torsion = log_uniform(rng, NOISE[0], most_noise), log_uniform(rng, *TORSION)
     change = change + size * (noise * white[0] + torsion * slow / slow.std())
-    mesh = healthy_um.reshape(-1, STEPS).mean(axis=0)
-    return ToothErrorChange(side, np.roll(change, start).reshape(-1, STEPS), np.roll(mesh, start), size, 0.0)
+    pattern, mesh = np.roll(change, start).reshape(-1, STEPS), healthy_um.reshape(-1, STEPS).mean(axis=0)
+    return ToothErrorChange(side, pattern, np.roll(mesh, start), event_rms_um(pattern), 0.0)
 
+
+def _depth_percent(mesh: GearMesh, side: int) -> float:
+    """Return the depth of the gear's crack in percent of the root; nan without one."""
+    cracks, gear = (mesh.cracks_1, mesh.cracks_2)[side], mesh.side(side + 1).gear
+    return cracks[0].depth_mm * percent_per_mm(gear.teeth, gear.module_mm) if cracks else nan
+
+
+TYPICAL_CRACK = (-5.4, 1.0 / 40.0)
+"""ln(change in µm per N/mm) and 1/z in the middle of the drawn cracks."""
 
 SIMULATORS: dict[str, Drawn] = {
     "shared load": shared_load,
@@ -330,28 +385,47 @@ SIMULATORS: dict[str, Drawn] = {
 
 
 def known_tooth_errors_of(simulator: str, n_each: int) -> KnownToothErrors:
-    """Return the changes of transmission error by `n_each` faults of each kind."""
+    """Return the changes of transmission error by `n_each` faults of each kind, and of as many other changes."""
     rng = np.random.default_rng([SEED, [*SIMULATORS].index(simulator)])
-    rows: list[FloatArray] = []
-    for fault in TOOTH_FAULTS:
-        n_rows = len(rows) + n_each
-        while len(rows) < n_rows:
+    drawn: list[DrawnChange] = []
+    for fault in (*TOOTH_FAULTS, OTHER):
+        n_rows = len(drawn) + n_each
+        while len(drawn) < n_rows:
             try:
-                rows.append(tooth_error_descriptors(SIMULATORS[simulator](fault, rng)))
+                drawn.append(SIMULATORS[simulator](fault, rng))
             except (InputError, RefusalError):
                 continue
-    return KnownToothErrors(np.array(rows), np.repeat(TOOTH_FAULTS, n_each))
+    rows = np.array([tooth_error_descriptors(one.change) for one in drawn])
+    return KnownToothErrors(rows, np.repeat([*TOOTH_FAULTS, OTHER], n_each), _depth_of(drawn))
+
+
+def _depth_of(drawn: Sequence[DrawnChange]) -> FloatArray:
+    """Return `KnownToothErrors.depth` by least squares over the cracks; nan where there are none."""
+    cracks = [one for one in drawn if one.depth_percent == one.depth_percent]
+    if not cracks:
+        return np.full(4, nan)
+    terms = np.array([[1.0, log(c.change.rms_um / c.load_n_per_mm), 1.0 / len(c.change.pattern_um)] for c in cracks])
+    log_percent = np.log([c.depth_percent for c in cracks])
+    fitted = np.linalg.lstsq(terms, log_percent, rcond=None)[0]
+    return np.array([*fitted, np.std(log_percent - terms @ fitted)])
 
 
 def together(several: Sequence[KnownToothErrors]) -> KnownToothErrors:
-    """Return the combined changes of several simulators."""
+    """Return the combined changes of several simulators.
+
+    Numbers of the depth are means; their differences count as uncertainty, at the mean change of a crack.
+    """
     descriptors = np.concatenate([known.descriptors for known in several])
-    return KnownToothErrors(descriptors, np.concatenate([known.faults for known in several]))
+    depths = np.array([known.depth for known in several if np.isfinite(known.depth).all()])
+    at = np.array([1.0, *TYPICAL_CRACK])
+    apart = float(np.std(depths[:, :3] @ at))
+    depth = [*depths[:, :3].mean(axis=0), np.hypot(apart, np.sqrt(np.mean(depths[:, 3] ** 2)))]
+    return KnownToothErrors(descriptors, np.concatenate([known.causes for known in several]), np.array(depth))
 
 
 def named(known: KnownToothErrors, rows: FloatArray) -> tuple[NDArray[np.str_], FloatArray]:
     """Return the most probable fault of each row and its probability, with equal priors for all four."""
-    levels = np.array([[*known.log_likelihoods(row).values()] for row in rows])
+    levels = np.array([[known.log_likelihoods(row)[name] for name in TOOTH_FAULTS] for row in rows])
     weights = np.exp(levels - levels.max(axis=1, keepdims=True))
     return np.array(TOOTH_FAULTS)[levels.argmax(axis=1)], weights.max(axis=1) / weights.sum(axis=1)
 
@@ -366,6 +440,17 @@ def _print_accuracy(
         f"{title}: right {right.mean():.2f} of {len(right)} ({of_each}; of one tooth {right[is_single].mean():.2f}); "
         f"probability ≥ 0.9: {sure.sum()}, right {right[sure].mean() if sure.any() else float('nan'):.2f}"
     )
+
+
+def _print_odds(known: KnownToothErrors, held_out: KnownToothErrors) -> None:
+    """Print how often encoders' odds of a damaged tooth are high, for damaged teeth and for other changes."""
+    levels = [known.log_likelihoods(row) for row in held_out.descriptors]
+    odds = np.array([np.mean([exp(at[name]) for name in TOOTH_FAULTS]) / exp(at[OTHER]) for at in levels])
+    for name in (*TOOTH_FAULTS, OTHER):
+        of_it = odds[held_out.causes == name]
+        typer.echo(
+            f"  {name}: odds of a damaged tooth ≥ 20 {np.mean(of_it >= 20):.3f}, ≥ 100 {np.mean(of_it >= 100):.3f}"
+        )
 
 
 ENCODER_COUNTS = 200_000
@@ -385,7 +470,7 @@ def name_blindly(n_each: int) -> None:
             if evidence is None or evidence.is_unlike_any:
                 unlike += 1
                 continue
-            named_fault = max(evidence.log_likelihoods, key=evidence.log_likelihoods.__getitem__)
+            named_fault = next(iter(evidence.probabilities))
             rows.append((fault, named_fault, evidence.probabilities[named_fault]))
     columns = [np.array(column) for column in zip(*rows, strict=True)]
     _print_accuracy(f"independent rig, {unlike} unlike any or not seen", columns[0], columns[1], columns[2])
@@ -400,10 +485,15 @@ def main(
     by_simulator = {name: known_tooth_errors_of(name, each) for name in SIMULATORS}
     for name, held_out in by_simulator.items():
         taught = together([known for title, known in by_simulator.items() if title != name])
-        _print_accuracy(f"{name} left out", held_out.faults, *named(taught, held_out.descriptors))
+        are_faults = held_out.causes != OTHER
+        _print_accuracy(
+            f"{name} left out", held_out.causes[are_faults], *named(taught, held_out.descriptors[are_faults])
+        )
+        _print_odds(taught, held_out)
     everything = together([*by_simulator.values()])
-    rows, faults = everything.descriptors.astype(np.float16), everything.faults
-    write_whole(to, lambda file: np.savez_compressed(file, allow_pickle=False, descriptors=rows, faults=faults))
+    typer.echo(f"depth of cracks: {everything.depth.round(3).tolist()}")
+    rows = everything.descriptors.astype(np.float16)
+    write_arrays(to, {"descriptors": rows, "causes": everything.causes, "depth": everything.depth})
     if blind:
         name_blindly(blind)
 

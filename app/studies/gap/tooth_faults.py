@@ -22,20 +22,12 @@ from app.benchmark.cases import Plan, PlannedCase
 from app.studies import run_study
 from app.studies.gap.calibrate import STRONG
 from gearsig.errors import GearsigError, RefusalError
-from gearsig.gap import (
-    TOOTH_FAULTS,
-    AddedEffect,
-    Interval,
-    OperatingCondition,
-    attribute,
-    conditions_of,
-    tooth_load_n_per_mm,
-)
+from gearsig.gap import AddedEffect, Interval, OperatingCondition, attribute, conditions_of, tooth_load_n_per_mm
 from gearsig.prepared import PreparedRecording
 from gearsig.processes import one_pool
 from gearsig.recording import Recording
 from gearsig.rig import Rig
-from gearsig.severity import CrackEstimate, estimate_crack
+from gearsig.severity import TOOTH_FAULTS, CrackEstimate, estimate_crack
 from sims.blind import BlindCase, labels, record_case
 from sims.cracked import CrackedPair
 from sims.reduced_fe import ReducedPair

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from gearsig.checks import FloatArray
 from gearsig.gap._attribution import Attribution, GapCalibration, calibration_values
-from gearsig.gap._evidence import CRACK
 from gearsig.gap._features import jackknife_variance
 from gearsig.gap._floors import FLOOR_IN_DEVIATIONS
 from gearsig.gap._report import NONE, UNKNOWN, Interval, Shrinkage, shares_of
 from gearsig.gap.start_stop._cycles import FEATURES, NAMES
 from gearsig.motion import median_deviation
+from gearsig.severity import CRACK
 
 FLOORS_FILE = Path(__file__).with_name("floors.json")
 HALF = float(np.sqrt(2.0))

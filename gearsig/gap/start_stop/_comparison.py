@@ -11,7 +11,6 @@ import numpy as np
 
 from gearsig.checks import FloatArray
 from gearsig.errors import GearsigError, RefusalError
-from gearsig.gap._evidence import CRACK
 from gearsig.gap._features import jackknife_variance
 from gearsig.gap._simulator import AddedEffect, DriveFacts, DriveSimulator, DriveTwin, GapEffect
 from gearsig.gap.start_stop._attribution import (
@@ -38,6 +37,7 @@ from gearsig.gap.start_stop._cycles import (
 from gearsig.motion import PairMotion, check_turns, find_roles, measure_motion
 from gearsig.recording import Recording
 from gearsig.rig import contact_pair
+from gearsig.severity import CRACK
 
 TORQUE_GAIN, WEAR = "torque_gain", "tooth_wear"
 

@@ -25,7 +25,7 @@ from gearsig.checks import FloatArray
 from gearsig.errors import GearsigError, RefusalError
 from gearsig.formatting import readable
 from gearsig.gap._conditions import Stage
-from gearsig.gap._evidence import CRACK, MIN_SIGN_FLOORS, evidence_of_feature
+from gearsig.gap._evidence import MIN_SIGN_FLOORS, evidence_of_feature
 from gearsig.gap._features import jackknife_variance
 from gearsig.gap._floors import FLOOR_IN_DEVIATIONS
 from gearsig.gap._report import (
@@ -70,6 +70,7 @@ from gearsig.gap.start_stop._comparison import (
 from gearsig.gap.start_stop._cycles import COMPRESSION, FEATURES, NAMES, UNITS, change_of, prediction_errors
 from gearsig.motion import is_start_stop, measure_motion, motion_segments
 from gearsig.recording import Recording
+from gearsig.severity import CRACK
 
 
 def diagnose_start_stop(

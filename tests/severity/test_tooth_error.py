@@ -1,4 +1,4 @@
-"""Faults of teeth by the transmission error: what its course is described by, and how likely each makes it."""
+"""Faults of teeth by the transmission error: how its profile is described, and how likely each makes it."""
 
 from __future__ import annotations
 
@@ -10,8 +10,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gearsig.errors import RefusalError
-from gearsig.gap import TOOTH_FAULTS, KnownToothErrors, ToothErrorChange, tooth_error_descriptors, tooth_error_evidence
 from gearsig.recording import Recording
+from gearsig.severity import (
+    OTHER,
+    TOOTH_FAULTS,
+    CrackEstimate,
+    KnownToothErrors,
+    ToothErrorChange,
+    ToothErrorEvidence,
+    estimate_crack,
+    tooth_error_descriptors,
+    tooth_error_evidence,
+)
 from sims.cracked import CrackedPair
 from sims.effects import EffectSetting
 from sims.machine import Operation
@@ -68,16 +78,34 @@ def test_relief_beyond_the_deflection_turns_the_mesh_round() -> None:
     assert back == pytest.approx(-there)
 
 
-def test_a_known_course_is_told_and_a_strange_one_is_not() -> None:
+def known() -> tuple[KnownToothErrors, np.ndarray]:
     rng = np.random.default_rng(1)
-    centres = 3.0 * rng.standard_normal((4, 17))
+    centres = 3.0 * rng.standard_normal((5, 17))
     rows = np.concatenate([centre + rng.standard_normal((60, 17)) for centre in centres])
-    known = KnownToothErrors(rows, np.repeat(TOOTH_FAULTS, 60))
-    for name, centre in zip(TOOTH_FAULTS, centres, strict=True):
-        said = known.log_likelihoods(centre)
+    return KnownToothErrors(rows, np.repeat([*TOOTH_FAULTS, OTHER], 60), np.array([7.0, 0.9, -8.0, 0.3])), centres
+
+
+def test_a_known_profile_is_identified_and_a_strange_one_is_not() -> None:
+    errors, centres = known()
+    for name, centre in zip((*TOOTH_FAULTS, OTHER), centres, strict=True):
+        said = errors.log_likelihoods(centre)
         assert max(said, key=said.__getitem__) == name
-    far = [*known.log_likelihoods(centres.mean(axis=0) + 100.0).values()]
+    far = [*errors.log_likelihoods(centres.mean(axis=0) + 100.0).values()]
     assert np.ptp(far) == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(("other", "expected"), [(-9.0, 90.0), (-2.0, 1.0 / 12.2), (-4.5, 1.0)])
+def test_the_odds_of_a_tooth_are_those_of_a_mean_fault(other: float, expected: float) -> None:
+    said = ToothErrorEvidence(dict.fromkeys(TOOTH_FAULTS, -4.5) | {OTHER: other}, 2.0, "driver")
+    assert said.odds_of_a_tooth == pytest.approx(expected, rel=0.01)
+    assert said.is_unlike_any
+
+
+def test_a_larger_change_is_a_deeper_crack() -> None:
+    errors, _ = known()
+    shallow, deep = (errors.log_percent(rms_um, 100.0, 40) for rms_um in (0.5, 1.0))
+    assert deep[0] - shallow[0] == pytest.approx(0.9 * np.log(2.0))
+    assert shallow[1] == deep[1] == 0.3
 
 
 def recorded(*settings: EffectSetting) -> Recording:
@@ -86,12 +114,20 @@ def recorded(*settings: EffectSetting) -> Recording:
 
 
 @pytest.mark.slow
-def test_encoders_name_a_crack_at_low_speed() -> None:
-    healthy = recorded()
-    said = tooth_error_evidence(recorded(EffectSetting("root_crack", 3.0, {"gear": "driver", "tooth": 7.0})), healthy)
+def test_encoders_identify_a_crack_at_low_speed() -> None:
+    healthy, cracked = recorded(), recorded(EffectSetting("root_crack", 3.0, {"gear": "driver", "tooth": 7.0}))
+    said = tooth_error_evidence(cracked, healthy)
     assert said is not None
     assert said.gear == "driver"
-    assert max(said.probabilities, key=said.probabilities.__getitem__) == "root_crack"
+    assert int(55 * said.place_rev) in (6, 7, 8)
+    assert next(iter(said.probabilities)) == "root_crack"
     assert said.probabilities["root_crack"] > 0.7
+    assert said.odds_of_a_tooth > 20.0
     with pytest.raises(RefusalError, match="did not change"):
         tooth_error_evidence(healthy.between(0.0, 2.5), healthy.between(2.5, 5.0))
+    estimate = estimate_crack(cracked, reference=healthy)
+    assert isinstance(estimate, CrackEstimate)
+    assert estimate.kind == "cracked"
+    assert estimate.shaft == "input"
+    assert estimate.interval_mm[0] < 3.0 < estimate.interval_mm[1]
+    assert "encoders" in " ".join(estimate.reasons)
