@@ -389,7 +389,9 @@ def march(step, poles, z, into, forces, angle, runout, mesh, rub, reads):  # typ
 # --------------------
 
 
-RATE_HZ, FINER, DURATION_S, SETTLING_S = 20_480.0, 4, 3.0, 0.4
+RATE_HZ, FINER, SETTLING_S = 20_480.0, 4, 0.4
+MIN_DURATION_S, MIN_TURNS = 3.0, 10.0
+"""Of a recording; revolutions of the slower shaft."""
 N_PATH, N_TURN = 64, 128
 STIFFNESS_N_PER_M2 = 14e9
 """Mesh stiffness per face width by which relief is chosen."""
@@ -614,8 +616,8 @@ class RossFault:
         Forces by angle of a shaft.
     shaft_crack : int or None
         Number among ROSS's cracked shafts, whose forces follow from the static deflection.
-    race : (bearing, order, depth, share of its shaft's turn, modulation) or None
-        Passages per revolution of the driving gear, depth in m.
+    race : (bearing, order, depth, length, modulation) or None
+        Passages per revolution of the driving gear; depth in m; length as a share of the distance between balls.
     ripple, wander : (share, order), (share, Hz)
     rub : (gear, share of the static deflection, stiffness, friction) or None
     moved, damped : factors on frequencies and damping of the housing
@@ -659,7 +661,8 @@ def record(
     zeta = drawn["mode_damping_ratio"] * np.exp(0.08 * normal(n_modes)) * fault.damped
     at_sensors = drawn["at_sensors"] * (1.0 + 0.03 * normal((n_sensors, n_modes)))
     system, columns = _system(machine, hz, zeta, speed)
-    n = round((SETTLING_S + DURATION_S) * RATE_HZ * FINER)
+    duration_s = max(MIN_DURATION_S, MIN_TURNS * 60.0 / rpm * machine.asked["teeth"][1] / machine.asked["teeth"][0])
+    n = round((SETTLING_S + duration_s) * RATE_HZ * FINER)
     rate = RATE_HZ * FINER
     time = np.arange(n) / rate
     wander = _slow(n, rate, 4e-4, 1.0, rng)
@@ -675,7 +678,7 @@ def record(
     z = -(into @ forces[0]) / modes.poles
     shapes = np.ascontiguousarray(at_sensors @ modes.shapes[len(ross["M"]) :])
     out = march(1.0 / rate, modes.poles, z, into, forces, angle, runout, mesh, rub, shapes)
-    lead, n_out = round(SETTLING_S * RATE_HZ), round(DURATION_S * RATE_HZ)
+    lead, n_out = round(SETTLING_S * RATE_HZ), round(duration_s * RATE_HZ)
     kept = slice(lead, lead + n_out)
     values = signal.resample_poly(out[:, :-2], 1, FINER, axis=0, window=("kaiser", 9.0))[kept].T
     values = values * (1.0 + 0.05 * rng.uniform(-1, 1, (n_sensors, 1)))
@@ -697,7 +700,7 @@ def record(
 
 
 def _slow(n: int, rate: float, size: float, corner_hz: float, rng: np.random.Generator) -> FloatArray:
-    """Return noise below a corner frequency with standard deviation `size`, by interpolating a coarse one."""
+    """Return a random walk about zero with standard deviation `size` and little above a corner frequency."""
     coarse = np.cumsum(rng.standard_normal(round(4.0 * corner_hz * n / rate) + 4))
     values = np.interp(np.linspace(0, len(coarse) - 1, n), np.arange(len(coarse)), signal.detrend(coarse))
     return np.asarray(size * values / values.std())
@@ -793,7 +796,7 @@ def _forces(
         for dof in np.flatnonzero(np.ptp(table, axis=0)):
             at(int(dof), np.interp(place, np.arange(N_TURN + 1), table[:, dof]))
     if fault.race is not None:
-        acting.append(_race(machine, fault.race, columns["mesh"], angles, rng))
+        acting.append(_race(machine, fault.race, columns["mesh"], angles, force, rng))
     vectors, courses = zip(*acting, strict=True)
     return np.array(vectors).T, np.ascontiguousarray(np.array(courses).T), runout
 
@@ -803,9 +806,13 @@ def _race(
     race: tuple[int, float, float, float, bool],
     mesh: FloatArray,
     angles: tuple[FloatArray, FloatArray],
+    force: float,
     rng: np.random.Generator,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return where a damaged race pushes shaft and housing apart, in N, and when: one ball after the other sinks."""
+    """Return where a damaged race pushes shaft and housing apart, in N, and when: one ball after the other sinks.
+
+    A ball loses at most what the most heavily loaded one carries, 5 F/n after Stribeck.
+    """
     bearing, order, depth, turn, modulated = race
     side, at_bearings = bearing // 2, machine.drawn["at_bearings"]
     passed = order * (angles[0] + 2e-5 * np.cumsum(rng.standard_normal(len(angles[0])))) / (2 * pi)
@@ -813,8 +820,9 @@ def _race(
     if modulated:
         pulse = pulse * np.maximum(np.cos(angles[side]), 0.0) ** 1.5
     load = mesh[machine.ross["gears"][[6 * side, 6 * side + 1]]]
-    share = 2.5 / machine.drawn["balls"][side, 0]
-    push = machine.ross["ball_n_per_m"][bearing] * load / np.hypot(*load) * depth * share
+    along = load / np.hypot(*load)
+    stiffness, n_balls = float(along**2 @ machine.ross["ball_n_per_m"][bearing]), machine.drawn["balls"][side, 0]
+    push = along * min(2.5 * stiffness * depth, 2.5 * force) / n_balls
     column = np.zeros(len(mesh))
     column[machine.ross["balls"][bearing]] = push
     column[-at_bearings.shape[1] :] = -push @ at_bearings[2 * bearing : 2 * bearing + 2]
