@@ -18,7 +18,7 @@ import typer
 from scipy import signal
 
 from app.studies import run_study
-from app.studies.gap.calibrate import STRONG, attributed_case
+from app.studies.gap.calibrate import attributed_case
 from app.studies.gap.calibrate import table as table_of
 from app.studies.gap.gearboxes import (
     Made,
@@ -135,6 +135,8 @@ ROSS = "ross"
 FIRST_RIG = 500_000
 """Number of the first machine's first point; its second point has the next number."""
 N_HEALTHY, N_FOREIGN = 3, 1
+CLEAR = 2.0
+"""Structural floors from which an effect is listed."""
 
 
 def simulate(to: Annotated[Path, typer.Option()], machines: int = 8) -> None:
@@ -184,9 +186,16 @@ def score(raw: Path) -> None:
         for cause, change, load in zip(causes, changes, loads, strict=True)
     ]
     typer.echo("one condition:\n" + table_of(calibration, single)[0])
-    for case, answer in ((case, case.by(calibration)) for case in single):
-        if case.size >= STRONG and case.truths[0] not in (NONE, UNKNOWN):
-            typer.echo(f"  {case.truths[0]}: {', '.join(f'{name} {p:.2f}' for name, p in list(answer.items())[:3])}")
+    shown = [
+        (case.truths[0], case.size, list(case.by(calibration).items())[:3])
+        for case in single
+        if case.size >= CLEAR and case.truths[0] not in (NONE, UNKNOWN)
+    ]
+    first = [answer[0][0] == truth for truth, _, answer in shown]
+    two = [truth in dict(answer[:2]) for truth, _, answer in shown]
+    typer.echo(f"from {CLEAR:g} floors {len(shown)}: likeliest {np.mean(first):.2f}, two {np.mean(two):.2f}")
+    for truth, size, answer in sorted(shown):
+        typer.echo(f"  {truth}, {size:.1f} floors: {', '.join(f'{name} {p:.2f}' for name, p in answer)}")
     second = {(rig - 1, detail): row for row, (rig, detail) in enumerate(zip(rigs, details, strict=True))}
     pairs = [(row, second[rigs[row], details[row]]) for row in range(len(rigs)) if (rigs[row], details[row]) in second]
     several = [

@@ -396,6 +396,8 @@ N_PATH, N_TURN = 64, 128
 STIFFNESS_N_PER_M2 = 14e9
 """Mesh stiffness per face width by which relief is chosen."""
 N_SEVERITIES = 2
+DRIVE_HZ, FOLLOWING_S, SLIP = 0.5, 0.15, 0.03
+"""Drive: its weak spring with the motor's inertia; time in which it follows; slip under load."""
 ENTRY = 0.02
 """Share of the path over which pairs meet and part: at once, in ROSS; steps would round the instant, which is heard."""
 TOOTH_FAULTS = ("root_crack", "tooth_spall", "chipped_tooth")
@@ -735,10 +737,10 @@ def _system(
     moved = 1.0 / np.sum(mesh[gears[[5, 11]]] ** 2 / drawn["inertia"])
     stiffness += stiff * np.outer(mesh, mesh)
     damping += 2.0 * float(drawn["mesh_damping_ratio"]) * (stiff * moved) ** 0.5 * np.outer(mesh, mesh)
-    # A drive that follows its set speed slowly, so that the shafts do not turn away.
-    inertia, rate = 2.0 * float(ross["M"][MOTOR, MOTOR]), 2 * pi * 1.5
-    stiffness[MOTOR, MOTOR] += inertia * rate**2
-    damping[MOTOR, MOTOR] += inertia * rate
+    # A motor with a few per cent of slip under load, and a weak spring, so that the shafts do not turn away.
+    inertia = 2.0 * float(ross["M"][MOTOR, MOTOR])
+    stiffness[MOTOR, MOTOR] += inertia * (2 * pi * DRIVE_HZ) ** 2
+    damping[MOTOR, MOTOR] += max(inertia / FOLLOWING_S, mesh[gears[5]] * float(drawn["force_n"]) / (SLIP * speed))
     return (mass, damping, stiffness), {"mesh": mesh, "friction": across}
 
 
