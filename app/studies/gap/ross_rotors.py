@@ -677,7 +677,7 @@ def record(
     modes = linear_modes(*system)
     mesh, rub = _teeth_and_rub(machine, fault, modes, columns["mesh"], columns["friction"], force, speed)
     into = np.ascontiguousarray(modes.into @ vectors)
-    z = -(into @ forces[0]) / modes.poles
+    z = -(into @ forces.mean(axis=0)) / modes.poles
     shapes = np.ascontiguousarray(at_sensors @ modes.shapes[len(ross["M"]) :])
     out = march(1.0 / rate, modes.poles, z, into, forces, angle, runout, mesh, rub, shapes)
     lead, n_out = round(SETTLING_S * RATE_HZ), round(duration_s * RATE_HZ)
