@@ -21,7 +21,7 @@ from gearsig.gap import reduce_recording
 
 RATIO, TEETH, SPEED, STIFF, MEAN_N = 1.6, (3, 4), 400.0, 5e6, 300.0
 """Contact ratio, teeth, rad/s of the driving gear, mean stiffness of the mesh in N/m, force between the flanks."""
-with_python = pytest.mark.skipif("ROSS_PYTHON" not in os.environ, reason="ROSS_PYTHON is not set")
+needs_ross = pytest.mark.skipif("ROSS_PYTHON" not in os.environ, reason="ROSS_PYTHON is not set")
 
 
 def test_teeth_that_soften_and_part_move_as_by_scipy() -> None:
@@ -75,13 +75,13 @@ def test_teeth_that_soften_and_part_move_as_by_scipy() -> None:
     assert np.std(out[1:, 0] - accelerations[1:]) < 1e-2 * np.std(accelerations)
 
 
-@with_python
+@needs_ross
 @pytest.mark.slow
 def test_it_moves_as_ross_moves() -> None:
     assert apart_from_ross(800, 2.5e-6) < 0.02
 
 
-@with_python
+@needs_ross
 @pytest.mark.slow
 def test_a_healthy_one_is_heard_at_its_mesh() -> None:
     machine = with_ross([RossMachine.draw(np.random.default_rng(5))])[0]
