@@ -785,7 +785,7 @@ def record(
             row = row + _noise(len(row), machine, channel, rng) * levels[channel] * day.noise_factor
         rows.append(row * day.gains[channel])
     later = time[::FINER][lasting]
-    tacho = _tachometer(turns, time, later, rng)
+    tacho = tachometer(turns, time, later, rng)
     samples = np.stack([*rows, tacho])
     point = machine.rig.operating_point
     channels = tuple(Channel(s.channel, s.quantity, s.unit, s.position) for s in machine.rig.sensors)
@@ -873,7 +873,7 @@ def _noise(n: int, machine: StaticMachine, channel: int, rng: np.random.Generato
     return np.asarray(noise * (machine.noise_share[channel] / noise.std()))
 
 
-def _tachometer(turns: FloatArray, time: FloatArray, at: FloatArray, rng: np.random.Generator) -> FloatArray:
+def tachometer(turns: FloatArray, time: FloatArray, at: FloatArray, rng: np.random.Generator) -> FloatArray:
     """Return the voltage of a tachometer with one pulse per revolution."""
     tacho = Tachometer(jitter_s=2e-6, noise_v=0.01)
     whole = np.arange(np.ceil(turns[0]), np.floor(turns[-1]) + 1.0)
