@@ -363,10 +363,10 @@ def _show_quality(analysis: Analysis) -> None:
         ],
         "quantity": [c.quantity.replace("_", " ") for c in recording.channels],
         "unit": [unit_text(c.unit) or "not known" for c in recording.channels],
-        "position": [c.position for c in recording.channels],
         "smallest": [float(row.min()) for row in recording.samples],
         "mean": [float(row.mean(dtype=np.float64)) for row in recording.samples],
         "largest": [float(row.max()) for row in recording.samples],
+        "position": [c.position for c in recording.channels],
     }
     config = {"channel": st.column_config.TextColumn(width="small")}
     show_table(table, number=".4g", column_config=config, width="stretch")

@@ -203,7 +203,7 @@ def show_warnings(warnings: Sequence[str], *, quiet: bool = False) -> None:
 
 def show_checks(checks: Iterable[tuple[bool, str]]) -> None:
     """Show line by line which statements hold and which do not; texts may come from files."""
-    with st.container(gap=None):
+    with st.container(key="checks", gap=None):
         for holds, text in checks:
             mark = ":green[:material/check:]" if holds else ":orange[:material/priority_high:]"
             st.markdown(f"{mark} {as_typed(text)}")
