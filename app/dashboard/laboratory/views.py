@@ -377,7 +377,8 @@ def _sound(run: LaboratoryRun, channel: str, largest: float) -> bytes:
     n = round(LISTEN_HZ * min(2.0, len(values) / rate_hz))
     once = np.interp(np.arange(n) / LISTEN_HZ, np.arange(len(values)) / rate_hz, values)
     file = BytesIO()
-    wavfile.write(file, LISTEN_HZ, np.int16(32767 * np.tile(once, max(1, round(2.0 * LISTEN_HZ / n)))))
+    sound = np.tile(32767 * once, max(1, round(2.0 * LISTEN_HZ / n)))
+    wavfile.write(file, LISTEN_HZ, sound.astype(np.int16))
     return file.getvalue()
 
 
