@@ -89,10 +89,9 @@ class Result:
         rows = []
         for name, value in values.items():
             is_array = isinstance(value, np.ndarray) and value.ndim
-            text = _array_text(value) if is_array else _value_text(value)
-            if text:
-                rows.append(f"<tr><th style='text-align:left'>{escape(name)}</th><td>{escape(text)}</td></tr>")
-        return f"<strong>{escape(type(self).__name__)}</strong><table>{''.join(rows)}</table>"
+            text = _array_text(value) if is_array else value if isinstance(value, str) else _value_text(value)
+            rows += [(name, text)] if text else []
+        return verdict_html([type(self).__name__], ("field", "value"), rows)
 
     def to_frame(self) -> DataFrame:
         """Return the result as a pandas table; column names end in their unit where it is fixed."""

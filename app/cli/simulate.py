@@ -174,9 +174,9 @@ def _option_line(option: Option) -> str:
 def _range(low: float | None, high: float | None, choices: tuple[str, ...]) -> str:
     if choices:
         return ", ".join(choices)
-    if low is None and high is None:
-        return ""
-    return f"{'any' if low is None else f'{low:g}'} to {'any' if high is None else f'{high:g}'}"
+    if low is None or high is None:
+        return f"at least {low:g}" if low is not None else f"at most {high:g}" if high is not None else ""
+    return f"{low:g} to {high:g}"
 
 
 def _default(value: float | str | None) -> str:

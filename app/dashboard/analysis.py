@@ -23,7 +23,15 @@ from app.dashboard.widgets.crack import show_crack
 from app.dashboard.widgets.machine import machine_text, show_machine
 from app.dashboard.widgets.method import MethodPage, cached, show_method
 from app.dashboard.widgets.spectrum import show_average, show_spectrum
-from app.dashboard.widgets.texts import as_typed, in_page_text, show_error, show_facts, show_table, show_unknown_speed
+from app.dashboard.widgets.texts import (
+    as_typed,
+    in_page_text,
+    show_error,
+    show_facts,
+    show_table,
+    show_unknown_speed,
+    show_warnings,
+)
 from app.dashboard.widgets.verdict import show_verdict
 from gearsig import plot
 from gearsig.angle import resample_to_angle
@@ -246,8 +254,7 @@ def show_speed(analysis: Analysis) -> None:
     show_facts(st.columns(len(numbers)), numbers)
     st.caption(f"Shaft {as_typed(angle.shaft or 'of reference')}, {plot.METHODS[angle.method]}.")
     show_panel(plot.speed_panel(angle), state.view_key("speed chart", analysis), 60.0)
-    if angle.notes:
-        st.markdown("\n".join(f"- {as_typed(note)}" for note in angle.notes))
+    show_warnings(angle.notes, quiet=True)
 
 
 STARTS_AND_STOPS = (
@@ -363,10 +370,10 @@ def _show_quality(analysis: Analysis) -> None:
         ],
         "quantity": [c.quantity.replace("_", " ") for c in recording.channels],
         "unit": [unit_text(c.unit) or "not known" for c in recording.channels],
-        "position": [c.position for c in recording.channels],
         "smallest": [float(row.min()) for row in recording.samples],
         "mean": [float(row.mean(dtype=np.float64)) for row in recording.samples],
         "largest": [float(row.max()) for row in recording.samples],
+        "position": [c.position for c in recording.channels],
     }
     config = {"channel": st.column_config.TextColumn(width="small")}
     show_table(table, number=".4g", column_config=config, width="stretch")

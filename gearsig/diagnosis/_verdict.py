@@ -55,10 +55,11 @@ def ranked(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     return tuple(sorted(findings, key=key))
 
 
-def verdict_of(findings: tuple[Finding, ...], *, has_reference: bool = False) -> str:
+def verdict_of(findings: tuple[Finding, ...], *, has_reference: bool = False, brief: bool = False) -> str:
     """Return the sentences for a reader in a hurry: an uncertain rate, what has changed, and the outcome.
 
-    They always include why a given reference did not help, or that it shows a fault itself.
+    They always include why a given reference did not help, or that it shows a fault itself. A brief verdict stands
+    beside its outcome: it does not repeat it, and leaves out the changes and the remedy.
     """
     doubt = said_first(findings, claims=outcome_of(findings) in (Outcome.FAULT, Outcome.SUSPICION))
     unfit = next((f.title for f in findings if f.code in (REFERENCE_UNFIT, REFERENCE_NOT_HEALTHY)), "")
@@ -71,20 +72,20 @@ def verdict_of(findings: tuple[Finding, ...], *, has_reference: bool = False) ->
     # A change that no pattern explains is a suspicion in itself, and has been reported already.
     if not claims and any(f.code == CHANGED and f.is_claim for f in findings):
         return " ".join(filter(None, (doubt, changed, zone, unfit)))
-    examined_text = _said(others, has_reference=has_reference)
-    if (
-        loud is not None and loud.code == VIBRATION_ZONE and not claims
-    ):  # nothing shows the cause, but the machine is not healthy
+    opener, said, remedy = _said(others, has_reference=has_reference)
+    if brief:
+        changed = opener = remedy = ""
+    if loud is not None and loud.code == VIBRATION_ZONE and not claims:
+        # nothing shows the cause, but the machine is not healthy
         causes = (text for text in loud.evidence if text.endswith(CAN_DO_THAT))
-        why = next(causes, "What is wrong does not show.")
-        examined_text = f"{zone} {why}{examined_text.removeprefix(NO_FAULT).removeprefix(CANNOT_TELL)}"
-        zone = ""
+        opener, zone = f"{zone} {next(causes, 'What is wrong does not show.')}", ""
     if claims:  # what is claimed may be new
         unchanged = unchanged.replace(LEVELS_MATCH, f"Other {LEVELS_MATCH.lower()}")
-    return " ".join(filter(None, (doubt, changed, examined_text, zone, unchanged, unfit)))
+    return " ".join(filter(None, (doubt, changed, opener, said, remedy, zone, unchanged, unfit)))
 
 
-def _said(findings: tuple[Finding, ...], *, has_reference: bool) -> str:
+def _said(findings: tuple[Finding, ...], *, has_reference: bool) -> tuple[str, str, str]:
+    """Return the outcome, what it rests on, and what would make it more certain."""
     outcome = outcome_of(findings)
     unused = [f for f in findings if f.code == DEPTH_UNKNOWN and f.kind is Kind.CANNOT_TELL]
     if outcome in (Outcome.FAULT, Outcome.SUSPICION):
@@ -93,14 +94,14 @@ def _said(findings: tuple[Finding, ...], *, has_reference: bool) -> str:
         claim = first.title.removesuffix(".")
         claim += f" (at most {percent(first.confidence)} sure)" if kind is Kind.FAULT else ""
         claim += f", and {len(more)} more" if more else ""
-        return " ".join([f"{kind.value.capitalize()}: {claim}.", *(f.title for f in unused)])
+        return f"{kind.value.capitalize()}:", " ".join([f"{claim}.", *(f.title for f in unused)]), ""
     titles = [f.title for f in findings if f.code in EXAMINED]
     if outcome is Outcome.NO_FAULT:
         has_teeth = any(f.code == "no-tooth-local-damage" for f in findings)
         is_steady = has_teeth or bool(titles)  # a drive that starts and stops has no lines to examine
         open_ones = NOT_ALONE.format("Damage of many teeth, unbalance" if has_teeth else "Unbalance")
         depth = [f.title for f in findings if f.code == DEPTH_UNKNOWN and f.kind is Kind.NOTICE]
-        return " ".join([NO_FAULT, *titles, *([open_ones] if is_steady and not has_reference else depth)])
+        return NO_FAULT, " ".join([*titles, *([open_ones] if is_steady and not has_reference else depth)]), ""
     others = [f for f in findings if f not in unused and (f.code in HINDERING or f.kind is Kind.CANNOT_TELL)]
     gaps = [*unused, *others]
     nothing = "Nothing was examined that would show a fault."
@@ -109,18 +110,18 @@ def _said(findings: tuple[Finding, ...], *, has_reference: bool) -> str:
     elif has_reference:
         nothing = "What shows is in the reference as well."
     why = " ".join(f.title for f in gaps[:2]) or nothing
-    return " ".join([CANNOT_TELL, why, *titles, *_remedy(gaps)])
+    return CANNOT_TELL, " ".join([why, *titles]), _remedy(gaps)
 
 
-def _remedy(gaps: list[Finding]) -> list[str]:
+def _remedy(gaps: list[Finding]) -> str:
     """Return in one sentence what would settle the most important of the open questions."""
     first = next((finding for finding in gaps if finding.surer), None)
     if first is None:
-        return []
+        return ""
     surer = first.surer.partition(". ")[0].rstrip(".")
     # Say what to do, not what to have, where a value is missing.
     opener = WHAT_WOULD_HELP if first.code in (DEPTH_UNKNOWN, SPEED_UNKNOWN) else SURER_WITH
-    return [f"{opener}{surer[:1].lower()}{surer[1:]}."]
+    return f"{opener}{surer[:1].lower()}{surer[1:]}."
 
 
 def _problem_title(problem: ChannelProblem) -> str:

@@ -7,7 +7,8 @@ threads can draw figures at the same time, and figures are freed with their last
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from functools import cache
+from functools import cache, partial
+from io import BytesIO
 from math import log10
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -144,10 +145,18 @@ LINE_PT = 0.9
 
 
 def new_figure(height_in: float, width_in: float = WIDTH_IN) -> Figure:
-    """Return an empty figure, by default 900 pixels wide."""
+    """Return an empty figure, by default 900 pixels wide, which notebooks show even where `pyplot` is not imported."""
     from matplotlib.figure import Figure
 
-    return Figure(figsize=(width_in, height_in), dpi=DOTS_PER_INCH, facecolor="white")
+    figure = Figure(figsize=(width_in, height_in), dpi=DOTS_PER_INCH, facecolor="white")
+    figure._repr_png_ = partial(_png_of, figure)  # type: ignore[attr-defined]
+    return figure
+
+
+def _png_of(figure: Figure) -> bytes:
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png")
+    return buffer.getvalue()
 
 
 def _apply_common_look(axes: Axes) -> None:

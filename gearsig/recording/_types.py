@@ -25,7 +25,7 @@ from gearsig.checks import (
     within,
 )
 from gearsig.errors import InputError
-from gearsig.formatting import counted
+from gearsig.formatting import counted, unit_text
 from gearsig.results import verdict_html
 from gearsig.rig import QUANTITIES, PulseTimes, Rig, SpeedSource, check_rig, check_speed_source
 
@@ -445,7 +445,7 @@ class Recording:
 
     def _repr_html_(self) -> str:
         """Return the same as a table, for notebooks."""
-        rows = [(c.name, c.quantity.replace("_", " "), c.unit, c.position) for c in self.channels]
+        rows = [(c.name, c.quantity.replace("_", " "), unit_text(c.unit), c.position) for c in self.channels]
         return verdict_html([repr(self).splitlines()[0]], ("channel", "quantity", "unit", "position"), rows)
 
     @property

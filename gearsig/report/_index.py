@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,13 +14,13 @@ from urllib.parse import quote
 
 from gearsig import __version__
 from gearsig.cache import write_text
-from gearsig.diagnosis import Analysis, Outcome
+from gearsig.diagnosis import Analysis, Outcome, verdict_of
 from gearsig.fleet import date_in_name
 from gearsig.formatting import csv_rows, moment_text, percent, readable, spreadsheet_cell, unit_text
 from gearsig.indicators import Indicator
 from gearsig.plot import with_unit
 from gearsig.report._files import compiled, date_text, render, write_pdf
-from gearsig.report._sections import css_class, headline_of, sure_of
+from gearsig.report._sections import css_class, sure_of
 from gearsig.severity import CrackEstimate
 
 
@@ -38,7 +37,7 @@ class Entry:
     outcome : Outcome
     verdict : str
     conclusion : str
-        The verdict for the index, without changes and without the outcome, which is shown beside it.
+        The brief verdict: the index shows the outcome beside it.
     confidence : float or None
         Of the fault or suspicion in the verdict; None if there is none.
     sure_of : str
@@ -93,7 +92,7 @@ def entry_of(analysis: Analysis, name: str, page: str) -> Entry:
         page,
         analysis.outcome,
         analysis.verdict,
-        without_outcome(" ".join(headline_of(analysis, with_remedy=True)).strip(), analysis.outcome),
+        verdict_of(analysis.findings, has_reference=analysis.reference is not None, brief=True),
         top.confidence if top is not None else None,
         sure_of(top) if top is not None else "",
         top.strength.ratio_db if top is not None and top.strength is not None else None,
@@ -101,19 +100,6 @@ def entry_of(analysis: Analysis, name: str, page: str) -> Entry:
         crack_mm,
         machine=analysis.rig.name if analysis.rig is not None else "",
     )
-
-
-def without_outcome(text: str, outcome: Outcome) -> str:
-    """Return a verdict without its leading outcome.
-
-    Examples
-    --------
-    >>> without_outcome("Fault: Damage at a tooth.", Outcome.FAULT)
-    'Damage at a tooth.'
-    >>> without_outcome("Cannot tell.", Outcome.CANNOT_TELL)
-    'Cannot tell.'
-    """
-    return re.sub(rf"(?i)^{re.escape(outcome.value)}[:.] +", "", text)
 
 
 def by_severity(entry: Entry) -> tuple[int, float, float, float, str]:

@@ -292,6 +292,7 @@ def start_stop_figures(examined: StartStop) -> Iterator[CaptionedFigure]:
     motion, impacts = examined.motion, examined.impacts
     yield CaptionedFigure(
         plot.motion_profile_figure(examined, title="Speed, torque and compression in their phases"),
+        "Shaded: run-up, running, run-down and, in grey, rest. "
         "Look at when the compression changes sides: between the dashed lines the flanks do not touch, beyond them "
         "they carry load. A run-down that gets shorter indicates friction.",
         f"Driver's speed, torque and compression over {motion.time_s[-1]:.4g} s, phases shaded.",

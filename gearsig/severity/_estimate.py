@@ -799,7 +799,7 @@ def _crack_estimate(
     unlike = model.unlike(features)
     if unlike:
         raise RefusalError(
-            f"one tooth stands out on shaft {shaft!r}, but unlike the calibration's cracks: {unlike}",
+            f"one tooth stands out on shaft {shaft!r}, but unlike the calibration's cracks ({unlike})",
             remedy="look at the tooth: it may be chipped or spalled, or the machine is unlike the calibration's",
         )
     low, high = model.percent_range

@@ -162,7 +162,7 @@ class DepthModel:
             phrase, unit, scale = IN_WORDS.get(FEATURES[i], (FEATURES[i].replace("_", " "), "", 1.0))
             value, lowest, highest = scale * features[i], scale * self.lowest[i], scale * self.highest[i]
             theirs = f"theirs {lowest:.1f} to {highest:.1f} {unit}".rstrip()
-            return with_minus(f"{phrase} is {value:.1f} {unit}".rstrip() + f"; {theirs}")
+            return with_minus(f"{phrase} is {value:.1f} {unit}".rstrip() + f", {theirs}")
         z = self.standardised(features)
         distance = float(np.sqrt(z @ self.precision @ z))  # Mahalanobis
         if distance > self.largest_distance:

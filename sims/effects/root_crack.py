@@ -85,8 +85,8 @@ EFFECT = Effect(
     "unchanged, so the tooth deflects more while it carries load.",
     signature="One burst per revolution of the gear's shaft, at the tooth's angle and about a mesh period long, which "
     "rings at the natural frequencies; a family of low, wide sidebands of that shaft about the mesh harmonics and the "
-    "resonances. In the shaft's synchronous average the residual's kurtosis rises, and the phase lags at the tooth. It "
-    "grows faster than the depth, and with the load.",
+    "resonances. In the shaft's synchronous average the residual's kurtosis rises, and the phase lags at the tooth. "
+    "The burst grows faster than the depth, and with the load.",
     shows_in=("tooth_window", "mesh_sidebands", "envelope_orders"),
     change=change,
     options=(

@@ -1,9 +1,11 @@
 """The fault laboratory's page, run without a browser."""
 
+from io import BytesIO
 from time import monotonic
 
 import numpy as np
 import pytest
+from scipy.io import wavfile
 from streamlit.testing.v1 import AppTest
 
 from app.dashboard import state
@@ -59,6 +61,18 @@ def test_the_crack_slider_shows_the_faulty_machine_in_every_view() -> None:
         assert not page.exception, tab
         assert not page.error, tab
         assert len(figures(page)) + len(page.get("plotly_chart")) == CHARTS[tab], tab
+
+
+def test_both_machines_are_heard_on_one_scale(monkeypatch) -> None:
+    heard: list[bytes] = []
+    monkeypatch.setattr("streamlit.audio", heard.append)
+    page = opened()
+    heard.clear()
+    slider(page, "Crack").set_value(1.5).run()
+    (rate_hz, healthy), (_, faulty) = [wavfile.read(BytesIO(sound)) for sound in heard]
+    assert len(healthy) == len(faulty) == 2 * rate_hz
+    quieter, louder = sorted(int(np.abs(sound.astype(int)).max()) for sound in (healthy, faulty))
+    assert 10_000 < quieter < louder <= 32767
 
 
 @pytest.mark.slow

@@ -16,6 +16,7 @@ def test_faults_come_first_and_the_surest_of_them() -> None:
     )
     assert [f.code for f in findings] == ["d", "b", "c", "a"]
     assert verdict_of(findings) == "Fault: surer (at most 90 % sure), and 1 more."
+    assert verdict_of(findings, brief=True) == "surer (at most 90 % sure), and 1 more."
 
 
 @pytest.mark.parametrize(
@@ -35,6 +36,7 @@ def test_no_fault_is_only_said_where_one_would_have_shown(findings: list[Finding
 def test_an_open_question_comes_with_what_would_settle_it() -> None:
     gap = Finding("x", Kind.CANNOT_TELL, "Noise hides it.", surer="A longer recording. Or another sensor.")
     assert verdict_of((gap,)) == "Cannot tell. Noise hides it. More certain with: a longer recording."
+    assert verdict_of((gap,), brief=True) == "Noise hides it."
 
 
 UNUSED = Finding(

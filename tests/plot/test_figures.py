@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import pickle
 import re
 import weakref
 from base64 import b64decode
@@ -218,6 +219,12 @@ def test_many_names_of_lines_stand_in_rows_within_the_drawing():
     assert len(places) == 9
     assert len({y for _, y in places}) == 2
     assert max(x for x, _ in places) < 760 - 6 * len("mode 0, 1000 Hz")
+
+
+def test_a_figure_shows_itself_in_a_notebook() -> None:
+    """By itself, IPython knows how to draw figures of `pyplot` only."""
+    figure = pickle.loads(pickle.dumps(new_figure(2.0)))  # noqa: S301 - its own
+    assert figure._repr_png_().startswith(b"\x89PNG")
 
 
 def test_a_figure_is_taken_apart_into_panels_that_zoom(average_of) -> None:

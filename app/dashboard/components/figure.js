@@ -292,7 +292,10 @@ class Figure {
     const { data } = this, unit = ` ${data.x_unit}`, said = [row.name];
     const isChange = row.start !== 0;
     said.push(`${data.bar}: ${isChange ? `${figure(row.start)} → ` : ""}${figure(row.end)}${unit}`);
-    if (row.interval) said.push(`90 % interval: ${figure(row.interval[0])} to ${row.interval[1] < 1e299 ? figure(row.interval[1]) : "any"}${unit}`);
+    if (row.interval) {
+      const [low, high] = row.interval;
+      said.push(`90 % interval: ${high < 1e299 ? `${figure(low)} to ${figure(high)}` : `at least ${figure(low)}`}${unit}`);
+    }
     if (row.mark !== null) said.push(`${data.mark}: ${figure(row.mark)}${unit}`);
     if (row.band !== null) said.push(`${data.band}: ±${figure(row.band)}${unit}`);
     return said;

@@ -1,6 +1,7 @@
 // A gear pair that turns in step with a cursor in its signal: play, or drag the cursor.
 
-const MODULE = 22, RIM = 5 * MODULE, CYCLES_PER_S = 2.5;
+const MODULE = 22, RIM = 5 * MODULE, CYCLES_PER_S = 2.5, PRESSURE = (20 * Math.PI) / 180;
+const HALF = 0.24; // of a pitch: half of a tooth's thickness at the pitch circle, the rest is backlash
 const APPROACH = 0.8; // mesh cycles from a tooth's entry to its middle on the line of centres, at a contact ratio of 1.6
 
 export default function ({ data, parentElement }) {
@@ -38,6 +39,7 @@ class Gears {
   update(data) {
     this.data = data;
     this.lines = data.lines.map((line) => ({ ...line, x: numbers(line.x), y: numbers(line.y), force: numbers(line.force) }));
+    this.shapes = data.teeth.map(shape);
     const x = this.lines[0].x;
     this.range = [x[0], x[x.length - 1]];
     if (this.at === null || this.at < this.range[0] || this.at > this.range[1]) this.at = data.start;
@@ -92,21 +94,15 @@ class Gears {
     // the driver is above the driven gear: the mesh lies along the width
     context.translate(width / 2, height / 2);
     context.rotate(Math.PI / 2);
-    wheel(context, -radii[0], radii[0], teeth[0], (k) => ((turned - k) * 2 * Math.PI) / teeth[0], cracked.driver, colours, this.ink);
-    wheel(context, radii[1], radii[1], teeth[1], (k) => Math.PI - ((turned - k - 0.5) * 2 * Math.PI) / teeth[1], cracked.driven, colours, this.ink);
+    wheel(context, -radii[0], this.shapes[0], 0, -turned, cracked.driver, colours, this.ink);
+    // the driving flanks touch: the driven tooth is a thickness ahead
+    wheel(context, radii[1], this.shapes[1], Math.PI, turned + 2 * HALF, -cracked.driven, colours, this.ink);
     // the force of the line in front, along the line of action
     const line = this.lines[this.lines.length - 1], force = value(line, line.force, this.at);
-    const length = (110 * force) / this.data.force, angle = ((90 - 20) * Math.PI) / 180;
-    const tip = [length * Math.cos(angle), -length * Math.sin(angle)];
+    context.rotate(PRESSURE - Math.PI / 2);
     context.strokeStyle = context.fillStyle = line.colour;
     context.lineWidth = 4;
-    context.beginPath();
-    context.moveTo(0, 0);
-    context.lineTo(...tip);
-    context.stroke();
-    context.beginPath();
-    context.arc(...tip, 6, 0, 2 * Math.PI);
-    context.fill();
+    arrow(context, (110 * force) / this.data.force);
     context.restore();
     this.write(context, `driver, ${teeth[0]} teeth`, 10, 18);
     this.write(context, `driven, ${teeth[1]} teeth`, 10, 0.64 * height);
@@ -139,36 +135,62 @@ class Gears {
   }
 }
 
-// One gear, of which only the teeth near the mesh are seen; the cracked tooth is in the colour of faults.
-function wheel(context, x, radius, n, angleOf, cracked, colours, ink) {
-  const step = (2 * Math.PI) / n, root = radius - 1.25 * MODULE, tip = radius + MODULE;
-  const profile = [[root, -0.5], [root, -0.33], [radius - 0.4 * MODULE, -0.28], [radius, -0.24], [tip, -0.13], [tip, 0.13], [radius, 0.24], [radius - 0.4 * MODULE, 0.28], [root, 0.33], [root, 0.5]];
+function arrow(context, length) {
+  context.beginPath();
+  context.moveTo(0, 0);
+  context.lineTo(length, 0);
+  context.stroke();
+  context.beginPath();
+  for (const [back, aside] of [[12, -7], [0, 0], [12, 7]]) context.lineTo(length + 4 - Math.sign(length) * back, aside);
+  context.fill();
+}
+
+const involute = (radius, base) => Math.sqrt((radius / base) ** 2 - 1) - Math.acos(base / radius);
+
+// The outlines of a gear's involute teeth near the mesh, of one tooth, and of a crack in its root, about the x axis.
+function shape(n) {
+  const step = (2 * Math.PI) / n, radius = (n * MODULE) / 2, root = radius - 1.25 * MODULE, base = radius * Math.cos(PRESSURE);
+  const radii = [...Array(9).keys()].map((i) => root + (i / 8) * 2.25 * MODULE);
+  const flank = radii.map((r) => [r, HALF * step + involute(radius, base) - involute(Math.max(r, base), base)]);
+  const tooth = [...flank.map(([r, angle]) => [r, -angle]), ...flank.reverse()];
+  const beside = Math.ceil(0.2 * n), end = (beside + 0.5) * step;
+  const outline = [...Array(2 * beside + 1).keys()].flatMap((k) => tooth.map(([r, angle]) => [r, angle + (k - beside) * step]));
+  const body = path(outline);
+  body.arc(0, 0, root - RIM, end, -end, true);
+  const crack = [[root + 3, -0.33], [root - 3, -0.16], [root - 2, -0.05], [root - 7, 0.1]];
+  return { step, outline: path(outline), body, tooth: path(tooth), crack: path(crack.map(([r, share]) => [r, share * step])) };
+}
+
+function path(points) {
+  const result = new Path2D();
+  for (const [r, angle] of points) result.lineTo(r * Math.cos(angle), r * Math.sin(angle));
+  return result;
+}
+
+// One gear, of which only the teeth near the mesh are seen. It is turned by a number of teeth from where its first one is in
+// mesh at the angle `facing`; the number of the cracked tooth is negative where teeth are counted the other way round.
+function wheel(context, x, { step, outline, body, tooth, crack }, facing, turned, cracked, colours, ink) {
   context.save();
   context.translate(x, 0);
-  for (let k = 0; k < n; k++) {
-    const middle = angleOf(k), isCracked = k + 1 === cracked;
-    context.beginPath();
-    for (const [r, share] of profile) context.lineTo(r * Math.cos(middle + share * step), -r * Math.sin(middle + share * step));
-    const inner = root - RIM;
-    context.lineTo(inner * Math.cos(middle + step / 2), -inner * Math.sin(middle + step / 2));
-    context.lineTo(inner * Math.cos(middle - step / 2), -inner * Math.sin(middle - step / 2));
-    context.closePath();
-    context.fillStyle = isCracked ? colours.fault : colours.measured;
-    context.globalAlpha = isCracked ? 0.75 : 0.25;
-    context.fill();
-    context.globalAlpha = 1;
-    context.strokeStyle = isCracked ? colours.fault : colours.measured;
-    context.lineWidth = 1;
-    context.stroke();
-    if (isCracked) {
-      context.strokeStyle = ink;
-      context.lineWidth = 2.5;
-      context.beginPath();
-      for (const [r, share] of [[root + 3, 0.33], [root - 3, 0.16], [root - 2, 0.05], [root - 7, -0.1]]) context.lineTo(r * Math.cos(middle + share * step), -r * Math.sin(middle + share * step));
-      context.stroke();
-    }
+  context.rotate(facing + (turned % 1) * step);
+  context.lineWidth = 1;
+  paint(context, body, outline, colours.measured, 0.25);
+  if (cracked) {
+    context.rotate((Math.trunc(turned) + cracked - Math.sign(cracked)) * step);
+    paint(context, tooth, tooth, colours.fault, 0.75);
+    context.strokeStyle = ink;
+    context.lineWidth = 2.5;
+    context.stroke(crack);
   }
   context.restore();
+}
+
+function paint(context, body, outline, colour, opacity) {
+  context.fillStyle = context.strokeStyle = colour;
+  context.globalAlpha = opacity;
+  context.fill(body);
+  context.globalAlpha = 1;
+  context.stroke(outline);
 }
 
 function ready(canvas) {

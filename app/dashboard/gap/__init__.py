@@ -345,7 +345,7 @@ def _show_panels(report: GapReport) -> None:
             steps[:N_BARS], "remaining gap (structural floors)", "remaining gap", limits=_reach(steps), span=(0.0, 1.0)
         ),
     }
-    about = {"How far": "One floor, shaded, is how far healthy machines differ from their simulation or reference."}
+    about = {"How far": "The gap over all features. Shaded: one floor, as far as healthy machines differ."}
     columns = st.container(key="gap-panels").columns(3)
     for column, (title, panel) in zip(columns, panels.items(), strict=True):
         with column.container(border=True, height="stretch"):

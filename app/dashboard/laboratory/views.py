@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from html import escape
+from io import BytesIO
 from math import isfinite
 
 import numpy as np
 import streamlit as st
+from scipy.io import wavfile
 
 from app.dashboard import address
 from app.dashboard.components import component_of
@@ -351,12 +353,12 @@ def show_gears(healthy: LaboratoryRun, faulty: LaboratoryRun | None, channel: st
             "colours": {"measured": colours.measured, "fault": colours.fault},
         },
     )
-    st.caption("A few hundred times slower. The line with a dot is the mesh force; the coloured tooth is faulty.")
+    st.caption("In slow motion. The arrow is the mesh force" + ("; the coloured tooth is faulty." if teeth else "."))
     largest = max(float(np.abs(run.recording.values(channel)).max()) for run in both) or 1.0
     for column, run, name in zip(st.columns(2), both, ("Healthy", "Faulty"), strict=False):
         with column:
             st.caption(f"{name}, as heard by the sensor")
-            st.audio(_sound(run, channel, largest), sample_rate=LISTEN_HZ)
+            st.audio(_sound(run, channel, largest))
 
 
 def _over_cycles(run: LaboratoryRun, channel: str, cycles: FloatArray) -> FloatArray:
@@ -366,12 +368,18 @@ def _over_cycles(run: LaboratoryRun, channel: str, cycles: FloatArray) -> FloatA
     return np.interp(time, np.arange(len(values)) / run.recording.sampling_rate_hz, values)
 
 
-def _sound(run: LaboratoryRun, channel: str, largest: float) -> FloatArray:
-    """Return two seconds of the channel, on the same loudness scale for both machines, repeated if it is shorter."""
+def _sound(run: LaboratoryRun, channel: str, largest: float) -> bytes:
+    """Return two seconds of the channel as WAV, on the same loudness scale for both machines, repeated if shorter.
+
+    Streamlit would bring an array to full loudness, and the faulty machine would sound no louder than the healthy one.
+    """
     values, rate_hz = run.recording.values(channel) / largest, run.recording.sampling_rate_hz
     n = round(LISTEN_HZ * min(2.0, len(values) / rate_hz))
     once = np.interp(np.arange(n) / LISTEN_HZ, np.arange(len(values)) / rate_hz, values)
-    return np.tile(once, max(1, round(2.0 * LISTEN_HZ / n)))
+    file = BytesIO()
+    sound = np.tile(32767 * once, max(1, round(2.0 * LISTEN_HZ / n)))
+    wavfile.write(file, LISTEN_HZ, sound.astype(np.int16))
+    return file.getvalue()
 
 
 View = Callable[[LaboratoryRun, LaboratoryRun | None, str], None]

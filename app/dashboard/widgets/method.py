@@ -476,7 +476,7 @@ def show_answer(page: MethodPage, answer: MethodAnswer, angle: ShaftAngle | Cann
     """Show what was found: words, figures, waveforms, tables."""
     for fact in answer.facts:
         st.markdown("".join(part if part in (" ", "**") else as_typed(part) for part in _SPOKEN.split(fact)))
-    show_warnings([capitalised(text) for text in answer.warnings])
+    show_warnings(answer.warnings)
     span = 60.0
     if any(isinstance(panel, LevelPanel) and panel.span is None for panel in answer.panels):
         slider, read = more.slider, address.number(20, 120, whole=True)
@@ -487,7 +487,7 @@ def show_answer(page: MethodPage, answer: MethodAnswer, angle: ShaftAngle | Cann
         _show_space(page, answer.path)
     elif not answer.panels and answer.waveforms is None:
         charts.show_figure(answer.draw(), f"{answer.caption}, {answer.channel}", page.key("figure"))
-    show_warnings([capitalised(note) for note in answer.notes], quiet=True)
+    show_warnings(answer.notes, quiet=True)
     if answer.waveforms is not None and "signal" in answer.waveforms.columns:
         _show_waveforms(page, answer.waveforms, angle)
     for what, table in answer.tables.items():

@@ -12,7 +12,7 @@ import streamlit as st
 
 from gearsig.diagnosis import CannotTell
 from gearsig.errors import GearsigError, InputError
-from gearsig.formatting import with_minus
+from gearsig.formatting import sentence, with_minus
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -193,7 +193,7 @@ def show_warnings(warnings: Sequence[str], *, quiet: bool = False) -> None:
     """Show an answer's warnings in one box, or quietly as small print; names in them come from files."""
     if not warnings:
         return
-    lines = [as_typed(in_page_text(text)) for text in warnings]
+    lines = [as_typed(in_page_text(sentence(text))) for text in warnings]
     text = lines[0] if len(lines) == 1 else "\n".join(f"- {line}" for line in lines)
     if quiet:
         st.caption(text)
@@ -203,7 +203,7 @@ def show_warnings(warnings: Sequence[str], *, quiet: bool = False) -> None:
 
 def show_checks(checks: Iterable[tuple[bool, str]]) -> None:
     """Show line by line which statements hold and which do not; texts may come from files."""
-    with st.container(gap=None):
+    with st.container(key="checks", gap=None):
         for holds, text in checks:
             mark = ":green[:material/check:]" if holds else ":orange[:material/priority_high:]"
             st.markdown(f"{mark} {as_typed(text)}")

@@ -159,17 +159,18 @@ def show_verdict_picture(analysis: Analysis) -> None:
         panel = replace(panel, lines=lines)
         show_lines(panel, state.view_key(place, analysis), marked=marked_points, legend=True, height_px=260)
         if picture.finding is not None:
-            st.caption(as_typed(f"{picture.finding.title} Circled: where an order crosses it."))
+            st.markdown(f"**{as_typed(picture.finding.title)}**")
+            st.caption("Circled: where an order crosses it.")
         return
     if picture.about == "bearing":
         spectrum = channel.envelope_spectrum
         cursors = bearing_cursors(analysis, spectrum) if spectrum is not None else ()
         code = picture.finding.code if picture.finding is not None else ""
         named = next((part for part, (words, _) in BEARING_PARTS.items() if words.replace(" ", "-") in code), "")
-        of = f" {picture.finding.where.bearing}" if picture.finding is not None else ""  # the verdict says it
-        cursors = tuple(
-            replace(cursor, label=cursor.label.removesuffix(of)) for cursor in cursors if named in cursor.label
-        )
+        bearing = picture.finding.where.bearing if picture.finding is not None else None
+        # the verdict says which bearing, and of others with the same orders
+        short = (replace(cursor, label=cursor.label.removesuffix(f" {bearing}")) for cursor in cursors)
+        cursors = tuple(cursor for cursor in short if cursor.label.endswith(named))
     else:
         spectrum = channel.order_spectrum or channel.spectrum
         cursors = line_cursors(analysis, spectrum, n_sidebands=1)
