@@ -205,10 +205,11 @@ def _interval_heights(x: FloatArray) -> FloatArray:
     The skirts of a line are not lines: only the largest bin within two bins on either side counts. A candidate may thus
     miss a line's centre by half a bin.
     """
-    from scipy.ndimage import maximum_filter1d
-
-    lines = np.where((x > 0.0) & (x >= maximum_filter1d(x, 5, mode="nearest")), x, 0.0)
-    return np.maximum(lines[:-1], lines[1:])
+    beyond = np.pad(x, 2, mode="edge")
+    pairs = np.maximum(beyond[:-1], beyond[1:])
+    largest = np.maximum(np.maximum(pairs[:-3], pairs[2:-1]), beyond[4:])  # of five
+    lines = np.where(x >= largest, x, 0.0)
+    return np.maximum(np.maximum(lines[:-1], lines[1:]), 0.0)
 
 
 def _mean_power(x: FloatArray, n_segment: int) -> FloatArray:
@@ -217,7 +218,7 @@ def _mean_power(x: FloatArray, n_segment: int) -> FloatArray:
     precision = np.result_type(x.dtype, np.float32)
     window = _hann(n_segment, precision)
     step = max(1, n_segment // 2)
-    power = np.zeros(n_segment // 2 + 1)
+    power = np.zeros(n_segment // 2 + 1, precision)
     for start in range(0, len(x) - n_segment + 1, step):
         segment = x[start : start + n_segment]
         lines = rfft((segment - segment.mean(dtype=np.float64)).astype(precision) * window, overwrite_x=True)
@@ -236,13 +237,15 @@ def _log_ratio(power: FloatArray) -> FloatArray:
 
     Values are clipped at 9, i.e. 39 dB: a higher line is no stronger evidence of a line.
     """
-    tiny = max(float(power.max()) * 1e-24, 1e-300)
+    tiny = max(float(power.max()) * 1e-24, float(np.finfo(power.dtype).tiny))
     log_power = np.log(np.maximum(power, tiny))
     length = min(96, len(power))
     n_blocks = len(power) // length
-    medians = np.median(log_power[: n_blocks * length].reshape(n_blocks, length), axis=1)
+    # Vector instructions sort such short rows ten times as fast as they are partitioned.
+    ascending = np.sort(log_power[: n_blocks * length].reshape(n_blocks, length), axis=1)
+    medians = ascending[:, (length - 1) // 2 : length // 2 + 1].mean(axis=1)
     middles = (np.arange(n_blocks) + 0.5) * length
-    over: FloatArray = log_power - np.interp(np.arange(len(power)), middles, medians)
+    over: FloatArray = log_power - np.interp(np.arange(len(power)), middles, medians).astype(power.dtype)
     return np.clip(over, -2.0, 9.0)
 
 
