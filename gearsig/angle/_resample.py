@@ -408,10 +408,10 @@ def resample_to_angle(
     Returns
     -------
     AngleSignal
-        In the units of the channels and in the recording's precision. Sample i lies at start_revolution + i / samples_per_revolution; the start is a
-        whole step, so that revolution 0 of the shaft angle falls on the grid. The first and last 24 samples of the
-        recording (more if the grid is coarse) have no complete kernel and are left out. The error is below 5e-6 of full
-        scale up to 0.4 of the lower of both sampling rates.
+        In the units of the channels and the precision of the samples. Sample i lies at start_revolution
+        + i / samples_per_revolution; the start is a whole step, so that revolution 0 of the shaft angle falls on the
+        grid. The first and last 24 samples of the recording (more if the grid is coarse) have no complete kernel and
+        are left out. The error is below 5e-6 of full scale up to 0.4 of the lower of both sampling rates.
 
     Raises
     ------
