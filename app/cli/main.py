@@ -6,6 +6,8 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Sequence
+from contextlib import suppress
+from errno import ENOSPC
 from functools import cache
 
 import typer
@@ -84,6 +86,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except BrokenPipeError:  # the reader of our output has gone, e.g. `| head`
         sys.stderr.close()
         sys.exit(0)
+    except OSError as error:  # standard output goes to a disk that is full; files say so themselves
+        if error.errno != ENOSPC:
+            raise
+        typer.echo(f"gearsig: output cannot be written ({error.strerror}); make room on its disk", err=True)
+        with suppress(OSError):
+            sys.stdout.close()
+        sys.exit(EXIT_INPUT_ERROR)
 
 
 @cache

@@ -408,10 +408,10 @@ def resample_to_angle(
     Returns
     -------
     AngleSignal
-        In the units of the channels. Sample i lies at start_revolution + i / samples_per_revolution; the start is a
-        whole step, so that revolution 0 of the shaft angle falls on the grid. The first and last 24 samples of the
-        recording (more if the grid is coarse) have no complete kernel and are left out. The error is below 5e-6 of full
-        scale up to 0.4 of the lower of both sampling rates.
+        In the units of the channels and the precision of the samples. Sample i lies at start_revolution
+        + i / samples_per_revolution; the start is a whole step, so that revolution 0 of the shaft angle falls on the
+        grid. The first and last 24 samples of the recording (more if the grid is coarse) have no complete kernel and
+        are left out. The error is below 5e-6 of full scale up to 0.4 of the lower of both sampling rates.
 
     Raises
     ------
@@ -442,7 +442,7 @@ def resample_to_angle(
             allowed=f"at most {_MAX_VALUES:.3g} values in all",
             remedy="lower it or cut the recording",
         )
-    samples = np.empty((len(rows), n))
+    samples = np.empty((len(rows), n), np.result_type(recording.samples, np.float32))
     _fill(recording, rows, shaft_angle, first, n_per_rev, samples)
     return AngleSignal(
         samples,
@@ -539,8 +539,11 @@ def _fill(
         times_at(knots, revolutions, speeds, knot, begin, 1.0 / n_per_rev, times)
         around = slice(knot, min(len(knots), int(np.searchsorted(knots, times[-1])) + 1))
         # The speed is interpolated linearly between knots: if no knot is slow, no time between them is.
-        coarse = float(speeds[around].min()) * n_per_rev / rate < 1.0 - 1e-6
-        if coarse:
+        slowest, fastest = (n_per_rev / rate * float(speed) for speed in (speeds[around].min(), speeds[around].max()))
+        coarse = slowest < 1.0 - 1e-6
+        if coarse and fastest <= _STEP * slowest:  # one cut-off serves all
+            scale = np.full(len(times), max(0.5 * (slowest + fastest), LOWEST_SCALE))
+        elif coarse:
             scale = np.clip(n_per_rev / rate * np.interp(times, knots[around], speeds[around]), LOWEST_SCALE, 1.0)
             coarse = float(scale.min()) < 1.0 - 1e-6
         times *= rate

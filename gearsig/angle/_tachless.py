@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +15,7 @@ from gearsig.angle._comb import (
     NARROW,
     TOP,
     CombLines,
+    ComplexArray,
     SpeedCandidate,
     SpeedSearch,
     best_decision,
@@ -90,7 +91,12 @@ class _Harmonic:
 
 
 def refine_by_phase(
-    recording: Recording, channels: tuple[str, ...], angle: ShaftAngle, orders: tuple[float, ...]
+    recording: Recording,
+    channels: tuple[str, ...],
+    angle: ShaftAngle,
+    orders: tuple[float, ...],
+    *,
+    transforms: Sequence[ComplexArray] = (),
 ) -> ShaftAngle:
     """Return the angle over which the strongest mesh harmonics have constant phase.
 
@@ -106,6 +112,8 @@ def refine_by_phase(
         Wrong by less than half an order at the mesh harmonic, i.e. 2 % for 23 teeth.
     orders : tuple of float
         Mesh harmonics.
+    transforms : sequence of arrays
+        The `rfft` of each channel, if known.
 
     Notes
     -----
@@ -115,7 +123,8 @@ def refine_by_phase(
     (2013).
     """
     if orders:
-        recording = _thinned(recording, channels, (max(orders) + 2.0) * angle.speed_range_rpm[1] / 60.0)
+        highest_hz = (max(orders) + 2.0) * angle.speed_range_rpm[1] / 60.0
+        recording = _thinned(recording, channels, highest_hz, transforms)
     # In orders of the shaft around the mesh order: below one, so that the shaft's sidebands stay outside.
     for half_width in (0.45, 0.45, 0.3, 0.2):
         refined = _refined_once(recording, channels, angle, orders, half_width)
@@ -125,12 +134,14 @@ def refine_by_phase(
     return angle
 
 
-def _thinned(recording: Recording, channels: tuple[str, ...], highest_hz: float) -> Recording:
+def _thinned(
+    recording: Recording, channels: tuple[str, ...], highest_hz: float, transforms: Sequence[ComplexArray]
+) -> Recording:
     """Return the channels decimated to 3.5 times the highest frequency of interest, if that halves the rate or more."""
     from scipy.fft import irfft, next_fast_len, rfft
 
     n, rate = recording.n_samples, recording.sampling_rate_hz
-    n_padded = next_fast_len(n, real=True)
+    n_padded = n if transforms else next_fast_len(n, real=True)
     n_thin = next_fast_len(math.ceil(3.5 * highest_hz / rate * n_padded), real=True)
     if n_thin > n_padded / 2:
         return recording
@@ -138,9 +149,9 @@ def _thinned(recording: Recording, channels: tuple[str, ...], highest_hz: float)
     kept = np.clip((hertz[-1] - hertz) / (hertz[-1] - 1.2 * highest_hz), 0.0, 1.0)
     response = n_thin / n_padded * np.sin(np.pi / 2 * kept) ** 2
     thin = np.empty((len(channels), n * n_thin // n_padded))
-    for name, row in zip(channels, thin, strict=True):
-        lines = rfft(recording.values(name), n_padded)[: len(response)]  # in the samples' precision
-        row[:] = irfft(lines * response, n_thin, overwrite_x=True)[: len(row)]
+    known = transforms or (rfft(recording.values(name), n_padded) for name in channels)  # in the samples' precision
+    for lines, row in zip(known, thin, strict=True):
+        row[:] = irfft(lines[: len(response)] * response, n_thin, overwrite_x=True)[: len(row)]
     return replace(recording.select(channels), samples=thin, sampling_rate_hz=rate * n_thin / n_padded)
 
 
@@ -286,7 +297,9 @@ def _rank(candidate: SpeedCandidate) -> tuple[bool, float]:
 
 def _refined(search: SpeedSearch, angle: ShaftAngle) -> SpeedCandidate | None:
     """Refine an angle by phase and score the comb over the order spectrum, where a correct angle gives sharp lines."""
-    refined = refine_by_phase(search.recording, search.channels, angle, search.comb.mesh_harmonics)
+    refined = refine_by_phase(
+        search.recording, search.channels, angle, search.comb.mesh_harmonics, transforms=search.transforms
+    )
     signal = _over_angle(search, refined)
     if signal is None:
         return None
@@ -365,6 +378,7 @@ def estimate_shaft_angle(
     channels: Sequence[str] | None = None,
     speed_range_rpm: tuple[float, float] | None = None,
     explained: bool = True,
+    transform: Callable[[str], ComplexArray] | None = None,
 ) -> ShaftAngle:
     """Estimate the angle of the reference shaft from mesh harmonics, their sidebands and shaft harmonics.
 
@@ -384,6 +398,8 @@ def estimate_shaft_angle(
         sampling rate and duration allow.
     explained : bool
         Whether a refusal states at which other speed a comb was found, which takes about as long as the search.
+    transform : callable, optional
+        Returns a channel's `rfft`, to reuse it; not used unless it is of all samples.
 
     Returns
     -------
@@ -400,7 +416,7 @@ def estimate_shaft_angle(
     -----
     Not for friction or belt drives, nor for speeds that change by more than a few per cent within a revolution.
     """
-    search = search_of(recording, rig, channels, speed_range_rpm)
+    search = search_of(recording, rig, channels, speed_range_rpm, transform)
     steady = _constant_speed(search)
     varying = varying_speed(search, steady if _is_sharp(search, steady) else None)
     candidate = _better(search, steady, varying)
@@ -415,7 +431,9 @@ def estimate_shaft_angle(
             "the speed that follows from the mesh lines jumps briefly, as no shaft can: the phase slips by cycles",
             remedy="give a tachometer, or a recording with less noise",
         )
-    return estimate_shaft_angle(recording, rig, channels=channels, speed_range_rpm=usual, explained=explained)
+    return estimate_shaft_angle(
+        recording, rig, channels=channels, speed_range_rpm=usual, explained=explained, transform=transform
+    )
 
 
 def _range_without_slips(angle: ShaftAngle) -> tuple[float, float] | None:
@@ -507,7 +525,7 @@ def find_offset_comb(recording: Recording, rig: Rig, stated_speed_rpm: float) ->
 def _constant_speed(search: SpeedSearch) -> SpeedCandidate | None:
     """Return the best comb over the spectrum of the whole recording, or of shorter parts if its lines are wider."""
     rate = search.recording.sampling_rate_hz
-    decision = best_decision(search.samples, rate, search.comb, search.low, search.high)
+    decision = best_decision(search.samples, rate, search.comb, search.low, search.high, search.transforms)
     if decision is None:
         return None
     times = np.array([0.0, search.recording.duration_s])

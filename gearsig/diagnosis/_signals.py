@@ -260,7 +260,11 @@ def _halves(signal: AngleSignal, average: SynchronousAverage) -> tuple[Synchrono
     """Average the odd and the even revolutions separately; what the machine does is in both."""
     revolutions = whole_revolutions(signal, average.channel)
     odd, even = (
-        replace(average, values=revolutions[start::2].mean(axis=0), n_revolutions=len(revolutions[start::2]))
+        replace(
+            average,
+            values=revolutions[start::2].mean(axis=0, dtype=np.float64),
+            n_revolutions=len(revolutions[start::2]),
+        )
         for start in (0, 1)
     )
     return odd, even

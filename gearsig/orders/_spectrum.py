@@ -137,17 +137,21 @@ def order_spectrum(
     >>> round(float(spectrum.values[spectrum.index_of(3.0)]), 9)
     2.0
     """
+    from scipy.fft import rfft
+
     one_of(scaling, "scaling", ORDER_SCALINGS)
     signal, channel = over_angle(signal, channel, shaft, shaft_angle, speed_rpm)
-    revolutions = whole_revolutions(signal, channel)
+    revolutions, transform = whole_revolutions(signal, channel), None
     n_rev, per_rev = revolutions.shape
     if revolutions_per_block is not None:
         count(revolutions_per_block, "revolutions_per_block")
         if revolutions_per_block > n_rev:
             raise InputError(f"revolutions_per_block is {revolutions_per_block}", allowed=f"1 to {n_rev}")
         n_rev = revolutions_per_block
-    elif n_rev >= MANY_REVOLUTIONS:
-        n_rev = fast_length(n_rev)
+    else:
+        n_rev = fast_length(n_rev) if n_rev >= MANY_REVOLUTIONS else n_rev
+        revolutions = revolutions[:n_rev]
+        transform = rfft(revolutions.reshape(-1))  # in the samples' precision
     plan = plan_blocks(revolutions.size, n_rev * per_rev, overlap, window)
     return spectrum_of_blocks(
         revolutions.reshape(-1),
@@ -159,6 +163,7 @@ def order_spectrum(
         axis="order",
         highest=signal.highest_order,
         shaft=signal.shaft_angle.shaft,
+        transform=transform,
     )
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from itertools import pairwise
 from operator import itemgetter
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gearsig.angle import ShaftAngle, estimate_shaft_angle, find_shaft_angle, refine_by_phase
 from gearsig.errors import InputError, RefusalError
@@ -54,7 +55,11 @@ MAINS_TOLERANCE = 0.002
 Twice the limit for hum in a recording's quality: these lines are only left out, or treated as confirming nothing."""
 
 
-def refined_angle(recording: Recording, rig: Rig) -> ShaftAngle:
+Transform = Callable[[str], NDArray[np.complexfloating]]
+"""Returns the `rfft` of a channel by its name."""
+
+
+def refined_angle(recording: Recording, rig: Rig, transform: Transform | None = None) -> ShaftAngle:
     """Return the angle of the reference shaft, refining a stated speed if the signal shows the true one near it.
 
     Synchronous averages need the speed to a small fraction of a revolution over the whole record, and nameplates are
@@ -65,6 +70,7 @@ def refined_angle(recording: Recording, rig: Rig) -> ShaftAngle:
     recording : Recording
     rig : Rig
         Its speed source is used if the recording has none.
+    transform : callable or None
 
     Raises
     ------
@@ -81,9 +87,9 @@ def refined_angle(recording: Recording, rig: Rig) -> ShaftAngle:
             remedy="check the speed's unit and the sampling rate",
         )
     if isinstance(recording.speed_source, ConstantSpeed):
-        return _refined(recording, rig, angle)
+        return _refined(recording, rig, angle, transform)
     if isinstance(recording.speed_source, SpeedChannel):
-        return _rescaled(recording, rig, angle)
+        return _rescaled(recording, rig, angle, transform)
     return angle
 
 
@@ -114,7 +120,7 @@ def phase_followed_angle(recording: Recording, rig: Rig, estimated: ShaftAngle) 
     )
 
 
-def _refined(recording: Recording, rig: Rig, stated: ShaftAngle) -> ShaftAngle:
+def _refined(recording: Recording, rig: Rig, stated: ShaftAngle, transform: Transform | None) -> ShaftAngle:
     """Return the speed that mesh lines or shaft harmonics show near the stated one, else the stated one.
 
     Raises
@@ -122,7 +128,10 @@ def _refined(recording: Recording, rig: Rig, stated: ShaftAngle) -> ShaftAngle:
     RefusalError
         If the strongest line near it varies, so that there is no single speed.
     """
-    by_lines = _from_meshes(recording, rig, stated) if rig.pairs else _from_shaft_harmonics(recording, stated)
+    if rig.pairs:
+        by_lines = _from_meshes(recording, rig, stated, transform)
+    else:
+        by_lines = _from_shaft_harmonics(recording, stated)
     if by_lines is None:
         if not rig.pairs:
             _refuse_a_wandering_speed(recording, stated)
@@ -175,14 +184,14 @@ def _refuse_a_wandering_speed(recording: Recording, stated: ShaftAngle) -> None:
             )
 
 
-def _rescaled(recording: Recording, rig: Rig, measured: ShaftAngle) -> ShaftAngle:
+def _rescaled(recording: Recording, rig: Rig, measured: ShaftAngle, transform: Transform | None) -> ShaftAngle:
     """Return a steady speed channel's angle, rescaled if the mesh lines show another speed.
 
     Speed channels are accurate to a part in a hundred or a thousand, which is revolutions in a long record.
     """
     if not rig.pairs or not measured.is_steady(STEADY):
         return measured
-    by_lines = _from_meshes(recording, rig, measured)
+    by_lines = _from_meshes(recording, rig, measured, transform)
     if by_lines is None:
         return measured
     difference = by_lines.mean_speed_rpm / measured.mean_speed_rpm - 1
@@ -193,11 +202,11 @@ def _rescaled(recording: Recording, rig: Rig, measured: ShaftAngle) -> ShaftAngl
     return replace(by_lines, shaft=measured.shaft, notes=(*by_lines.notes, note))
 
 
-def _from_meshes(recording: Recording, rig: Rig, stated: ShaftAngle) -> ShaftAngle | None:
+def _from_meshes(recording: Recording, rig: Rig, stated: ShaftAngle, transform: Transform | None) -> ShaftAngle | None:
     speed = stated.mean_speed_rpm
     limits = (speed * (1 - STATED_SPEED_TOLERANCE), speed * (1 + STATED_SPEED_TOLERANCE))
     try:
-        by_lines = estimate_shaft_angle(recording, rig, speed_range_rpm=limits, explained=False)
+        by_lines = estimate_shaft_angle(recording, rig, speed_range_rpm=limits, explained=False, transform=transform)
     except RefusalError:
         return None
     # An estimate that follows a profile may leave the range, for the mesh of wrong tooth counts.

@@ -381,10 +381,10 @@ def _mask_multiples(
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator,unused-ignore]
 def _comb_totals(scores, candidates, origins, factors, first, resolution, inside_once):  # type: ignore[no-untyped-def]
     """Sum the scores nearest to origin + factor · candidate, and note which terms were on the spectrum at all."""
-    total = np.zeros(len(candidates))
+    total, per_resolution = np.zeros(len(candidates)), 1.0 / resolution
     for i in range(len(factors)):
         for j in range(len(candidates)):
-            index = int(np.rint((origins[i] + factors[i] * candidates[j] - first) / resolution))
+            index = int(np.rint((origins[i] + factors[i] * candidates[j] - first) * per_resolution))
             if 0 <= index < len(scores):
                 inside_once[i] = True
                 total[j] += scores[index]

@@ -157,7 +157,8 @@ class PreparedRecording:
             If the speed source is malformed.
         """
         return self.keep(
-            "angle", lambda: refined_angle(self.recording, self.rig).between(0.0, self.recording.duration_s)
+            "angle",
+            lambda: refined_angle(self.recording, self.rig, self.transform).between(0.0, self.recording.duration_s),
         )
 
     @property

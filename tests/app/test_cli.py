@@ -463,3 +463,14 @@ def test_a_dashboard_whose_output_nobody_reads_stops_when_it_is_told_to() -> Non
             assert server.wait(20) == 0
         finally:
             server.kill()
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no device that is always full")
+def test_output_to_a_full_disk_is_one_line_and_a_code() -> None:
+    command = [sys.executable, "-c", "from app.cli.main import main; main(['rig', 'example'])"]
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.splitlines() == [
+        "gearsig: output cannot be written (No space left on device); make room on its disk"
+    ]
