@@ -1,7 +1,8 @@
 """Depth of a crack in a tooth root: millimetres and percent with an interval, or why it cannot be estimated.
 
 `estimate_crack` returns a `CrackEstimate` or `NoCrackSeen`, or refuses. Its `Calibration` comes from simulated cracks,
-made by `python -m app.studies.crack_severity`.
+made by `python -m app.studies.crack_severity`. `tooth_error_evidence` says what encoders on both shafts show of a
+damaged tooth; it was learned by `python -m app.studies.gap.tooth_errors`.
 """
 
 from gearsig.severity._estimate import (
