@@ -454,6 +454,9 @@ def percent_per_mm(teeth: int, module_mm: float, pressure_angle_deg: float = 20.
 TEETH_COUNT = "Teeth count from 1 at the mark in order of engagement; the place is good to about one tooth."
 """Beside the number of a tooth."""
 
+NO_MARK = "There is no mark on this shaft: the angle holds for this record only, and names no tooth."
+WHOLE_WIDTH = "The depth assumes a crack through the whole face width."
+
 SMALLEST_AGREEMENT = 0.4
 """Agreement of the tooth pattern with the reference's: other gears reach 0.38 once in a hundred cases; the right ones
 fall below it only where a deep crack dominates the pattern."""
@@ -622,10 +625,9 @@ def _encoder_text(encoders: ToothErrorEvidence) -> str:
     likeliest, p = next(iter(encoders.probabilities.items()))
     kind = KIND_OF_FAULT.get(likeliest, "out of its place")
     where = f" of the {'driver' if encoders.gear == SIDES[0] else 'driven gear'}" if encoders.gear else ""
-    like = (
-        "" if encoders.is_unlike_any else f", most like a tooth{where} that is {kind} ({odds_text(p)} of tooth faults)"
-    )
-    return f"By the encoders, the transmission error changed by {encoders.rms_um:.2g} µm rms at one tooth{like}"
+    like = f", which looks like a tooth{where} that is {kind} ({odds_text(p)} of tooth faults)"
+    changed = f"By the encoders, the transmission error changed by {encoders.rms_um:.2g} µm rms where it changed most"
+    return changed if encoders.is_unlike_any else changed + like
 
 
 def _by_encoders(encoders: ToothErrorEvidence, prepared: PreparedRecording, facts: PairFacts) -> CrackEstimate | None:
@@ -634,20 +636,22 @@ def _by_encoders(encoders: ToothErrorEvidence, prepared: PreparedRecording, fact
     if encoders.odds_of_a_tooth < CLEARLY_A_TOOTH or sum(faults.values()) < 0.5:
         return None
     is_driven = encoders.gear == SIDES[1]
+    text = f"{_encoder_text(encoders)}; the depth follows from its size and the load."
     shaft, teeth = ((facts.pair.driver, facts.driver_teeth), (facts.pair.driven, facts.driven_teeth))[is_driven]
+    has_mark = prepared.has_mark(shaft)
     weights = {kind: p * FAULT_PRIORS[kind] for kind, p in faults.items()}
     normal_n_per_mm = facts.load_mpa * facts.module_mm / cos(radians(PRESSURE_ANGLE_DEG))
     log_percent, spread = load_known_tooth_errors().log_percent(encoders.rms_um, normal_n_per_mm, teeth)
     return CrackEstimate(
         shaft=shaft,
         gear=f"{facts.pair.name}/{shaft}",
-        tooth=(round(encoders.place_rev * teeth - MIDDLE) % teeth) + 1 if prepared.has_mark(shaft) else None,
+        tooth=(round(encoders.place_rev * teeth - MIDDLE) % teeth) + 1 if has_mark else None,
         angle_deg=360.0 * encoders.place_rev,
         gear_is_certain=bool(encoders.gear),
         **_depth(log_percent, WITHIN_90_PERCENT * spread, percent_per_mm(teeth, facts.module_mm)),
         p_value=1.0 / encoders.odds_of_a_tooth,
         with_reference=True,
-        reasons=(f"{_encoder_text(encoders)}; the depth follows from its size and the load.", TEETH_COUNT),
+        reasons=(text, TEETH_COUNT if has_mark else NO_MARK, WHOLE_WIDTH),
         kind_probabilities={kind: weights[kind] / sum(weights.values()) for kind in KINDS},
     )
 
@@ -812,11 +816,7 @@ def _crack_estimate(
     per_mm = percent_per_mm(teeth, facts.module_mm)
     place = (best.event.centre_rev - calibration.lag_pitches / teeth) % 1.0
     further_prominences = [e.event.prominence for e in gears if e is not best]
-    if best.shaft.has_mark:
-        reasons.append(TEETH_COUNT)
-    else:
-        reasons.append("There is no mark on this shaft: the angle holds for this record only, and names no tooth.")
-    reasons.append("The depth assumes a crack through the whole face width.")
+    reasons += [TEETH_COUNT if best.shaft.has_mark else NO_MARK, WHOLE_WIDTH]
     way = ALONE if best.agreement is None else WITH_REFERENCE
     return CrackEstimate(
         shaft=shaft,
