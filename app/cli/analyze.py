@@ -90,8 +90,8 @@ def crack(
     It reports "no crack seen, below … mm" if none stands out and one through half of the root would have; it refuses
     machines outside its calibration (by simulation). With --reference it is much more certain, and cracks of a
     millimetre become visible. It also says whether the tooth may be chipped or spalled instead. Fine encoders on both
-    shafts, in both recordings, count as well. With --channel it uses only some of the accelerations, e.g. to leave out a
-    dead one.
+    shafts, in both recordings, count as well. With --channel it uses only some of the accelerations, e.g. to leave
+    out a dead one.
 
     Example: gearsig crack sample_data/root_crack_3mm.h5 --reference sample_data/root_crack_0mm.h5
     """
