@@ -613,9 +613,6 @@ KIND_OF_FAULT = {CRACK: CRACKED, "chipped_tooth": CHIPPED, "tooth_spall": SPALLE
 FAULT_PRIORS = {CRACKED: 0.5, CHIPPED: 0.25, SPALLED: 0.25}
 """As in `KindModel`."""
 
-MIDDLE = 0.85
-"""Middle of a tooth's engagement, in pitches from its beginning, at a usual contact ratio."""
-
 WITHIN_90_PERCENT = 1.645
 """Half of the interval that holds 90 % of a normal distribution, in standard deviations."""
 
@@ -645,7 +642,7 @@ def _by_encoders(encoders: ToothErrorEvidence, prepared: PreparedRecording, fact
     return CrackEstimate(
         shaft=shaft,
         gear=f"{facts.pair.name}/{shaft}",
-        tooth=(round(encoders.place_rev * teeth - MIDDLE) % teeth) + 1 if has_mark else None,
+        tooth=int(encoders.place_rev * teeth) % teeth + 1 if has_mark else None,
         angle_deg=360.0 * encoders.place_rev,
         gear_is_certain=bool(encoders.gear),
         **_depth(log_percent, WITHIN_90_PERCENT * spread, percent_per_mm(teeth, facts.module_mm)),

@@ -119,7 +119,7 @@ def test_encoders_identify_a_crack_at_low_speed() -> None:
     said = tooth_error_evidence(cracked, healthy)
     assert said is not None
     assert said.gear == "driver"
-    assert int(55 * said.place_rev) in (6, 7, 8)
+    assert int(55 * said.place_rev) + 1 == 7
     assert next(iter(said.probabilities)) == "root_crack"
     assert said.probabilities["root_crack"] > 0.7
     assert said.odds_of_a_tooth > 20.0
