@@ -137,7 +137,7 @@ def long_recording(page: Page, clock: Clock, folder: Path) -> None:
     file = folder / "million.h5"
     write_recording(Recording(samples[None], RATE_HZ, (Channel("a1", "acceleration", "m/s^2"),)), file)
     page.get_by_role("link", name="Analysis").click()
-    page.get_by_text("Own file", exact=True).click()
+    page.get_by_text("Your file", exact=True).click()
     settle(page)
     clock.start()
     page.locator("input[type=file]").first.set_input_files(file)
