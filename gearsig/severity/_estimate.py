@@ -457,7 +457,7 @@ TEETH_COUNT = "Teeth count from 1 at the mark in order of engagement; the place 
 NO_MARK = "There is no mark on this shaft: the angle holds for this record only, and names no tooth."
 ASSUMED = (
     "The depth assumes a crack through the whole face width, in a tooth that gives way as those of the calibration do. "
-    "Finite-element teeth give way more: in them cracks of 1 to 4 mm read 1.2 to 2 times too deep."
+    "Finite-element teeth give way more: in them cracks of 1 to 4 mm read 1.1 to 2 times too deep."
 )
 
 SMALLEST_AGREEMENT = 0.4
