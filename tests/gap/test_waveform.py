@@ -221,3 +221,15 @@ def test_waveforms_part_what_faults_of_a_tooth_have_together() -> None:
     assert after["root_crack"] / after["tooth_spall"] == pytest.approx(0.6 * np.exp(2.0))
     assert next(iter(after)) == "root_crack"
     assert with_likelihoods(before, {"root_crack": 5.0}) == before
+
+
+def test_the_transmission_error_changes_how_probable_a_damaged_tooth_is() -> None:
+    """Odds of a damaged tooth are multiplied by its likelihood over that of other changes; shares of others stay."""
+    before = {"root_crack": 0.3, "tooth_spall": 0.1, "unbalance": 0.4, "none": 0.2}
+    after = with_likelihoods(before, {"root_crack": 0.0, "tooth_spall": 0.0, OTHER: -np.log(50.0)})
+    damaged = after["root_crack"] + after["tooth_spall"]
+    assert damaged / (1.0 - damaged) == pytest.approx(50.0 * 0.4 / 0.6)
+    assert after["root_crack"] / after["tooth_spall"] == pytest.approx(3.0)
+    assert after["unbalance"] / after["none"] == pytest.approx(2.0)
+    assert sum(after.values()) == pytest.approx(1.0)
+    assert with_likelihoods(before, {OTHER: -3.0}) == pytest.approx(before)
