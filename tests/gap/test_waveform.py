@@ -15,6 +15,7 @@ from gearsig.gap import (
     with_likelihoods,
     with_profiles_between,
 )
+from gearsig.severity import OTHER
 
 N_CHANNELS, N_HARMONICS = 2, 8
 HARMONICS = np.arange(1, N_HARMONICS + 1)[:, None]
