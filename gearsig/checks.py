@@ -17,6 +17,7 @@ from gearsig.errors import InputError
 from gearsig.formatting import counted
 
 FloatArray = NDArray[np.floating[Any]]
+ComplexArray = NDArray[np.complexfloating[Any, Any]]
 T = TypeVar("T")
 
 

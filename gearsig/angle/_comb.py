@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.angle._types import ShaftAngle
-from gearsig.checks import FloatArray, listed, positive
+from gearsig.checks import ComplexArray, FloatArray, listed, positive
 from gearsig.compiled import njit
 from gearsig.errors import InputError, RefusalError
 from gearsig.peaks import parabola_vertex
@@ -24,7 +24,6 @@ N_SIDEBANDS = 2
 N_SHAFT_HARMONICS = 3
 IntArray = NDArray[np.integer[Any]]
 BoolArray = NDArray[np.bool_]
-ComplexArray = NDArray[np.complexfloating]
 Stages = tuple[tuple[float, tuple[float, ...]], ...]
 
 # Probabilities that a line of the comb is present. They distinguish a speed from half of it: low harmonics and near

@@ -15,7 +15,6 @@ from gearsig.angle._comb import (
     NARROW,
     TOP,
     CombLines,
-    ComplexArray,
     SpeedCandidate,
     SpeedSearch,
     best_decision,
@@ -26,7 +25,7 @@ from gearsig.angle._comb import (
 )
 from gearsig.angle._resample import resample_to_angle, times_of_revolutions
 from gearsig.angle._types import AngleSignal, ShaftAngle, monotone_slopes
-from gearsig.checks import FloatArray, positive
+from gearsig.checks import ComplexArray, FloatArray, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Recording
 from gearsig.rig import Rig

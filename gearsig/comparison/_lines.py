@@ -11,7 +11,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from gearsig.angle import AngleSignal
-from gearsig.checks import FloatArray
+from gearsig.checks import ComplexArray, FloatArray
 from gearsig.comparison._types import (
     Agreement,
     Alignment,
@@ -28,7 +28,7 @@ from gearsig.errors import InputError
 from gearsig.orders import average_lines, revolution_of_lines
 from gearsig.prepared import best_shift, lines_over_floor, shift_scores, turned_lines
 from gearsig.rig import OrderLine, Rig, order_lines
-from gearsig.spectra import ComplexArray, Spectrum, noise_floor, power_density
+from gearsig.spectra import Spectrum, noise_floor, power_density
 
 
 @dataclass(frozen=True)

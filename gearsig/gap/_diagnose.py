@@ -527,7 +527,7 @@ def _encoder_messages(evidences: Sequence[ToothErrorEvidence], known: Mapping[st
     together = ToothErrorEvidence(mean_log_likelihoods(evidences), clearest.rms_um, clearest.gear)
     shown = {known[name].title: p for name, p in together.probabilities.items() if p >= 0.05 and name in known}
     likely = ", ".join(f"{title} {odds_text(p)}" for title, p in shown.items())
-    where = {"driver": ", on the driver", "driven": ", on the driven gear"}.get(clearest.gear, "")
+    where = f", on {clearest.gear_text}" if clearest.gear else ""
     return [f"{changed}{where}. {_odds_text(together.odds_of_a_tooth)}. If a tooth is damaged, it shows: {likely}."]
 
 

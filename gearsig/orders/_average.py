@@ -19,13 +19,13 @@ from gearsig.angle import (
     speed_channel_angle,
     times_of_revolutions,
 )
-from gearsig.checks import FloatArray, count, freeze, instance_of, listed, not_negative, one_of
+from gearsig.checks import ComplexArray, FloatArray, count, freeze, instance_of, listed, not_negative, one_of
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import counted
 from gearsig.recording import Channel, Recording
 from gearsig.results import Result
 from gearsig.rig import known_ratio
-from gearsig.spectra import ComplexArray, array_rate_hz, check_signal, checked_signal
+from gearsig.spectra import array_rate_hz, check_signal, checked_signal
 
 LineScaling = Literal["amplitude peak", "amplitude rms"]
 

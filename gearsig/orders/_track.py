@@ -8,12 +8,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gearsig.angle import AngleSignal, ShaftAngle
-from gearsig.checks import FloatArray, freeze, frozen_array, instance_of, listed_numbers, not_negative, positive
+from gearsig.checks import (
+    ComplexArray,
+    FloatArray,
+    freeze,
+    frozen_array,
+    instance_of,
+    listed_numbers,
+    not_negative,
+    positive,
+)
 from gearsig.errors import InputError, RefusalError
 from gearsig.orders._average import block_times, over_angle, unit_of
 from gearsig.recording import Recording
 from gearsig.results import Result
-from gearsig.spectra import BATCH_SAMPLES, BlockPlan, ComplexArray, plan_blocks
+from gearsig.spectra import BATCH_SAMPLES, BlockPlan, plan_blocks
 
 
 @dataclass(frozen=True)

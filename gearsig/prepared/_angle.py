@@ -9,9 +9,9 @@ from itertools import pairwise
 from operator import itemgetter
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gearsig.angle import ShaftAngle, estimate_shaft_angle, find_shaft_angle, refine_by_phase
+from gearsig.checks import ComplexArray
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import signed
 from gearsig.prepared._lines import (
@@ -55,7 +55,7 @@ MAINS_TOLERANCE = 0.002
 Twice the limit for hum in a recording's quality: these lines are only left out, or treated as confirming nothing."""
 
 
-Transform = Callable[[str], NDArray[np.complexfloating]]
+Transform = Callable[[str], ComplexArray]
 """Returns the `rfft` of a channel by its name."""
 
 

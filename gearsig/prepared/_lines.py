@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from scipy.fft import ifft, next_fast_len
 from scipy.optimize import minimize_scalar
 
-from gearsig.checks import FloatArray
+from gearsig.checks import ComplexArray, FloatArray
 from gearsig.compiled import njit
 from gearsig.peaks import parabola_vertex
-from gearsig.spectra import ComplexArray, Spectrum, noise_floor
+from gearsig.spectra import Spectrum, noise_floor
 
 LOG_RATIO_LIMIT = 6.0
 """Natural log of power over floor at which a harmonic counts in full: 26 dB, far above what noise reaches."""

@@ -45,6 +45,7 @@ from gearsig.severity._model import (
     CHIPPED,
     CRACKED,
     KINDS,
+    NORMAL_90,
     RELIEF_KNOWN,
     SPALLED,
     WITH_REFERENCE,
@@ -618,15 +619,12 @@ KIND_OF_FAULT = {CRACK: CRACKED, "chipped_tooth": CHIPPED, "tooth_spall": SPALLE
 FAULT_PRIORS = {CRACKED: 0.5, CHIPPED: 0.25, SPALLED: 0.25}
 """As in `KindModel`."""
 
-WITHIN_90_PERCENT = 1.645
-"""Half of the interval that holds 90 % of a normal distribution, in standard deviations."""
-
 
 def _encoder_text(encoders: ToothErrorEvidence) -> str:
     """Return what the encoders show, as the beginning of a sentence."""
     likeliest, p = next(iter(encoders.probabilities.items()))
     kind = KIND_OF_FAULT.get(likeliest, "out of its place")
-    where = f" of the {'driver' if encoders.gear == SIDES[0] else 'driven gear'}" if encoders.gear else ""
+    where = f" of {encoders.gear_text}" if encoders.gear else ""
     like = f", which looks like a tooth{where} that is {kind} ({odds_text(p)} of tooth faults)"
     changed = f"By the encoders, the transmission error changed by {encoders.rms_um:.2g} µm rms where it changed most"
     return changed if encoders.is_unlike_any else changed + like
@@ -650,7 +648,7 @@ def _by_encoders(encoders: ToothErrorEvidence, prepared: PreparedRecording, fact
         tooth=int(encoders.place_rev * teeth) % teeth + 1 if has_mark else None,
         angle_deg=360.0 * encoders.place_rev,
         gear_is_certain=bool(encoders.gear),
-        **_depth(log_percent, WITHIN_90_PERCENT * spread, percent_per_mm(teeth, facts.module_mm)),
+        **_depth(log_percent, NORMAL_90 * spread, percent_per_mm(teeth, facts.module_mm)),
         p_value=1.0 / encoders.odds_of_a_tooth,
         with_reference=True,
         reasons=(text, TEETH_COUNT if has_mark else NO_MARK),

@@ -17,6 +17,9 @@ from gearsig.formatting import odds_text, with_minus
 from gearsig.results import Result
 from gearsig.severity._features import FEATURES, IN_WORDS, RELIEF, RISING, SHAPE, SHAPED
 
+NORMAL_90 = 1.645
+"""Half of the interval that holds 90 % of a normal distribution, in standard deviations."""
+
 MIN_SPREAD = 0.1
 """Of ln percent: no machine is known to better than ten percent."""
 

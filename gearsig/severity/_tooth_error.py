@@ -315,8 +315,12 @@ class KnownToothErrors:
         teeth : int
             Of the cracked gear.
         """
-        terms = np.array([1.0, log(rms_um / load_n_per_mm), 1.0 / teeth])
-        return float(terms @ self.depth[:3]), float(self.depth[3])
+        return float(depth_terms(rms_um, load_n_per_mm, teeth) @ self.depth[:3]), float(self.depth[3])
+
+
+def depth_terms(rms_um: float, load_n_per_mm: float, teeth: int) -> FloatArray:
+    """Return 1, ln(δ/w) and 1/z, of which a crack's ln(depth) is a linear function; see `KnownToothErrors`."""
+    return np.array([1.0, log(rms_um / load_n_per_mm), 1.0 / teeth])
 
 
 SHRINKAGE = 0.2
@@ -380,6 +384,11 @@ class ToothErrorEvidence:
         levels = np.array([self.log_likelihoods[name] for name in TOOTH_FAULTS])
         shares = dict(zip(TOOTH_FAULTS, softmax(levels).tolist(), strict=True))
         return dict(sorted(shares.items(), key=lambda item: -item[1]))
+
+    @property
+    def gear_text(self) -> str:
+        """The gear that shows it, in words; empty if not known."""
+        return {"driver": "the driver", "driven": "the driven gear"}.get(self.gear, "")
 
     @property
     def odds_of_a_tooth(self) -> float:

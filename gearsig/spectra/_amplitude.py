@@ -8,14 +8,13 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from gearsig.checks import FloatArray, one_of, positive, within
+from gearsig.checks import ComplexArray, FloatArray, one_of, positive, within
 from gearsig.compiled import njit
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Recording
 from gearsig.spectra._types import (
     Axis,
     BlockPlan,
-    ComplexArray,
     Scaling,
     Spectrum,
     checked_signal,

@@ -6,10 +6,10 @@ from typing import Literal
 
 import numpy as np
 
-from gearsig.checks import FloatArray, count, one_of, positive
+from gearsig.checks import ComplexArray, FloatArray, count, one_of, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Recording
-from gearsig.spectra._types import ComplexArray, Spectrum, checked_signal, named_signal
+from gearsig.spectra._types import Spectrum, checked_signal, named_signal
 
 LOWEST_RELATIVE_MAGNITUDE = 1e-12
 """Lower limit of magnitudes, relative to the largest: lines of zero have no logarithm."""

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.angle import ShaftAngle
-from gearsig.checks import FloatArray, count, freeze, positive, within
+from gearsig.checks import ComplexArray, FloatArray, count, freeze, positive, within
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Recording
 from gearsig.results import Result
 from gearsig.spectra._amplitude import Preparation, prepared_signal
-from gearsig.spectra._types import ComplexArray, Spectrum, checked_signal, make_window, named_signal, scaled_unit
+from gearsig.spectra._types import Spectrum, checked_signal, make_window, named_signal, scaled_unit
 
 MAX_CELLS = 1 << 26
 """1.6 GB of results; more is more likely a mistyped parameter than intended."""

@@ -11,7 +11,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.checks import FloatArray, count, freeze, limits, one_of, positive, within
+from gearsig.checks import ComplexArray, FloatArray, count, freeze, limits, one_of, positive, within
 from gearsig.compiled import njit
 from gearsig.errors import InputError, RefusalError
 from gearsig.recording import Channel, Recording
@@ -19,7 +19,7 @@ from gearsig.results import Result
 from gearsig.spectra._amplitude import Preparation, amplitude_spectrum, noise_floor, prepared_signal
 from gearsig.spectra._coherence import SpectralCoherence, enhanced_envelope, spectral_coherence
 from gearsig.spectra._kurtogram import BandCandidate, Kurtogram, kurtogram, kurtosis_error
-from gearsig.spectra._types import BATCH_SAMPLES, ComplexArray, Scaling, Spectrum, named_signal, squared_unit
+from gearsig.spectra._types import BATCH_SAMPLES, Scaling, Spectrum, named_signal, squared_unit
 
 EnvelopeKind = Literal["magnitude", "squared"]
 

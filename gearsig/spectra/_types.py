@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from types import UnionType
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gearsig.checks import (
+    ComplexArray,
     FloatArray,
     closest_match_hint,
     count,
@@ -241,8 +241,6 @@ def window_response(name: str, offset_bins: FloatArray) -> FloatArray:
     response: FloatArray = np.abs(np.exp(-2j * np.pi / n * np.outer(offsets, k)) @ w) / w.sum()
     return response
 
-
-ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
 BATCH_SAMPLES = 1 << 19
 """Samples transformed at once: 4 MB of float64, which suits the caches and bounds the memory."""

@@ -9,7 +9,7 @@ from typing import get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.checks import FloatArray, freeze, not_negative, one_of, within
+from gearsig.checks import ComplexArray, FloatArray, freeze, not_negative, one_of, within
 from gearsig.errors import InputError
 from gearsig.results import Result
 from gearsig.timefreq._squeezing import (
@@ -26,7 +26,6 @@ from gearsig.timefreq._squeezing import (
 )
 from gearsig.timefreq._types import (
     Coefficients,
-    ComplexArray,
     Edges,
     LinePlan,
     Piece,

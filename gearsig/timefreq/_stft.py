@@ -9,7 +9,7 @@ from typing import get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.checks import FloatArray, count, number, one_of, positive
+from gearsig.checks import ComplexArray, FloatArray, count, number, one_of, positive
 from gearsig.errors import InputError, RefusalError
 from gearsig.timefreq._squeezing import (
     MIN_SHARE,
@@ -23,7 +23,6 @@ from gearsig.timefreq._squeezing import (
 )
 from gearsig.timefreq._types import (
     Coefficients,
-    ComplexArray,
     Edges,
     LinePlan,
     Reduction,

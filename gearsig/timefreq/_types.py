@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, Literal, cast, get_args
+from typing import Literal, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gearsig.angle import AngleSignal
-from gearsig.checks import FloatArray, count, freeze, frozen_array, one_of, positive, short
+from gearsig.checks import ComplexArray, FloatArray, count, freeze, frozen_array, one_of, positive, short
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import axis_label, axis_unit
 from gearsig.recording import Recording
@@ -20,7 +20,6 @@ from gearsig.spectra import Scaling, array_rate_hz, check_signal, scaled_unit
 Axis = Literal["frequency", "order"]
 Spacing = Literal["linear", "logarithmic"]
 Reduction = Literal["mean", "max"]
-ComplexArray = NDArray[np.complexfloating[Any, Any]]
 
 
 @dataclass(frozen=True)

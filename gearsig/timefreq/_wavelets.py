@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import ifft, rfft
 
-from gearsig.checks import FloatArray, count, frozen_array, instance_of, positive, within
+from gearsig.checks import ComplexArray, FloatArray, count, frozen_array, instance_of, positive, within
 from gearsig.compiled import njit
 from gearsig.errors import InputError, RefusalError
-from gearsig.timefreq._types import ComplexArray, Edges, Spacing, UniformSignal, segment_of
+from gearsig.timefreq._types import Edges, Spacing, UniformSignal, segment_of
 
 TAIL = 1e-6
 """Share of the peak below which a wavelet is treated as zero, in time and in frequency."""

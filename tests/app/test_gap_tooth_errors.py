@@ -10,6 +10,7 @@ import pytest
 from app.studies.gap.tooth_errors import (
     CORNERS,
     SIMULATORS,
+    evidence_on,
     known_tooth_errors_of,
     named,
     separations_with_corners,
@@ -17,7 +18,7 @@ from app.studies.gap.tooth_errors import (
     together,
 )
 from gearsig.checks import FloatArray
-from gearsig.severity import OTHER, SINGLE_TOOTH_FAULTS, TOOTH_FAULTS, KnownToothErrors
+from gearsig.severity import OTHER, SINGLE_TOOTH_FAULTS, KnownToothErrors
 from sims.fe_gear import ready_gear
 from sims.mesh import FlankDeviation, GearMesh, PairGeometry, ToothChip, share_torque
 from sims.reduced_fe import mesh_maps, static_table
@@ -89,7 +90,7 @@ def test_faults_of_a_simulator_left_out_are_named(known: dict[str, KnownToothErr
     taught = together([errors for name, errors in known.items() if name != left_out])
     is_fault = known[left_out].causes != OTHER
     rows, causes = known[left_out].descriptors[is_fault], known[left_out].causes[is_fault]
-    likeliest, probability = named(taught, rows)
+    likeliest, probability = named(evidence_on(taught, rows))
     right = likeliest == causes
     assert right.mean() > 0.8
     assert right[probability >= 0.9].mean() > 0.9
@@ -101,8 +102,7 @@ def test_faults_of_a_simulator_left_out_are_named(known: dict[str, KnownToothErr
 def test_other_changes_are_not_taken_for_a_damaged_tooth(known: dict[str, KnownToothErrors], left_out: str) -> None:
     """Another load, wear of all teeth and run-out; cracks, chips and spalls are, with 600 of each 0.96 of them."""
     taught = together([errors for name, errors in known.items() if name != left_out])
-    levels = [taught.log_likelihoods(row) for row in known[left_out].descriptors]
-    odds = np.array([np.mean([np.exp(at[name]) for name in TOOTH_FAULTS]) / np.exp(at[OTHER]) for at in levels])
+    odds = np.array([one.odds_of_a_tooth for one in evidence_on(taught, known[left_out].descriptors)])
     causes = known[left_out].causes
     assert np.mean(odds[causes == OTHER] > 20.0) <= 0.01
     assert np.mean(odds[np.isin(causes, SINGLE_TOOTH_FAULTS)] > 20.0) > 0.7

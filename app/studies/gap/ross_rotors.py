@@ -29,12 +29,11 @@ import numpy as np
 from scipy import linalg, signal
 
 from app.studies.gap.quasi_static import tachometer
-from gearsig.checks import FloatArray
+from gearsig.checks import ComplexArray, FloatArray
 from gearsig.compiled import njit
 from gearsig.errors import RefusalError
 from gearsig.recording import Channel, Recording
 from gearsig.rig import Bearing, GearPair, OperatingPoint, Rig, Sensor, Shaft, TachometerChannel
-from gearsig.spectra import ComplexArray
 from sims.machine import log_uniform
 
 # --------------------
@@ -441,6 +440,7 @@ class RossMachine:
         def log(low: float, high: float, n: int) -> FloatArray:
             return np.array([log_uniform(rng, low, high) for _ in range(n)])
 
+        # gears, and the speeds and loads of both points
         z1 = int(rng.integers(18, 37))
         teeth = z1, int(z1 * u(1.0, 2.2)) + 1
         module = 1e-3 * float(rng.choice([2.0, 2.5, 3.0, 4.0]))
@@ -455,6 +455,7 @@ class RossMachine:
         mass = 7850.0 * pi * radii**2 * width
         inertia = 0.5 * mass * radii**2
         ratio = teeth[0] / teeth[1]
+        # shafts that fit into the smaller gear, on balls that fit onto them; a coupling twists at 30 to 120 Hz
         thin = u(0.42, 0.58) * (2.0 * radii[0] - 2.5 * module)
         shafts, balls = [], []
         for side in range(2):
@@ -511,6 +512,7 @@ class RossMachine:
             ],
             "shaft_cracks": [(int(rng.integers(2)), u(0.3, 0.45))],
         }
+        # a housing of some modes, tolerances and sensors, which ROSS does not have
         housing = u(4, 9) * mass.sum() + 5.0
         n_modes, n_sensors = int(rng.integers(8, 14)), int(rng.integers(1, 4))
         hz = np.concatenate([log(20.0, 200.0, 3), log(300.0, 9000.0, n_modes - 3)])

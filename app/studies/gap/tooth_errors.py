@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache, partial
-from math import exp, floor, log, nan, pi
+from math import exp, floor, nan, pi
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -40,6 +40,8 @@ from gearsig.severity import (
     TOOTH_FAULTS,
     KnownToothErrors,
     ToothErrorChange,
+    ToothErrorEvidence,
+    depth_terms,
     event_rms_um,
     percent_per_mm,
     tooth_error_descriptors,
@@ -404,7 +406,7 @@ def _depth_of(drawn: Sequence[DrawnChange]) -> FloatArray:
     cracks = [one for one in drawn if one.depth_percent == one.depth_percent]
     if not cracks:
         return np.full(4, nan)
-    terms = np.array([[1.0, log(c.change.rms_um / c.load_n_per_mm), 1.0 / len(c.change.pattern_um)] for c in cracks])
+    terms = np.array([depth_terms(c.change.rms_um, c.load_n_per_mm, len(c.change.pattern_um)) for c in cracks])
     log_percent = np.log([c.depth_percent for c in cracks])
     fitted = np.linalg.lstsq(terms, log_percent, rcond=None)[0]
     return np.array([*fitted, np.std(log_percent - terms @ fitted)])
@@ -423,11 +425,15 @@ def together(several: Sequence[KnownToothErrors]) -> KnownToothErrors:
     return KnownToothErrors(descriptors, np.concatenate([known.causes for known in several]), np.array(depth))
 
 
-def named(known: KnownToothErrors, rows: FloatArray) -> tuple[NDArray[np.str_], FloatArray]:
-    """Return the most probable fault of each row and its probability, with equal priors for all four."""
-    levels = np.array([[known.log_likelihoods(row)[name] for name in TOOTH_FAULTS] for row in rows])
-    weights = np.exp(levels - levels.max(axis=1, keepdims=True))
-    return np.array(TOOTH_FAULTS)[levels.argmax(axis=1)], weights.max(axis=1) / weights.sum(axis=1)
+def evidence_on(known: KnownToothErrors, rows: FloatArray) -> list[ToothErrorEvidence]:
+    """Return the evidence that rows of descriptors are; their size and gear do not matter."""
+    return [ToothErrorEvidence(known.log_likelihoods(row), nan, "") for row in rows]
+
+
+def named(evidence: Sequence[ToothErrorEvidence]) -> tuple[NDArray[np.str_], FloatArray]:
+    """Return the most probable fault of each and its probability, with equal priors for all four."""
+    faults, probabilities = zip(*(next(iter(one.probabilities.items())) for one in evidence), strict=True)
+    return np.array(faults), np.array(probabilities)
 
 
 def _print_accuracy(
@@ -442,12 +448,11 @@ def _print_accuracy(
     )
 
 
-def _print_odds(known: KnownToothErrors, held_out: KnownToothErrors) -> None:
+def _print_odds(causes: NDArray[np.str_], evidence: Sequence[ToothErrorEvidence]) -> None:
     """Print how often encoders' odds of a damaged tooth are high, for damaged teeth and for other changes."""
-    levels = [known.log_likelihoods(row) for row in held_out.descriptors]
-    odds = np.array([np.mean([exp(at[name]) for name in TOOTH_FAULTS]) / exp(at[OTHER]) for at in levels])
+    odds = np.array([one.odds_of_a_tooth for one in evidence])
     for name in (*TOOTH_FAULTS, OTHER):
-        of_it = odds[held_out.causes == name]
+        of_it = odds[causes == name]
         typer.echo(
             f"  {name}: odds of a damaged tooth ≥ 20 {np.mean(of_it >= 20):.3f}, ≥ 100 {np.mean(of_it >= 100):.3f}"
         )
@@ -470,8 +475,7 @@ def name_blindly(n_each: int) -> None:
             if evidence is None or evidence.is_unlike_any:
                 unlike += 1
                 continue
-            named_fault = next(iter(evidence.probabilities))
-            rows.append((fault, named_fault, evidence.probabilities[named_fault]))
+            rows.append((fault, *next(iter(evidence.probabilities.items()))))
     columns = [np.array(column) for column in zip(*rows, strict=True)]
     _print_accuracy(f"independent rig, {unlike} unlike any or not seen", columns[0], columns[1], columns[2])
 
@@ -485,11 +489,10 @@ def main(
     by_simulator = {name: known_tooth_errors_of(name, each) for name in SIMULATORS}
     for name, held_out in by_simulator.items():
         taught = together([known for title, known in by_simulator.items() if title != name])
-        are_faults = held_out.causes != OTHER
-        _print_accuracy(
-            f"{name} left out", held_out.causes[are_faults], *named(taught, held_out.descriptors[are_faults])
-        )
-        _print_odds(taught, held_out)
+        evidence = evidence_on(taught, held_out.descriptors)
+        of_faults = [one for one, cause in zip(evidence, held_out.causes, strict=True) if cause != OTHER]
+        _print_accuracy(f"{name} left out", held_out.causes[held_out.causes != OTHER], *named(of_faults))
+        _print_odds(held_out.causes, evidence)
     everything = together([*by_simulator.values()])
     typer.echo(f"depth of cracks: {everything.depth.round(3).tolist()}")
     rows = everything.descriptors.astype(np.float16)

@@ -18,7 +18,7 @@ from gearsig.gap._floors import FLOOR_IN_DEVIATIONS
 from gearsig.gap._report import NONE, UNKNOWN, Interval, Shrinkage, shares_of
 from gearsig.gap.start_stop._cycles import FEATURES, NAMES
 from gearsig.motion import median_deviation
-from gearsig.severity import CRACK
+from gearsig.severity import CRACK, NORMAL_90
 
 FLOORS_FILE = Path(__file__).with_name("floors.json")
 HALF = float(np.sqrt(2.0))
@@ -26,7 +26,6 @@ HALF = float(np.sqrt(2.0))
 RIPPLE = "torque_ripple"
 """It is at an order, as a crack is at a tooth: its placebo is the same cause elsewhere."""
 N_PLACEBOS = 4
-NORMAL_90 = 1.645
 
 
 @dataclass(frozen=True)
