@@ -64,13 +64,18 @@ class RefusalError(GearsigError):
         super().__init__(_one_line(f"{reason}; {remedy}" if remedy else reason))
 
 
-def answer_or_none(ask: Callable[[], T], name: str, refusals: list[str]) -> T | None:
+def answer_or_none(
+    ask: Callable[[], T], name: str, refusals: list[str], *, let_through: type[GearsigError] | tuple[()] = ()
+) -> T | None:
     """Return what `ask` returns; if it raises a `GearsigError`, return None and add "name: error" to the refusals.
 
-    For results of several parts, where one that the data do not allow must not withhold the others.
+    For results of several parts, where one that the data do not allow must not withhold the others. Errors that concern
+    all of them are let through.
     """
     try:
         return ask()
+    except let_through:
+        raise
     except GearsigError as error:
         refusals.append(f"{name}: {error}")
         return None

@@ -95,7 +95,7 @@ def with_crack(findings: Sequence[Finding], answer: Answer | None, rig: Rig) -> 
     if isinstance(answer, NoCrackSeen):
         # Both gears of the pair are searched: if a crack through half of the root would have shown, the teeth count as
         # examined.
-        settled = answer.with_reference and answer.below_percent <= 50.0 and not rig.assumed
+        settled = answer.with_reference and answer.below_percent <= 50.0 and not (answer.stands_out or rig.assumed)
         codes = ("tooth-damage-undecided", "tooth-not-examined") if settled else ()
         return [*(f for f in findings if f.code not in codes), _none_seen(answer, rig)]
     crack_finding = _seen(answer, rig)

@@ -11,7 +11,7 @@ import json
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cache
-from math import exp
+from math import exp, log
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Generic, Protocol, TypeVar
@@ -298,7 +298,8 @@ def with_likelihoods(probabilities: Mapping[str, float], matches: Mapping[str, f
 
     p_i ∝ p_i L_i among those that have a likelihood; their sum is kept. The waveform distinguishes how a tooth is
     damaged; that a tooth is damaged follows from the features. The transmission error shows that as well: `OTHER` gives
-    the likelihood of all causes without one of their own, and the sum changes.
+    the likelihood of all causes without one of their own, and the sum changes. An unknown cause may be on a tooth or
+    not: its likelihood is the mean of both.
 
     Parameters
     ----------
@@ -307,8 +308,12 @@ def with_likelihoods(probabilities: Mapping[str, float], matches: Mapping[str, f
     matches : mapping
         Effect → ln L.
     """
-    others = dict.fromkeys(probabilities, matches[OTHER]) if OTHER in matches else {}
-    counted = {name: value for name, value in {**others, **matches}.items() if name in probabilities}
+    likelihoods = dict(matches)
+    if OTHER in matches:
+        of_teeth = [value for name, value in matches.items() if name != OTHER] or [matches[OTHER]]
+        unknown = log(0.5 * (float(np.mean(np.exp(of_teeth))) + exp(matches[OTHER])))
+        likelihoods = {**dict.fromkeys(probabilities, matches[OTHER]), UNKNOWN: unknown, **matches}
+    counted = {name: value for name, value in likelihoods.items() if name in probabilities}
     if len(counted) < 2:
         return dict(probabilities)
     together = sum(probabilities[name] for name in counted)

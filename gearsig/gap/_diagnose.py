@@ -14,7 +14,6 @@ import numpy as np
 
 from gearsig.checks import closest_match_hint, listed, short
 from gearsig.errors import GearsigError, InputError, RefusalError, answer_or_none
-from gearsig.formatting import odds_text
 from gearsig.gap._attribution import (
     Attribution,
     attribute,
@@ -74,9 +73,9 @@ from gearsig.severity import (
     CrackEstimate,
     NoCrackSeen,
     ToothErrorEvidence,
+    combined_evidence,
     estimate_crack,
     has_encoders,
-    mean_log_likelihoods,
     tooth_error_evidence,
 )
 
@@ -102,8 +101,8 @@ OF_THE_WAVEFORM = (
 )
 
 BY_THE_CRACK_ESTIMATE = (
-    "The crack estimate says about {name}: {text} {depth}It rests on the shape of one tooth's event, "
-    "the probability here on all features and on trials on the twin, so the two can differ."
+    "The crack estimate says about {name}: {text} {depth}It looks at single teeth alone; the probability here rests on "
+    "all features and on trials on the twin as well, so the two can differ."
 )
 NO_CRACK_ESTIMATE = (
     "The crack estimate says nothing about a crack in {name}: {reason}. The probability here rests "
@@ -238,7 +237,7 @@ def diagnose_gap(
     # 4. Which effect: evidence from the forests and labelled recordings, then trials of the most probable on the twin.
     tell("recognising", 0.2)
     labelled, left_out = labelled_changes(learn, healthy, conditions, twin, cache, fresh=fresh)
-    tooth_errors, no_tooth_errors = _tooth_error_evidences(conditions, recordings, references)
+    encoders, encoder_messages = _encoder_evidence(conditions, recordings, references)
     with ThreadPoolExecutor(1) as executor:  # step 5 runs while other processes simulate
         unexpected_job = executor.submit(unexpected_findings, recording, healthy)
         crack_job = executor.submit(_crack_answer, recording, reference)
@@ -251,7 +250,7 @@ def diagnose_gap(
             lambda what, done: tell(what, 0.25 + 0.55 * done),
             fresh=fresh,
             labelled=labelled,
-            tooth_error_log_likelihoods=mean_log_likelihoods(tooth_errors),
+            tooth_error_log_likelihoods={} if encoders is None else encoders.log_likelihoods,
         )
     tried, gap = attribution.tried, _places(clearest)
     probabilities = _posterior(attribution, conditions, clearest, known, gap)
@@ -336,8 +335,7 @@ def diagnose_gap(
             *_fit_messages(named, tried, crack),
             *([TEETH_COUNT] if named is not None and named.place.startswith("tooth") else ()),
             *_waveform_messages(tried, known, clearest),
-            *_encoder_messages(tooth_errors, known),
-            *no_tooth_errors,
+            *encoder_messages,
         ),
         twin_toml=""
         if fitted is None
@@ -500,10 +498,10 @@ def _waveform_messages(
     return [message]
 
 
-def _tooth_error_evidences(
+def _encoder_evidence(
     conditions: Sequence[Condition], recordings: Sequence[Recording], references: Sequence[Recording]
-) -> tuple[list[ToothErrorEvidence], list[str]]:
-    """Return the encoder evidence of conditions with a reference and encoders in both, and the reasons for refusals."""
+) -> tuple[ToothErrorEvidence | None, list[str]]:
+    """Return the evidence from encoders at all conditions with a reference, and what they show or why nothing."""
     of = {recording.name: recording for recording in (*references, *recordings)}
     refusals: list[str] = []
     evidences = [
@@ -511,33 +509,9 @@ def _tooth_error_evidences(
         for c in conditions
         if c.facts.reference
     ]
-    known = [evidence for evidence in evidences if evidence is not None]
-    return known, [f"No evidence from the encoders: {refusal}." for refusal in refusals]
-
-
-def _encoder_messages(evidences: Sequence[ToothErrorEvidence], known: Mapping[str, GapEffect]) -> list[str]:
-    """Return what the transmission error indicates or, where that is nothing, what would help."""
-    if not evidences:
-        return []
-    clearest = max(evidences, key=lambda evidence: evidence.rms_um)
-    changed = f"The transmission error from the encoders changed by {clearest.rms_um:.2g} µm rms where it changed most"
-    if all(evidence.is_unlike_any for evidence in evidences):
-        slower = "At a few revolutions per second or less its profile distinguishes crack, spall and chip."
-        return [f"{changed}, which at this speed does not distinguish faults: the drive oscillates too. {slower}"]
-    together = ToothErrorEvidence(mean_log_likelihoods(evidences), clearest.rms_um, clearest.gear)
-    shown = {known[name].title: p for name, p in together.probabilities.items() if p >= 0.05 and name in known}
-    likely = ", ".join(f"{title} {odds_text(p)}" for title, p in shown.items())
-    where = f", on {clearest.gear_text}" if clearest.gear else ""
-    return [f"{changed}{where}. {_odds_text(together.odds_of_a_tooth)}. If a tooth is damaged, it shows: {likely}."]
-
-
-def _odds_text(odds: float) -> str:
-    """Return how much likelier a profile is with a damaged tooth than with any other change, or less likely."""
-    if 1.0 / 1.5 < odds < 1.5:
-        return "Such a profile is as likely with a damaged tooth as with wear, run-out or another load"
-    first, second = "with a damaged tooth", "with wear, run-out or another load"
-    first, second = (first, second) if odds > 1.0 else (second, first)
-    return f"Such a profile is {max(odds, 1.0 / odds):.0f} times as likely {first} as {second}"
+    together = combined_evidence([evidence for evidence in evidences if evidence is not None])
+    shown = [] if together is None else [together.text]
+    return together, [*shown, *(f"No evidence from the encoders: {refusal}." for refusal in refusals)]
 
 
 def _fit_messages(named: GapCause | None, tried: Mapping[str, TriedEffect], crack: CrackAnswer) -> list[str]:

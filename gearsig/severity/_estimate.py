@@ -12,7 +12,7 @@ import numpy as np
 
 from gearsig.checks import FloatArray, instance_of, listed, positive, within
 from gearsig.errors import InputError, RefusalError, answer_or_none
-from gearsig.formatting import odds_text, percent
+from gearsig.formatting import percent
 from gearsig.prepared import PreparedRecording, prepare
 from gearsig.recording import Recording, check_recording
 from gearsig.rig import SIDES, GearPair, Rig
@@ -22,6 +22,7 @@ from gearsig.severity._features import (
     MAX_RELIEF_SHARE,
     STIFFNESS_N_PER_MM_UM,
     Conditions,
+    ReferenceRefusalError,
     ShaftLines,
     ToothEvent,
     check_same_speed,
@@ -57,7 +58,14 @@ from gearsig.severity._model import (
     kind_vector,
     load_calibration,
 )
-from gearsig.severity._tooth_error import CRACK, ToothErrorEvidence, load_known_tooth_errors, tooth_error_evidence
+from gearsig.severity._tooth_error import (
+    CLEARLY_A_TOOTH,
+    CRACK,
+    UNDECIDED,
+    ToothErrorEvidence,
+    load_known_tooth_errors,
+    tooth_error_evidence,
+)
 
 MIN_HARMONICS = 4
 """Mesh harmonics needed below the highest order: with fewer, one resonance decides."""
@@ -168,7 +176,7 @@ def _gear_evidence(
     difference, agreement = difference_lines(shaft, healthy[i], whole_teeth=_is_marked(now, healthy))
     residual, largest = np.abs(without_regular_lines(difference)).max(axis=1), np.abs(shaft.lines).max(axis=1)
     if not np.all(residual > SMALLEST_DIFFERENCE * largest):
-        raise RefusalError(
+        raise ReferenceRefusalError(
             "the reference holds the same samples as the recording",
             remedy="give a recording that was taken before the crack",
         )
@@ -314,10 +322,10 @@ def check_same_rig(now: Rig, healthy: Rig) -> None:
 
     Raises
     ------
-    RefusalError
+    ReferenceRefusalError
     """
     if healthy.pairs and now.teeth_text != healthy.teeth_text:
-        raise RefusalError(
+        raise ReferenceRefusalError(
             f"the reference is of another machine: its teeth are {healthy.teeth_text}, the recording's "
             f"{now.teeth_text}",
             remedy=_REMEDY,
@@ -325,7 +333,7 @@ def check_same_rig(now: Rig, healthy: Rig) -> None:
     torque, reference_torque = now.operating_point.torque_nm, healthy.operating_point.torque_nm
     same_shaft = now.operating_point.shaft == healthy.operating_point.shaft
     if torque and reference_torque and same_shaft and abs(abs(torque / reference_torque) - 1.0) > LARGEST_TORQUE_CHANGE:
-        raise RefusalError(
+        raise ReferenceRefusalError(
             f"the reference was taken at {reference_torque:g} N m, the recording at {torque:g} N m",
             remedy=f"take it within {percent(LARGEST_TORQUE_CHANGE)} of the same torque",
         )
@@ -336,7 +344,7 @@ def check_same_level(now: Sequence[ShaftLines], healthy: Sequence[ShaftLines]) -
 
     Raises
     ------
-    RefusalError
+    ReferenceRefusalError
     """
     check_same_speed(now[0], healthy[0])
     n = min(n_bands(now[0]), n_bands(healthy[0]))
@@ -346,7 +354,7 @@ def check_same_level(now: Sequence[ShaftLines], healthy: Sequence[ShaftLines]) -
         change_db = np.quantile(now_db[:, i] - healthy_db[:, i], 0.5, weights=weights[:, i], method="inverted_cdf")
         if abs(change_db) > LARGEST_LEVEL_CHANGE_DB:
             side = "above" if change_db > 0 else "below"
-            raise RefusalError(
+            raise ReferenceRefusalError(
                 f"the mesh is {abs(change_db):.1f} dB {side} that of the reference in channel {name!r}: another gain, "
                 "unit or load",
                 remedy=_REMEDY,
@@ -469,7 +477,7 @@ CLEARLY_OF_THE_REFERENCE, STANDARD_ERRORS = -0.2, 3.0
 """Share of the recording in the event, and by how many standard errors it is below zero. Of 67 simulated machines with
 a visible crack, two came so low; with recording and reference exchanged, 54 of 68 did (seed 9158)."""
 
-WEAKER = "One tooth stands out, but less, over the mesh, than with the shallowest cracks of the calibration."
+WEAKER = "Something at one tooth stands out, but is weaker, over the mesh, than the calibration's shallowest cracks."
 
 LARGEST_BOUND_PERCENT = 50.0
 """Percent of the root: "no crack seen, below 70 %" would be no answer."""
@@ -569,16 +577,29 @@ def estimate_crack(
     check_same_rig(prepared.rig, before.rig)
     unseen: list[str] = []
     ask = partial(tooth_error_evidence, prepared.recording, before.recording, prepared.rig)
-    encoders = answer_or_none(ask, "No evidence from the encoders", unseen)
+    encoders = answer_or_none(ask, "No evidence from the encoders", unseen, let_through=ReferenceRefusalError)
+
+    def by_encoders(evidence: ToothErrorEvidence, odds: float, shaft: str = "") -> CrackEstimate | None:
+        ask = partial(_by_encoders, evidence, prepared, before, facts, odds, shaft)
+        return answer_or_none(ask, "No estimate from the encoders", unseen)
+
     try:
         answer = _by_vibration(prepared, before, facts, used, chosen, tip_relief_um)
+    except ReferenceRefusalError:
+        raise
     except RefusalError as refusal:
-        alone = None if encoders is None else _by_encoders(encoders, prepared, facts)
-        if alone is None:
+        if encoders is None:
             raise
-        return replace(alone, reasons=(*alone.reasons, f"From the vibration alone there is no estimate: {refusal}."))
-    if encoders is not None:
-        return _with_encoders(answer, encoders, prepared, facts)
+        alone, why = by_encoders(encoders, CLEARLY_A_TOOTH), f"By the vibration there is no estimate: {refusal.reason}"
+        if alone is None:
+            both = f"{encoders.text} {why}"
+            raise RefusalError(both, remedy=refusal.remedy, looked_at=refusal.looked_at) from None
+        answer = replace(alone, reasons=(*alone.reasons, f"{why}."))
+    else:
+        # Where the vibration shows a damaged tooth, the encoders need not show it as clearly.
+        shown = (UNDECIDED, answer.shaft) if isinstance(answer, CrackEstimate) else (CLEARLY_A_TOOTH, "")
+        if encoders is not None:
+            answer = _together(answer, encoders, by_encoders(encoders, *shown), facts)
     return replace(answer, reasons=(*answer.reasons, *(f"{reason}." for reason in unseen)))
 
 
@@ -590,8 +611,17 @@ def _by_vibration(
     chosen: tuple[str, ...],
     tip_relief_um: float | None,
 ) -> CrackEstimate | NoCrackSeen:
-    """Return the estimate from accelerations; `before` is the reference."""
+    """Return the estimate from accelerations; `before` is the reference. Default: the channels that both have."""
     names = acceleration_channels(prepared.recording, chosen)
+    if before is not None and not chosen:
+        theirs = {channel.name for channel in before.recording.channels if channel.quantity == "acceleration"}
+        common = tuple(name for name in names if name in theirs)
+        if not common:
+            raise RefusalError(
+                f"the reference has no acceleration channel {' or '.join(map(repr, names))}",
+                remedy="record both with the same channels",
+            )
+        names = common
     now = pair_lines(prepared, None, facts.pair, names)
     used.check_reach(reach_of(facts, now[0].order_hz * facts.driver_teeth))
     healthy = None
@@ -612,48 +642,71 @@ def _by_vibration(
     return replace(answer, reasons=(*answer.reasons, *doubts)) if doubts else answer
 
 
-CLEARLY_A_TOOTH = 20.0
-"""Odds of a damaged tooth from which the encoders alone show one."""
-
 KIND_OF_FAULT = {CRACK: CRACKED, "chipped_tooth": CHIPPED, "tooth_spall": SPALLED}
 FAULT_PRIORS = {CRACKED: 0.5, CHIPPED: 0.25, SPALLED: 0.25}
 """As in `KindModel`."""
 
-
-def _encoder_text(encoders: ToothErrorEvidence) -> str:
-    """Return what the encoders show, as the beginning of a sentence."""
-    likeliest, p = next(iter(encoders.probabilities.items()))
-    kind = KIND_OF_FAULT.get(likeliest, "out of its place")
-    where = f" of {encoders.gear_text}" if encoders.gear else ""
-    like = f", which looks like a tooth{where} that is {kind} ({odds_text(p)} of tooth faults)"
-    changed = f"By the encoders, the transmission error changed by {encoders.rms_um:.2g} µm rms where it changed most"
-    return changed if encoders.is_unlike_any else changed + like
+ASSUMED_BY_ENCODERS = (
+    "The depth by the encoders follows from the size of the change and the load, for a crack through the whole face "
+    "width; its interval holds for rack-shaped and for finite-element teeth."
+)
 
 
-def _by_encoders(encoders: ToothErrorEvidence, prepared: PreparedRecording, facts: PairFacts) -> CrackEstimate | None:
-    """Return the estimate from the transmission error alone; None where no tooth seems cracked, chipped or spalled."""
-    faults = {KIND_OF_FAULT[name]: p for name, p in encoders.probabilities.items() if name in KIND_OF_FAULT}
-    if encoders.odds_of_a_tooth < CLEARLY_A_TOOTH or sum(faults.values()) < 0.5:
+def _by_encoders(
+    encoders: ToothErrorEvidence,
+    prepared: PreparedRecording,
+    before: PreparedRecording,
+    facts: PairFacts,
+    odds: float,
+    shaft: str = "",
+) -> CrackEstimate | None:
+    """Return the estimate from the transmission error; None below these odds of a damaged tooth.
+
+    Where both gears show the change, that on `shaft` is meant.
+
+    Raises
+    ------
+    RefusalError
+        If encoders are not known to show the depth at this load or with this gear.
+    """
+    if encoders.odds_of_a_tooth < odds:
         return None
-    is_driven = encoders.gear == SIDES[1]
-    text = f"{_encoder_text(encoders)}; the depth follows from its size and the load."
+    weights = {KIND_OF_FAULT[name]: p * FAULT_PRIORS[KIND_OF_FAULT[name]] for name, p in encoders.probabilities.items()}
+    is_driven = encoders.gear == SIDES[1] or (not encoders.gear and shaft == facts.pair.driven)
     shaft, teeth = ((facts.pair.driver, facts.driver_teeth), (facts.pair.driven, facts.driven_teeth))[is_driven]
-    has_mark = prepared.has_mark(shaft)
-    weights = {kind: p * FAULT_PRIORS[kind] for kind, p in faults.items()}
-    normal_n_per_mm = facts.load_mpa * facts.module_mm / cos(radians(PRESSURE_ANGLE_DEG))
-    log_percent, spread = load_known_tooth_errors().log_percent(encoders.rms_um, normal_n_per_mm, teeth)
+    log_percent, half_width = _log_percent_by_encoders(encoders, facts, teeth)
+    place_rev, has_mark = encoders.places_rev[SIDES[is_driven]], prepared.has_mark(shaft)
+    doubts = [
+        f"{whose}{problem.text}; the encoders may be wrong for it."
+        for whose, of in (("", prepared), ("The reference: ", before))
+        for problem in of.grave_problems([c.name for c in of.recording.channels if c.quantity == "encoder"])
+    ]
     return CrackEstimate(
         shaft=shaft,
         gear=f"{facts.pair.name}/{shaft}",
-        tooth=int(encoders.place_rev * teeth) % teeth + 1 if has_mark else None,
-        angle_deg=360.0 * encoders.place_rev,
+        tooth=int(place_rev * teeth) % teeth + 1 if has_mark else None,
+        angle_deg=360.0 * place_rev,
         gear_is_certain=bool(encoders.gear),
-        **_depth(log_percent, NORMAL_90 * spread, percent_per_mm(teeth, facts.module_mm)),
+        **_depth(log_percent, half_width, percent_per_mm(teeth, facts.module_mm)),
         p_value=1.0 / encoders.odds_of_a_tooth,
         with_reference=True,
-        reasons=(text, TEETH_COUNT if has_mark else NO_MARK),
+        reasons=(encoders.text, TEETH_COUNT if has_mark else NO_MARK, ASSUMED_BY_ENCODERS, *doubts),
         kind_probabilities={kind: weights[kind] / sum(weights.values()) for kind in KINDS},
     )
+
+
+def _log_percent_by_encoders(encoders: ToothErrorEvidence, facts: PairFacts, teeth: int) -> tuple[float, float]:
+    """Return ln of a crack's depth in percent of the root, and the half width of its 90 % interval.
+
+    Raises
+    ------
+    RefusalError
+        If the load or the number of teeth is beyond those of known cracks, or the depth would be.
+    """
+    known, normal_mpa = load_known_tooth_errors(), facts.load_mpa / cos(radians(PRESSURE_ANGLE_DEG))
+    log_percent, spread = known.log_percent(encoders.rms_um, normal_mpa * facts.module_mm, teeth)
+    known.check_reach(normal_mpa, teeth, exp(log_percent - spread))
+    return log_percent, NORMAL_90 * spread
 
 
 def _depth(log_percent: float, half_width: float, percent_per_mm: float) -> dict[str, Any]:
@@ -667,36 +720,61 @@ def _depth(log_percent: float, half_width: float, percent_per_mm: float) -> dict
     }
 
 
-def _with_encoders(
-    answer: CrackEstimate | NoCrackSeen, encoders: ToothErrorEvidence, prepared: PreparedRecording, facts: PairFacts
+def _together(
+    answer: CrackEstimate | NoCrackSeen, encoders: ToothErrorEvidence, alone: CrackEstimate | None, facts: PairFacts
 ) -> CrackEstimate | NoCrackSeen:
     """Return the answer from vibration and encoders together.
 
-    Two estimates of ln(depth) are independent and weighted by their inverse variances; kinds are multiplied.
+    Two estimates of ln(depth) are independent and weighted by their inverse variances; kinds are multiplied. Where they
+    name different teeth, or depths that exclude each other, the answer is that of the vibration.
+
+    Parameters
+    ----------
+    answer : CrackEstimate or NoCrackSeen
+        From the vibration.
+    encoders : ToothErrorEvidence
+    alone : CrackEstimate or None
+        From the encoders, on the gear of the vibration's answer where both gears show the change.
+    facts : PairFacts
     """
-    alone, said = _by_encoders(encoders, prepared, facts), _encoder_text(encoders)
-    if alone is not None and isinstance(answer, NoCrackSeen):
-        return replace(alone, reasons=(*alone.reasons, f"By the vibration alone: {answer.text}"))
-    if alone is None or isinstance(answer, NoCrackSeen) or alone.shaft != answer.shaft:
-        return replace(answer, reasons=(*answer.reasons, f"{said}."))
-    kinds = {k: answer.kind_probabilities[k] * alone.kind_probabilities[k] / FAULT_PRIORS[k] for k in KINDS}
-    shares = {kind: weight / sum(kinds.values()) for kind, weight in kinds.items()}
-    both = (answer, alone)
-    logs = [log(at.depth_percent) for at in both]
-    halves = [0.5 * log(at.interval_percent[1] / at.interval_percent[0]) for at in both]
-    if abs(logs[0] - logs[1]) > hypot(*halves):
-        text = f"{said}; a crack would be {alone.size} by them, which contradicts the vibration; its depth stands here."
-        return replace(answer, kind_probabilities=shares, reasons=(*answer.reasons, text))
-    weights = [half**-2.0 for half in halves]
-    log_percent = sum(w * at for w, at in zip(weights, logs, strict=True)) / sum(weights)
+    if alone is None:
+        return replace(answer, reasons=(*answer.reasons, encoders.text))
+    by_vibration = f"By the vibration alone: {answer.text}"
+    if isinstance(answer, NoCrackSeen):
+        return replace(alone, reasons=(*alone.reasons, by_vibration))
+    if answer.shaft != alone.shaft and not answer.gear_is_certain:
+        return replace(alone, reasons=(*alone.reasons, by_vibration, *answer.reasons))
+    teeth = facts.driver_teeth if answer.shaft == facts.pair.driver else facts.driven_teeth
+    apart = 0 if answer.tooth is None or alone.tooth is None else abs(answer.tooth - alone.tooth)
+    is_same = answer.shaft == alone.shaft and min(apart, teeth - apart) <= NEIGHBOURS
+    if is_same:
+        (low, high), log_percent = answer.interval_percent, log(answer.depth_percent)
+        half = max(log(high) - log_percent, log_percent - log(low))
+        of_encoders, half_of_encoders = _log_percent_by_encoders(encoders, facts, teeth)
+        is_same = abs(log_percent - of_encoders) <= hypot(half, half_of_encoders)
+    if not is_same:
+        against = f"By the encoders alone: {alone.text} The vibration says otherwise, and its answer is given."
+        return replace(answer, reasons=(*answer.reasons, encoders.text, against))
+    weights = {
+        k: answer.kind_probabilities.get(k, FAULT_PRIORS[k]) * alone.kind_probabilities[k] / FAULT_PRIORS[k]
+        for k in KINDS
+    }
+    # An interval without width, as at the whole root, does not say how certain the vibration is.
+    precisions = [(width or half_of_encoders) ** -2.0 for width in (half, half_of_encoders)]
+    mean = (precisions[0] * log_percent + precisions[1] * of_encoders) / sum(precisions)
+    both = f"By the encoders alone: {alone.text} The depth combines both."
     return replace(
         answer,
         gear_is_certain=answer.gear_is_certain or alone.gear_is_certain,
-        **_depth(log_percent, sum(weights) ** -0.5, answer.depth_percent / answer.depth_mm),
+        **_depth(mean, sum(precisions) ** -0.5, answer.depth_percent / answer.depth_mm),
         p_value=answer.p_value * alone.p_value,
-        kind_probabilities=shares,
-        reasons=(*answer.reasons, f"{said}; by them alone a crack would be {alone.size}. The depth combines both."),
+        kind_probabilities={kind: weight / sum(weights.values()) for kind, weight in weights.items()},
+        reasons=(*answer.reasons, encoders.text, ASSUMED_BY_ENCODERS, both),
     )
+
+
+NEIGHBOURS = 1
+"""Difference of tooth numbers up to which vibration and encoders name the same tooth: each is good to about one."""
 
 
 def reach_of(facts: PairFacts, mesh_hz: float) -> dict[str, float]:
@@ -714,7 +792,13 @@ def judge(
     gears: Sequence[GearEvidence], model: DepthModel, calibration: Calibration, facts: PairFacts
 ) -> CrackEstimate | NoCrackSeen:
     """Decide whether the clearest event is a crack, and how deep it is or may be."""
-    best = max(gears, key=lambda evidence: model.score(evidence.features))
+
+    def rank(evidence: GearEvidence) -> tuple[bool, float]:
+        # An event that is weaker than those of the shallowest cracks must not hide one on the other gear.
+        score = model.score(evidence.features)
+        return score >= model.threshold and not model.is_weaker(evidence.features), score
+
+    best = max(gears, key=rank)
     clear = model.score(best.features) >= model.threshold
     agreements = {  # where nothing changed as much as the shallowest crack changes it, patterns need not agree
         evidence.shaft.shaft: evidence.agreement
@@ -735,7 +819,7 @@ def judge(
             raise
     searched = _searched(gears, model, calibration, facts)
     if strange and weakest is not None:
-        raise RefusalError(
+        raise ReferenceRefusalError(
             f"the teeth's own pattern on shaft {weakest!r} agrees with that of the reference by "
             f"only {agreements[weakest]:.2f}",
             remedy="take a reference of the same gears, same sensors, same speed and load; or leave it out. Teeth that "
@@ -763,6 +847,7 @@ def judge(
         dict(zip(FEATURES, best.features.tolist(), strict=True)),
         (_reference_text(best), *((WEAKER,) if is_weaker else ())),
         searched,
+        stands_out=is_weaker,
     )
 
 
@@ -796,7 +881,7 @@ def _crack_estimate(
     if best.agreement is not None:
         share, error = share_of_the_recording(best.shaft, best.searched, best.event)
         if share < CLEARLY_OF_THE_REFERENCE and share < -STANDARD_ERRORS * error:
-            raise RefusalError(
+            raise ReferenceRefusalError(
                 f"what stands out at one tooth of shaft {shaft!r} seems to be in the reference, not in the recording",
                 remedy="swap both if they were exchanged, or take a reference of healthy gears",
             )

@@ -565,12 +565,21 @@ def _is_allowed_shift(shifts_rev: FloatArray, teeth: int, *, whole_teeth: bool, 
     return np.ones(len(moved), dtype=bool)
 
 
+class ReferenceRefusalError(RefusalError):
+    """The reference does not fit the recording, whatever is measured in them."""
+
+
 def check_same_speed(now: ShaftLines, healthy: ShaftLines) -> None:
-    """Refuse a reference at another speed."""
+    """Refuse a reference at another speed.
+
+    Raises
+    ------
+    ReferenceRefusalError
+    """
     change = abs(now.order_hz / healthy.order_hz - 1.0)
     if change > LARGEST_SPEED_DIFFERENCE:
         rpm = tuple(60.0 * shaft.order_hz for shaft in (healthy, now))
-        raise RefusalError(
+        raise ReferenceRefusalError(
             f"the reference was taken at a speed {100 * change:.1f} % off: shaft {now.shaft!r} turns at {rpm[0]:.5g} "
             f"rpm there, at {rpm[1]:.5g} rpm in the recording",
             remedy=f"take it within {percent(LARGEST_SPEED_DIFFERENCE)} of the same speed, at the same load",

@@ -342,7 +342,8 @@ class CrackEstimate(Result):
     interval_mm, interval_percent : tuples of two floats
         Contains the depth in 90 % of cases, for machines like the calibration's.
     p_value : float
-        Probability of an event this clear on a healthy gear pair, from the calibration's healthy pairs.
+        Probability of an event this clear on a healthy gear pair, from the calibration's healthy pairs; by encoders at
+        most the inverse of the likelihood ratio (Markov's inequality); by both, the product.
     with_reference : bool
         Whether it was compared with a recording of the healthy gears.
     features : mapping
@@ -351,10 +352,10 @@ class CrackEstimate(Result):
         What the reader should know, one sentence each.
     kind_probabilities : mapping
         "cracked", "chipped", "spalled" → probability, with cracks as frequent as chips and spalls together.
-    reach_cycles : float
+    reach_cycles : float or None
         For how many mesh cycles after its centre the event has four times a median other tooth's energy. It depends on
-        damping and resonances as much as on the depth; the estimate does not use it.
-    squeezed_rise_db : float
+        damping and resonances as much as on the depth; the estimate does not use it. None: by encoders.
+    squeezed_rise_db : float or None
         Synchrosqueezed energy at high orders near the tooth over that of a median healthy tooth; see
         `gearsig.severity`. The estimate does not use it.
     agreement : float or None
@@ -375,8 +376,8 @@ class CrackEstimate(Result):
     features: Mapping[str, float] = field(default_factory=dict)
     reasons: tuple[str, ...] = ()
     kind_probabilities: Mapping[str, float] = field(default_factory=dict)
-    reach_cycles: float = 0.0
-    squeezed_rise_db: float = 0.0
+    reach_cycles: float | None = None
+    squeezed_rise_db: float | None = None
     agreement: float | None = None
 
     def __post_init__(self) -> None:
@@ -401,7 +402,7 @@ class CrackEstimate(Result):
     @property
     def place(self) -> str:
         """Tooth or angle, and the gear, in words."""
-        where = f"tooth {self.tooth}" if self.tooth is not None else f"{self.angle_deg:.0f}°"
+        where = f"tooth {self.tooth}" if self.tooth is not None else f"{round(self.angle_deg) % 360}°"
         return f"{where} of {self.gear}{'' if self.gear_is_certain else ' (or its mate)'}"
 
     @property
@@ -468,6 +469,8 @@ class NoCrackSeen(Result):
     reasons : tuple of str
     searched : tuple of ToothSearch
         Of both gears.
+    stands_out : bool
+        Whether something stands out at one tooth as clearly as a crack, though weaker than any of the calibration.
     """
 
     below_mm: float
@@ -477,6 +480,7 @@ class NoCrackSeen(Result):
     features: Mapping[str, float] = field(default_factory=dict)
     reasons: tuple[str, ...] = ()
     searched: tuple[ToothSearch, ...] = field(default=(), repr=False, compare=False)
+    stands_out: bool = False
 
     @property
     def text(self) -> str:

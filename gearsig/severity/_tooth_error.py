@@ -12,10 +12,10 @@ torsion rings, is no evidence. If it is a crack, its depth follows from the size
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from itertools import pairwise
-from math import exp, hypot, log, log10, pi, sqrt
+from math import exp, gcd, hypot, log, log10, pi, sqrt
 from pathlib import Path
 
 import numpy as np
@@ -25,10 +25,12 @@ from scipy.special import logsumexp, softmax
 from gearsig.cache import read_arrays
 from gearsig.checks import FloatArray
 from gearsig.errors import InputError, RefusalError
+from gearsig.formatting import odds_text
 from gearsig.motion import TransmissionError, transmission_error
 from gearsig.prepared import circular_correlation
 from gearsig.recording import Recording
 from gearsig.rig import SIDES, Rig
+from gearsig.severity._features import ReferenceRefusalError
 
 TOOTH_ERRORS_FILE = Path(__file__).with_name("tooth_errors.npz")
 MAX_BYTES = 10_000_000
@@ -43,7 +45,9 @@ TOOTH_FAULTS = (*SINGLE_TOOTH_FAULTS, "pitch_error")
 pitch error may affect one tooth or all."""
 
 OTHER = "other"
-"""Any change that is no fault of a tooth: another load, wear of all teeth, run-out, noise and torsion of the drive."""
+"""Any change that is no fault of single teeth: another load, wear, run-out or uneven pitch of all teeth, noise."""
+
+OF_ALL_TEETH = ("pitch_error", OTHER)
 
 STEPS = 32
 """Steps per pitch."""
@@ -70,8 +74,8 @@ BOTH_GEARS = 0.9
 """Fraction of the larger change from which the other gear shows it as well."""
 
 ONE_IN = 100.0
-"""Largest ratio of the likelihoods of a damaged tooth and of any other change, and of its inverse: encoders' discs have
-faults that no simulator draws. Of 1800 other changes of simulators left out none reaches it."""
+"""Largest ratio of the static likelihoods of a damaged tooth and of any other change, and of its inverse: encoders'
+discs have faults that no simulator draws. Of 1800 other changes of simulators left out one reaches it."""
 
 FAR = 4.3
 """Distance in standard deviations, over all descriptors, at which one known profile counts as much as none, about 0.85
@@ -111,7 +115,7 @@ class ToothErrorChange:
     @property
     def place_rev(self) -> float:
         """Middle of the pitch of the tooth that shows it, in revolutions of its gear from angle zero, 0 to 1."""
-        start = int(np.argmax(_window_energy(_banded(self.pattern_um, LOWEST_ORDER))))
+        start, _ = _event(_banded(self.pattern_um, LOWEST_ORDER))
         size = np.abs(_straightened(np.roll(_banded(self.pattern_um, 0), -start)[:WINDOW]))
         centre = start + float(np.average(np.arange(WINDOW), weights=np.clip(size / size.max() - 0.5, 0.0, None)))
         later = LATER + (TOWARDS_TIP if self.side == 0 else -TOWARDS_TIP)
@@ -122,22 +126,47 @@ def tooth_error_changes(now: TransmissionError, healthy: TransmissionError) -> l
     """Return the change on the gear where it is larger, or on both where they are similar, as with equal teeth.
 
     Teeth are aligned by the encoder counts, unless another rotation leaves less than half of the difference: encoders
-    without an index pulse start anywhere.
+    without an index pulse start anywhere. Where the teeth of one gear are a multiple of the other's, a change of the
+    smaller gear also repeats on the larger one, while a change of the larger one is diluted on the smaller.
     """
     changes = []
+    after_both, before_both = _patterns_um(now), _patterns_um(healthy)
     for side in (0, 1):
-        after, before = (_resampled((t.driver_um, t.driven_um)[side]) for t in (now, healthy))
-        errors = [float(np.mean((t.driver_error_um, t.driven_error_um)[side])) for t in (now, healthy)]
+        (after, after_error_um), (before, before_error_um) = after_both[side], before_both[side]
         pattern = after - _turned(before, after)
         mesh_um = _resampled(healthy.mesh_um[None])[0]
-        changes.append(ToothErrorChange(side, pattern, mesh_um, event_rms_um(pattern), hypot(*errors)))
+        noise_um = hypot(after_error_um, before_error_um)
+        changes.append(ToothErrorChange(side, pattern, mesh_um, event_rms_um(pattern), noise_um))
     largest_um = max(change.rms_um for change in changes)
-    return [change for change in changes if change.rms_um >= BOTH_GEARS * largest_um]
+    similar = [change for change in changes if change.rms_um >= BOTH_GEARS * largest_um]
+    smaller, larger = sorted(now.teeth)
+    if len(similar) > 1 and smaller < larger and larger % smaller == 0:
+        return [min(similar, key=lambda change: len(change.pattern_um))]
+    return similar
+
+
+def _patterns_um(error: TransmissionError) -> list[tuple[FloatArray, float]]:
+    """Return, for each gear, all that it repeats, (z, STEPS), and the standard error of one value.
+
+    What both gears repeat, because their teeth have a common divisor g, `TransmissionError` divides evenly. One damaged
+    tooth is its cause, so that the other gear's part is added: its mean over every g-th tooth.
+    """
+    patterns, error_um = (error.driver_um, error.driven_um), (error.driver_error_um, error.driven_error_um)
+    divisor, ahead = gcd(*error.teeth), error.first_driven_pitch - error.first_pitch
+    repeated = [rows.reshape(-1, divisor, rows.shape[1]).mean(axis=0) for rows in patterns]
+    complete = []
+    for side, turned in ((0, -ahead), (1, ahead)):
+        added = np.tile(np.roll(repeated[1 - side], turned, axis=0), (error.teeth[side] // divisor, 1))
+        # Halves of one measured pattern have the same error, which then is twice as large.
+        further = sqrt((divisor - 1) / error.teeth[1 - side])
+        noise_um = float(np.mean(error_um[side]) + further * np.mean(error_um[1 - side]))
+        complete.append((_resampled(patterns[side] + added), noise_um))
+    return complete
 
 
 def event_rms_um(pattern_um: FloatArray) -> float:
-    """Return the RMS of a change within the window with the most energy."""
-    return sqrt(float(_window_energy(_banded(pattern_um, LOWEST_ORDER)).max()) / WINDOW)
+    """Return the RMS of a change within the window around it."""
+    return sqrt(_event(_banded(pattern_um, LOWEST_ORDER))[1] / WINDOW)
 
 
 def _resampled(rows: FloatArray) -> FloatArray:
@@ -172,9 +201,16 @@ def _banded(pattern: FloatArray, lowest: int) -> FloatArray:
     return banded
 
 
-def _window_energy(wave: FloatArray) -> FloatArray:
+def _event(wave: FloatArray) -> tuple[int, float]:
+    """Return the first step of the window around the largest event, and the energy in it.
+
+    Energy is weighted towards the middle: without weights, each window that holds a short event has as much of it, and
+    most hold it at an edge.
+    """
     square = wave**2
-    return np.convolve(np.concatenate([square, square[: WINDOW - 1]]), np.ones(WINDOW), "valid")
+    weighted = np.convolve(np.concatenate([square, square[: WINDOW - 1]]), np.hanning(WINDOW + 2)[1:-1], "valid")
+    start = int(np.argmax(weighted))
+    return start, float(np.roll(square, -start)[:WINDOW].sum())
 
 
 def tooth_error_descriptors(change: ToothErrorChange) -> FloatArray:
@@ -191,10 +227,9 @@ def tooth_error_descriptors(change: ToothErrorChange) -> FloatArray:
     a pitch then seems compliant, not the shorter.
     """
     wave = _banded(change.pattern_um, LOWEST_ORDER)
-    energy = _window_energy(wave)
-    start = int(np.argmax(energy))
+    start, energy = _event(wave)
     background = float(np.median(np.roll(wave, -start)[WINDOW:] ** 2)) if len(wave) > WINDOW else 0.0
-    over = 10.0 * log10(max(float(energy[start]) / WINDOW, 1e-12) / max(background, 1e-12))
+    over = 10.0 * log10(max(energy / WINDOW, 1e-12) / max(background, 1e-12))
     event = _straightened(np.roll(_banded(change.pattern_um, 0), -start)[:WINDOW])
     event = event if change.side == 0 else event[::-1]
     size = np.abs(event)
@@ -221,7 +256,7 @@ def tooth_error_descriptors(change: ToothErrorChange) -> FloatArray:
     orders = np.fft.rfftfreq(16 * STEPS, 1.0 / STEPS)
     descriptors = np.array(
         [
-            float(energy[start]) / max(float(np.sum(wave**2)), 1e-24),
+            energy / max(float(np.sum(wave**2)), 1e-24),
             min(over, 40.0),
             sign,
             *(float(np.mean(size > part * peak)) * WINDOW / STEPS for part in (0.2, 0.5, 0.8)),
@@ -280,11 +315,14 @@ class KnownToothErrors:
         One of `TOOTH_FAULTS`, or `OTHER`.
     depth : array, (4,)
         c0, c1, c2 and the standard deviation s.
+    reach : array, (3, 2)
+        Lowest and highest load per face width and module, in N/mm²; numbers of teeth; crack depths in percent.
     """
 
     descriptors: FloatArray
     causes: NDArray[np.str_]
     depth: FloatArray
+    reach: FloatArray
 
     @cached_property
     def _root(self) -> FloatArray:
@@ -297,11 +335,17 @@ class KnownToothErrors:
         return np.asarray(self.descriptors @ self._root)
 
     def log_likelihoods(self, descriptors: FloatArray) -> dict[str, float]:
-        """Return ln L of each of `TOOTH_FAULTS` and of `OTHER`; equal where the profile is unlike any known one."""
+        """Return ln L of each of `TOOTH_FAULTS` and of `OTHER`; equal where the profile is unlike any known one.
+
+        Uneven pitch of all teeth and run-out differ in degree only. On the independent rig, eccentric and misaligned
+        gears look like pitch errors as much as pitch errors do, so that these two have one likelihood, their mean.
+        """
         kernels = np.exp(-0.5 * np.sum((self._scaled - descriptors @ self._root) ** 2, axis=1))
         names = (*TOOTH_FAULTS, OTHER)
         beyond = exp(-0.5 * FAR**2) * len(names) / len(self.causes)
-        return {name: log(float(np.mean(kernels[self.causes == name])) + beyond) for name in names}
+        means = {name: float(np.mean(kernels[self.causes == name])) for name in names}
+        means |= dict.fromkeys(OF_ALL_TEETH, float(np.mean([means[name] for name in OF_ALL_TEETH])))
+        return {name: log(mean + beyond) for name, mean in means.items()}
 
     def log_percent(self, rms_um: float, load_n_per_mm: float, teeth: int) -> tuple[float, float]:
         """Return ln of a crack's depth in percent of the root, and its standard deviation.
@@ -316,6 +360,26 @@ class KnownToothErrors:
             Of the cracked gear.
         """
         return float(depth_terms(rms_um, load_n_per_mm, teeth) @ self.depth[:3]), float(self.depth[3])
+
+    def check_reach(self, load_n_per_mm2: float, teeth: int, percent: float) -> None:
+        """Refuse a crack unlike those that are known.
+
+        Raises
+        ------
+        RefusalError
+        """
+        named = {
+            "a load per face width and module of {} N/mm²": load_n_per_mm2,
+            "{} teeth": float(teeth),
+            "a crack through {} % of the root": percent,
+        }
+        lowest, highest = self.reach.T * [[1.0, 1.0, 0.0], [1.0, 1.0, 1.0]]  # shallower cracks are alike
+        for (name, value), low, high in zip(named.items(), lowest, highest, strict=True):
+            if not low <= value <= high:
+                raise RefusalError(
+                    f"{name.format(f'{value:.3g}')} is beyond the known cracks, {low:.3g} to {high:.3g}",
+                    remedy="judge by the vibration",
+                )
 
 
 def depth_terms(rms_um: float, load_n_per_mm: float, teeth: int) -> FloatArray:
@@ -342,13 +406,14 @@ def load_known_tooth_errors() -> KnownToothErrors:
         If the file is missing or damaged.
     """
     arrays = read_arrays(TOOTH_ERRORS_FILE, MAX_BYTES)
-    if arrays is None or not {"descriptors", "causes", "depth"} <= arrays.keys():
+    if arrays is None or not {"descriptors", "causes", "depth", "reach"} <= arrays.keys():
         raise InputError(
             "the known changes of transmission errors are missing, damaged or of another version",
             where=TOOTH_ERRORS_FILE.name,
             remedy=MAKE_TOOTH_ERRORS,
         )
-    return KnownToothErrors(arrays["descriptors"].astype(np.float64), arrays["causes"], arrays["depth"])
+    descriptors = arrays["descriptors"].astype(np.float64)
+    return KnownToothErrors(descriptors, arrays["causes"], arrays["depth"], arrays["reach"])
 
 
 def has_encoders(recording: Recording) -> bool:
@@ -364,65 +429,103 @@ class ToothErrorEvidence:
     ----------
     log_likelihoods : mapping
         One of `TOOTH_FAULTS`, or `OTHER` → ln L.
+    weight : float
+        How much a static profile counts at this speed, 0 to 1; ln L includes it.
     rms_um : float
-        RMS of the change, while the teeth that show it are in mesh.
-    gear : str
-        Gear that shows it, "driver" or "driven"; empty if not known.
-    place_rev : float
-        Middle of the pitch of the tooth that shows it, in revolutions of that gear (where it is not known, of the
-        driver) from angle zero, 0 to 1.
+        RMS of the change while the teeth that show it are in mesh.
+    places_rev : mapping
+        "driver" or "driven" → middle of the pitch of the tooth that shows it, in revolutions of that gear from its
+        angle zero, 0 to 1; one gear, or both where they show it alike.
     """
 
     log_likelihoods: Mapping[str, float]
+    weight: float
     rms_um: float
-    gear: str
-    place_rev: float = 0.0
+    places_rev: Mapping[str, float]
 
     @property
     def probabilities(self) -> dict[str, float]:
-        """Return tooth fault → probability if a tooth is damaged, for equal priors, most probable first."""
-        levels = np.array([self.log_likelihoods[name] for name in TOOTH_FAULTS])
-        shares = dict(zip(TOOTH_FAULTS, softmax(levels).tolist(), strict=True))
+        """Return fault → probability if a single tooth is damaged, for equal priors, most probable first."""
+        levels = np.array([self.log_likelihoods[name] for name in SINGLE_TOOTH_FAULTS])
+        shares = dict(zip(SINGLE_TOOTH_FAULTS, softmax(levels).tolist(), strict=True))
         return dict(sorted(shares.items(), key=lambda item: -item[1]))
 
     @property
-    def gear_text(self) -> str:
-        """The gear that shows it, in words; empty if not known."""
-        return {"driver": "the driver", "driven": "the driven gear"}.get(self.gear, "")
+    def gear(self) -> str:
+        """The gear that shows it, "driver" or "driven"; empty if both do."""
+        return next(iter(self.places_rev)) if len(self.places_rev) == 1 else ""
 
     @property
     def odds_of_a_tooth(self) -> float:
-        """Likelihood of a damaged tooth over that of any other change, within a factor `ONE_IN` of 1."""
+        """Likelihood of a single damaged tooth, its faults equally likely, over that of any other change.
+
+        The factor lies within `ONE_IN` of 1; that of one fault may be three times as large.
+        """
         return exp(_log_mean(self.log_likelihoods) - self.log_likelihoods[OTHER])
 
     @property
-    def is_unlike_any(self) -> bool:
-        """Whether the profile is unlike any known one, so that it distinguishes no faults."""
-        return max(self.probabilities.values()) < UNLIKE
+    def distinguishes_faults(self) -> bool:
+        """Whether the profile makes one fault of a tooth likelier than another."""
+        return max(self.probabilities.values()) >= UNLIKE
+
+    @property
+    def text(self) -> str:
+        """What the encoders show, in one sentence or two."""
+        where = {"driver": " on the driver", "driven": " on the driven gear"}.get(self.gear, "")
+        changed = f"By the encoders, the transmission error changed by {self.rms_um:.2g} µm rms where it changed most"
+        odds, other = self.odds_of_a_tooth, "wear, run-out, uneven pitch or another load"
+        if 1.0 / UNDECIDED < odds < UNDECIDED and not self.distinguishes_faults:
+            return (
+                f"{changed}{where}, which at this speed does not distinguish faults: the drive oscillates too. {SLOWER}"
+            )
+        if odds <= 1.0 / UNDECIDED:
+            return f"{changed}{where}, {1.0 / odds:.0f} times as likely with {other} as with a damaged tooth."
+        times = (
+            f"{odds:.0f} times as likely with a damaged tooth as"
+            if odds >= UNDECIDED
+            else "as likely with a damaged tooth as"
+        )
+        faults = [f"{FAULT_WORDS[name]} {odds_text(p)}" for name, p in self.probabilities.items() if p >= 0.05]
+        which = f" A damaged tooth would be {', '.join(faults)}." if self.distinguishes_faults else ""
+        return f"{changed}{where}, {times} with {other}.{which}"
 
 
-UNLIKE = 0.3
-"""Probability of the most probable of four faults below which they are practically equal."""
+UNLIKE = 0.4
+"""Probability of the most probable of three faults below which they are practically equal."""
+UNDECIDED = 3.0
+"""Odds, and their inverse, within which a change is as likely with a damaged tooth as without."""
+SLOWER = "At a few revolutions per second or less its profile distinguishes crack, spall and chip."
+FAULT_WORDS = {CRACK: "cracked", "tooth_spall": "spalled", "chipped_tooth": "chipped"}
 
 
 def _log_mean(log_likelihoods: Mapping[str, float]) -> float:
-    """Return ln L of a damaged tooth, all faults equally likely."""
-    return float(logsumexp([log_likelihoods[name] for name in TOOTH_FAULTS])) - log(len(TOOTH_FAULTS))
+    """Return ln L of a single damaged tooth, its faults equally likely."""
+    levels = [log_likelihoods[name] for name in SINGLE_TOOTH_FAULTS]
+    return float(logsumexp(levels)) - log(len(levels))
 
 
-def mean_log_likelihoods(evidence: Sequence[ToothErrorEvidence]) -> dict[str, float]:
-    """Return cause → mean ln L over conditions, which are strongly dependent; empty where there is no evidence."""
-    return {
-        name: float(np.mean([at_condition.log_likelihoods[name] for at_condition in evidence]))
+def combined_evidence(evidences: Sequence[ToothErrorEvidence]) -> ToothErrorEvidence | None:
+    """Return the evidence of several operating points, ln L = w_max Σ ln L_i/Σ w_i; None where there is none.
+
+    They show the same teeth, so that they are dependent: the static likelihoods are averaged, each with the weight of
+    its speed, and count as much as at the slowest.
+    """
+    if not evidences:
+        return None
+    weights = np.array([evidence.weight for evidence in evidences])
+    largest = float(weights.max())
+    clearest = max(evidences, key=lambda evidence: evidence.rms_um)
+    log_likelihoods = {
+        name: largest * float(np.sum([evidence.log_likelihoods[name] for evidence in evidences]) / weights.sum())
         for name in (*TOOTH_FAULTS, OTHER)
-        if evidence
     }
+    return replace(clearest, log_likelihoods=log_likelihoods, weight=largest)
 
 
 def tooth_error_evidence(
     recording: Recording, reference: Recording, rig: Rig | None = None
 ) -> ToothErrorEvidence | None:
-    """Return the evidence from a change in transmission error; None where it was not measured.
+    """Return the evidence from a change in transmission error; None where neither recording has encoders.
 
     Parameters
     ----------
@@ -434,11 +537,15 @@ def tooth_error_evidence(
     Raises
     ------
     InputError, RefusalError
-        If there are encoders, but the transmission error cannot be computed, see `transmission_error`, or did not
-        change by more than its noise.
+        If only one has encoders, the transmission error cannot be computed, see `transmission_error`, did not change by
+        more than its noise, or changed the wrong way round.
     """
-    if not (has_encoders(recording) and has_encoders(reference)):
+    of_both = has_encoders(recording), has_encoders(reference)
+    if not any(of_both):
         return None
+    if not all(of_both):
+        which = "recording" if of_both[0] else "reference"
+        raise RefusalError(f"only the {which} has encoders on two shafts", remedy="record both with the same encoders")
     rigs = [rig or measured.rig for measured in (recording, reference)]
     now, healthy = (
         transmission_error(measured, of, pair=of.pairs[0].name if of is not None and of.pairs else "")
@@ -452,13 +559,34 @@ def tooth_error_evidence(
             f"the transmission error did not change by more than its noise, {noise_um:.2g} µm rms",
             remedy="finer encoders, or a longer recording, show smaller changes",
         )
-    weight = 1.0 / (1.0 + now.mesh_hz / STATIC_MESH_HZ)
-    per_gear = [load_known_tooth_errors().log_likelihoods(tooth_error_descriptors(change)) for change in changes]
-    log_likelihoods = {
-        name: weight * log(float(np.mean([exp(measured[name]) for measured in per_gear]))) for name in per_gear[0]
-    }
-    odds = float(np.clip(_log_mean(log_likelihoods) - log_likelihoods[OTHER], -log(ONE_IN), log(ONE_IN)))
-    log_likelihoods[OTHER] = _log_mean(log_likelihoods) - odds
-    clearest = max(changes, key=lambda change: change.rms_um)
-    gear = SIDES[changes[0].side] if len(changes) == 1 else ""
-    return ToothErrorEvidence(log_likelihoods, clearest.rms_um, gear, (clearest if gear else changes[0]).place_rev)
+    known = load_known_tooth_errors()
+    weight = 1.0 / (1.0 + max(now.mesh_hz, healthy.mesh_hz) / STATIC_MESH_HZ)
+    per_gear = [known.log_likelihoods(tooth_error_descriptors(change)) for change in changes]
+    static = {name: log(float(np.mean([exp(of_gear[name]) for of_gear in per_gear]))) for name in per_gear[0]}
+    _check_direction(changes, static, known)
+    odds = float(np.clip(_log_mean(static) - static[OTHER], -log(ONE_IN), log(ONE_IN)))
+    static |= dict.fromkeys(OF_ALL_TEETH, _log_mean(static) - odds)
+    return ToothErrorEvidence(
+        {name: weight * value for name, value in static.items()},
+        weight,
+        max(change.rms_um for change in changes),
+        {SIDES[change.side]: change.place_rev for change in changes},
+    )
+
+
+def _check_direction(
+    changes: Sequence[ToothErrorChange], log_likelihoods: Mapping[str, float], known: KnownToothErrors
+) -> None:
+    """Refuse recordings that seem to be exchanged: a crack, spall or chip always lets the driven gear lag."""
+    likeliest = max(log_likelihoods.values())
+    for change in changes:
+        exchanged = known.log_likelihoods(tooth_error_descriptors(replace(change, pattern_um=-change.pattern_um)))
+        if max(exchanged[name] for name in SINGLE_TOOTH_FAULTS) - likeliest > log(CLEARLY_A_TOOTH):
+            raise ReferenceRefusalError(
+                "by the encoders, a tooth seems to be damaged in the reference, not in the recording",
+                remedy="swap both if they were exchanged, or take a reference of healthy gears",
+            )
+
+
+CLEARLY_A_TOOTH = 20.0
+"""Odds of a damaged tooth from which the encoders alone show one."""

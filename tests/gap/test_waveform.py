@@ -7,6 +7,7 @@ import pytest
 
 from gearsig.gap import SIDEBAND_OFFSETS as OFFSETS
 from gearsig.gap import (
+    UNKNOWN,
     AddedEffect,
     GapEffect,
     SimulatedWaveform,
@@ -234,3 +235,11 @@ def test_the_transmission_error_changes_how_probable_a_damaged_tooth_is() -> Non
     assert after["unbalance"] / after["none"] == pytest.approx(2.0)
     assert sum(after.values()) == pytest.approx(1.0)
     assert with_likelihoods(before, {OTHER: -3.0}) == pytest.approx(before)
+
+
+def test_an_unknown_cause_may_be_on_a_tooth_as_well() -> None:
+    """A user's own fault of a tooth has no likelihood of its own."""
+    before = {"root_crack": 0.1, "tooth_spall": 0.1, "none": 0.1, UNKNOWN: 0.7}
+    after = with_likelihoods(before, {"root_crack": 0.0, "tooth_spall": 0.0, OTHER: -np.log(100.0)})
+    assert after[UNKNOWN] / after["root_crack"] == pytest.approx(7.0 * 0.505)
+    assert after["none"] < 0.01

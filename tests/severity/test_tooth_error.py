@@ -10,15 +10,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gearsig.errors import RefusalError
+from gearsig.motion import TransmissionError
 from gearsig.recording import Recording
 from gearsig.severity import (
     OTHER,
+    SINGLE_TOOTH_FAULTS,
     TOOTH_FAULTS,
     CrackEstimate,
     KnownToothErrors,
+    NoCrackSeen,
     ToothErrorChange,
     ToothErrorEvidence,
+    combined_evidence,
     estimate_crack,
+    tooth_error_changes,
     tooth_error_descriptors,
     tooth_error_evidence,
 )
@@ -26,6 +31,7 @@ from sims.cracked import CrackedPair
 from sims.effects import EffectSetting
 from sims.machine import Operation
 from sims.simulator import SimulationSetup
+from tests.severity.gearbox import Record
 
 STEPS, TEETH = 32, 20
 
@@ -82,23 +88,63 @@ def known() -> tuple[KnownToothErrors, np.ndarray]:
     rng = np.random.default_rng(1)
     centres = 3.0 * rng.standard_normal((5, 17))
     rows = np.concatenate([centre + rng.standard_normal((60, 17)) for centre in centres])
-    return KnownToothErrors(rows, np.repeat([*TOOTH_FAULTS, OTHER], 60), np.array([7.0, 0.9, -8.0, 0.3])), centres
+    depth, reach = np.array([7.0, 0.9, -8.0, 0.3]), np.array([[15.0, 120.0], [18.0, 100.0], [10.0, 80.0]])
+    return KnownToothErrors(rows, np.repeat([*TOOTH_FAULTS, OTHER], 60), depth, reach), centres
 
 
 def test_a_known_profile_is_identified_and_a_strange_one_is_not() -> None:
     errors, centres = known()
     for name, centre in zip((*TOOTH_FAULTS, OTHER), centres, strict=True):
         said = errors.log_likelihoods(centre)
-        assert max(said, key=said.__getitem__) == name
+        assert max(said, key=said.__getitem__) == (name if name in SINGLE_TOOTH_FAULTS else "pitch_error")
+        assert said["pitch_error"] == said[OTHER]
     far = [*errors.log_likelihoods(centres.mean(axis=0) + 100.0).values()]
     assert np.ptp(far) == pytest.approx(0.0, abs=1e-9)
 
 
-@pytest.mark.parametrize(("other", "expected"), [(-9.0, 90.0), (-2.0, 1.0 / 12.2), (-4.5, 1.0)])
-def test_the_odds_of_a_tooth_are_those_of_a_mean_fault(other: float, expected: float) -> None:
-    said = ToothErrorEvidence(dict.fromkeys(TOOTH_FAULTS, -4.5) | {OTHER: other}, 2.0, "driver")
-    assert said.odds_of_a_tooth == pytest.approx(expected, rel=0.01)
-    assert said.is_unlike_any
+def evidence(
+    odds: float = 50.0, rms_um: float = 2.0, places_rev: dict[str, float] | None = None, **gained: float
+) -> ToothErrorEvidence:
+    """Evidence of these odds, with the log-likelihoods of some faults raised by what they gained."""
+    levels = {name: gained.get(name, 0.0) for name in SINGLE_TOOTH_FAULTS}
+    mean = np.log(np.mean(np.exp([*levels.values()])))
+    where = {"driver": 0.38} if places_rev is None else places_rev
+    return ToothErrorEvidence(levels | dict.fromkeys(("pitch_error", OTHER), mean - np.log(odds)), 1.0, rms_um, where)
+
+
+@pytest.mark.parametrize("odds", [90.0, 1.0 / 12.0, 1.0])
+def test_the_odds_of_a_tooth_are_those_of_a_mean_fault(odds: float) -> None:
+    assert evidence(odds).odds_of_a_tooth == pytest.approx(odds)
+    assert not evidence(odds).distinguishes_faults
+    assert evidence(odds, root_crack=3.0).distinguishes_faults
+
+
+def test_what_encoders_show_is_said_as_strongly_as_they_show_it() -> None:
+    damaged, worn = evidence(50.0, root_crack=3.0).text, evidence(0.02, root_crack=3.0).text
+    assert "50 times as likely with a damaged tooth" in damaged
+    assert "cracked 91 %" in damaged
+    assert "50 times as likely with wear" in worn
+    assert "cracked" not in worn
+    assert "does not distinguish" in evidence(1.0).text
+
+
+def test_conditions_count_by_their_speed_and_together_as_the_slowest() -> None:
+    """A fast one, where the drive rings, must not dilute what a slow one shows."""
+    slow, fast = evidence(50.0), replace(evidence(50.0**0.2), weight=0.2)
+    both, twice = combined_evidence([slow, fast]), combined_evidence([slow, slow])
+    assert both is not None
+    assert twice is not None
+    assert both.odds_of_a_tooth == pytest.approx(50.0)
+    assert twice.odds_of_a_tooth == pytest.approx(50.0)
+    assert combined_evidence([]) is None
+
+
+@pytest.mark.parametrize(("load", "teeth", "percent"), [(8.0, 30, 30.0), (50.0, 12, 30.0), (50.0, 30, 95.0)])
+def test_a_depth_is_not_told_beyond_known_cracks(load: float, teeth: int, percent: float) -> None:
+    errors, _ = known()
+    errors.check_reach(50.0, 30, 2.0)
+    with pytest.raises(RefusalError, match="beyond the known cracks"):
+        errors.check_reach(load, teeth, percent)
 
 
 def test_a_larger_change_is_a_deeper_crack() -> None:
@@ -119,15 +165,145 @@ def test_encoders_identify_a_crack_at_low_speed() -> None:
     said = tooth_error_evidence(cracked, healthy)
     assert said is not None
     assert said.gear == "driver"
-    assert int(55 * said.place_rev) + 1 == 7
+    assert int(55 * said.places_rev["driver"]) + 1 == 7
     assert next(iter(said.probabilities)) == "root_crack"
     assert said.probabilities["root_crack"] > 0.7
     assert said.odds_of_a_tooth > 20.0
     with pytest.raises(RefusalError, match="did not change"):
         tooth_error_evidence(healthy.between(0.0, 2.5), healthy.between(2.5, 5.0))
+    with pytest.raises(RefusalError, match="in the reference"):
+        tooth_error_evidence(healthy, cracked)
+    with pytest.raises(RefusalError, match="in the reference"):
+        estimate_crack(healthy, reference=cracked)
     estimate = estimate_crack(cracked, reference=healthy)
     assert isinstance(estimate, CrackEstimate)
     assert estimate.kind == "cracked"
     assert estimate.shaft == "input"
     assert estimate.interval_mm[0] < 3.0 < estimate.interval_mm[1]
     assert "encoders" in " ".join(estimate.reasons)
+
+
+def transmission(teeth: tuple[int, int], *events: tuple[int, int]) -> TransmissionError:
+    """Both gears' parts, least squares of minimum norm as `transmission_error` separates them, of events (side, tooth).
+
+    An event of 1.5 pitches, 1 µm high. Angles start at tooth 3 of the driver and tooth 11 of the driven gear.
+    """
+    first, n_steps = (3, 11), STEPS
+    n_rows = 3 * np.lcm(*teeth)
+    number = np.arange(n_rows)
+    errors = np.zeros((n_rows, n_steps))
+    bump = np.sin(np.pi * (np.arange(48) + 0.5) / 48.0) ** 2
+    for side, tooth in events:
+        met = np.flatnonzero((first[side] + number) % teeth[side] == tooth)
+        for row in met[met < n_rows - 2]:
+            errors.reshape(-1)[row * n_steps : row * n_steps + 48] += bump
+    at = [(start + number) % z for start, z in zip(first, teeth, strict=True)]
+    columns = np.hstack([np.eye(z)[k] for z, k in zip(teeth, at, strict=True)])
+    parts = np.linalg.pinv(columns) @ (errors - errors.mean(axis=0))
+    gears = parts[: teeth[0]], parts[teeth[0] :]
+    shown = [gear - gear.mean(axis=0) for gear in gears]
+    noise = [np.full(gear.shape, 1e-3) for gear in gears]
+    return TransmissionError(
+        errors, *first, np.cos(2.0 * np.pi * np.arange(n_steps) / n_steps), *shown, *noise, (0.05, 0.05),
+        ("input", "output"), np.arange(n_rows) * 1e-2,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("side", [0, 1])
+@pytest.mark.parametrize("teeth", [(20, 31), (20, 20), (15, 30), (30, 15), (20, 30)])
+def test_the_whole_event_is_found_whatever_divisor_the_teeth_share(teeth: tuple[int, int], side: int) -> None:
+    """Separated evenly, each of two equal gears shows half of it. Low orders take more from a gear of few teeth."""
+    tooth = 8
+    changes = tooth_error_changes(transmission(teeth, (side, tooth)), transmission(teeth))
+    sides = [change.side for change in changes]
+    assert sides == ([0, 1] if teeth[0] == teeth[1] else [side])
+    alone = tooth_error_changes(transmission((21, 31), (side, tooth)), transmission((21, 31)))
+    assert [change.rms_um for change in changes] == pytest.approx([alone[0].rms_um] * len(sides), rel=0.15)
+
+
+ESTIMATE = "gearsig.severity._estimate"
+
+
+def estimated(
+    monkeypatch: pytest.MonkeyPatch, evidence: ToothErrorEvidence, recording: Recording, healthy: Recording
+) -> CrackEstimate | NoCrackSeen:
+    """The crack estimate of recordings without encoders, as if they had shown this."""
+    monkeypatch.setattr(f"{ESTIMATE}.tooth_error_evidence", lambda *_: evidence)
+    return estimate_crack(recording, reference=healthy)
+
+
+CRACKED = {"root_crack": 6.0}
+
+
+def test_encoders_make_the_same_crack_more_certain(
+    monkeypatch: pytest.MonkeyPatch, record: Record, healthy: Recording
+) -> None:
+    alone = estimate_crack(record(2.0), reference=healthy)
+    assert isinstance(alone, CrackEstimate)
+    assert alone.tooth is not None
+    place = {"driver": (alone.tooth - 0.5) / 29}
+    both = estimated(monkeypatch, evidence(5.0, 1.0, place, **CRACKED), record(2.0), healthy)
+    assert isinstance(both, CrackEstimate)
+    assert both.tooth == alone.tooth
+    assert np.ptp(np.log(both.interval_mm)) < np.ptp(np.log(alone.interval_mm))
+    assert both.p_value == pytest.approx(alone.p_value / 5.0)
+    assert both.kind_probabilities["cracked"] > alone.kind_probabilities["cracked"]
+
+
+@pytest.mark.parametrize("place", [{"driver": 0.9}, {"driven": 0.4}])
+def test_encoders_that_name_another_tooth_are_said_and_not_counted(
+    monkeypatch: pytest.MonkeyPatch, record: Record, healthy: Recording, place: dict[str, float]
+) -> None:
+    alone = estimate_crack(record(2.0), reference=healthy)
+    other = estimated(monkeypatch, evidence(50.0, 1.0, place, **CRACKED), record(2.0), healthy)
+    assert isinstance(other, CrackEstimate)
+    assert replace(other, reasons=()) == replace(alone, reasons=())
+    assert "The vibration says otherwise" in other.reasons[-1]
+
+
+def test_encoders_stand_in_for_the_vibration_but_not_for_a_fitting_reference(
+    monkeypatch: pytest.MonkeyPatch, record: Record, healthy: Recording
+) -> None:
+    clear = evidence(50.0, 1.0, {"driven": 0.4}, **CRACKED)
+    short = record(2.0, duration_s=0.4)
+    answer = estimated(monkeypatch, clear, short, healthy)
+    assert isinstance(answer, CrackEstimate)
+    assert answer.shaft == "output"
+    assert answer.reach_cycles is None
+    assert answer.p_value == pytest.approx(0.02)
+    assert "By the vibration there is no estimate" in " ".join(answer.reasons)
+    with pytest.raises(RefusalError, match=r"revolutions.*needed"):
+        estimated(monkeypatch, evidence(2.0), short, healthy)
+    with pytest.raises(RefusalError, match="By the encoders"):
+        estimated(monkeypatch, evidence(2.0), short, healthy)
+    with pytest.raises(RefusalError, match="same samples"):
+        estimated(monkeypatch, clear, healthy, healthy)
+    with pytest.raises(RefusalError, match="at a speed"):
+        estimated(monkeypatch, clear, record(2.0, speed_rpm=1400.0), healthy)
+
+
+def test_encoders_that_show_no_tooth_leave_the_answer_to_the_vibration(
+    monkeypatch: pytest.MonkeyPatch, record: Record, healthy: Recording
+) -> None:
+    alone = estimate_crack(record(2.0), reference=healthy)
+    answer = estimated(monkeypatch, evidence(0.02, **CRACKED), record(2.0), healthy)
+    assert replace(answer, reasons=()) == replace(alone, reasons=())
+    assert "as likely with wear" in answer.reasons[-1]
+
+
+def test_a_depth_at_the_whole_root_can_be_combined(
+    monkeypatch: pytest.MonkeyPatch, record: Record, healthy: Recording
+) -> None:
+    """Intervals end at 100 %, so that their width may be nothing."""
+    whole = estimate_crack(record(2.0), reference=healthy)
+    assert isinstance(whole, CrackEstimate)
+    whole_mm = 100.0 * whole.depth_mm / whole.depth_percent
+    fields = {"depth_percent": 100.0, "interval_percent": (100.0, 100.0), "depth_mm": whole_mm}
+    whole = replace(whole, **fields, interval_mm=(whole_mm, whole_mm), kind_probabilities={})
+    monkeypatch.setattr(f"{ESTIMATE}._by_vibration", lambda *_: whole)
+    assert whole.tooth is not None
+    place = {"driver": (whole.tooth - 0.5) / 29}
+    answer = estimated(monkeypatch, evidence(50.0, 1.1, place, **CRACKED), record(2.0), healthy)
+    assert isinstance(answer, CrackEstimate)
+    assert answer.interval_percent[0] < 100.0
+    assert answer.kind == "cracked"

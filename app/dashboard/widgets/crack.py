@@ -101,15 +101,16 @@ def _show_answer(estimate: CrackEstimate | NoCrackSeen) -> None:
         tooth = f"tooth {estimate.tooth}" if estimate.tooth is not None else "not known"
         gear = f"{estimate.gear}{'' if estimate.gear_is_certain else ' or its mate'}"
         kinds = ", ".join(f"{kind} {percent(share)}" for kind, share in estimate.kind_probabilities.items())
-        event = f"{estimate.reach_cycles:.1f} mesh cycles; {signed(estimate.squeezed_rise_db)} dB over a healthy tooth"
         numbers = {
             "Depth of a crack": f"{estimate.depth_mm:.2f} mm, {estimate.depth_percent:.0f} % of the root",
             "90 % interval": f"{low:.2f} to {high:.2f} mm",
             "Place": f"{tooth}, {estimate.angle_deg:.0f}°, {gear}",
             "Looks like": kinds or estimate.kind,
             "Chance of as much on healthy gears": f"{estimate.p_value:.2g}",
-            "Event": event,
         }
+        if estimate.reach_cycles is not None and estimate.squeezed_rise_db is not None:
+            rise = f"{signed(estimate.squeezed_rise_db)} dB over a healthy tooth"
+            numbers["Event"] = f"{estimate.reach_cycles:.1f} mesh cycles; {rise}"
         show_facts((*st.columns(3), *st.columns(3)), numbers)
     st.markdown("\n".join(f"- {as_typed(reason)}" for reason in estimate.reasons))
 

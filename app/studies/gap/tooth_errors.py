@@ -19,6 +19,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 import typer
 from numpy.typing import NDArray
+from scipy.special import softmax
 
 from app.studies import run_study
 from app.studies.gap.quasi_static import (
@@ -376,6 +377,15 @@ def _depth_percent(mesh: GearMesh, side: int) -> float:
     return cracks[0].depth_mm * percent_per_mm(gear.teeth, gear.module_mm) if cracks else nan
 
 
+def _reach_of(drawn: Sequence[DrawnChange]) -> FloatArray:
+    """Return `KnownToothErrors.reach`: the drawn loads and, of the cracks, teeth and depths; nan without cracks."""
+    cracks = [one for one in drawn if one.depth_percent == one.depth_percent]
+    if not cracks:
+        return np.full((3, 2), nan)
+    teeth, depths = [len(one.change.pattern_um) for one in cracks], [one.depth_percent for one in cracks]
+    return np.array([LOAD_N_PER_MM2, (min(teeth), max(teeth)), (min(depths), max(depths))])
+
+
 TYPICAL_CRACK = (-5.4, 1.0 / 40.0)
 """ln(change in µm per N/mm) and 1/z in the middle of the drawn cracks."""
 
@@ -398,7 +408,7 @@ def known_tooth_errors_of(simulator: str, n_each: int) -> KnownToothErrors:
             except (InputError, RefusalError):
                 continue
     rows = np.array([tooth_error_descriptors(one.change) for one in drawn])
-    return KnownToothErrors(rows, np.repeat([*TOOTH_FAULTS, OTHER], n_each), _depth_of(drawn))
+    return KnownToothErrors(rows, np.repeat([*TOOTH_FAULTS, OTHER], n_each), _depth_of(drawn), _reach_of(drawn))
 
 
 def _depth_of(drawn: Sequence[DrawnChange]) -> FloatArray:
@@ -422,18 +432,21 @@ def together(several: Sequence[KnownToothErrors]) -> KnownToothErrors:
     at = np.array([1.0, *TYPICAL_CRACK])
     apart = float(np.std(depths[:, :3] @ at))
     depth = [*depths[:, :3].mean(axis=0), np.hypot(apart, np.sqrt(np.mean(depths[:, 3] ** 2)))]
-    return KnownToothErrors(descriptors, np.concatenate([known.causes for known in several]), np.array(depth))
+    causes, reaches = np.concatenate([known.causes for known in several]), [known.reach for known in several]
+    reach = np.stack([np.nanmin(reaches, axis=0)[:, 0], np.nanmax(reaches, axis=0)[:, 1]], axis=1)
+    return KnownToothErrors(descriptors, causes, np.array(depth), reach)
 
 
 def evidence_on(known: KnownToothErrors, rows: FloatArray) -> list[ToothErrorEvidence]:
     """Return the evidence that rows of descriptors are; their size and gear do not matter."""
-    return [ToothErrorEvidence(known.log_likelihoods(row), nan, "") for row in rows]
+    return [ToothErrorEvidence(known.log_likelihoods(row), 1.0, nan, {}) for row in rows]
 
 
 def named(evidence: Sequence[ToothErrorEvidence]) -> tuple[NDArray[np.str_], FloatArray]:
     """Return the most probable fault of each and its probability, with equal priors for all four."""
-    faults, probabilities = zip(*(next(iter(one.probabilities.items())) for one in evidence), strict=True)
-    return np.array(faults), np.array(probabilities)
+    levels = np.array([[one.log_likelihoods[name] for name in TOOTH_FAULTS] for one in evidence])
+    shares = softmax(levels, axis=1)
+    return np.array(TOOTH_FAULTS)[shares.argmax(axis=1)], shares.max(axis=1)
 
 
 def _print_accuracy(
@@ -451,33 +464,44 @@ def _print_accuracy(
 def _print_odds(causes: NDArray[np.str_], evidence: Sequence[ToothErrorEvidence]) -> None:
     """Print how often encoders' odds of a damaged tooth are high, for damaged teeth and for other changes."""
     odds = np.array([one.odds_of_a_tooth for one in evidence])
-    for name in (*TOOTH_FAULTS, OTHER):
+    for name in dict.fromkeys(causes.tolist()):
         of_it = odds[causes == name]
-        typer.echo(
-            f"  {name}: odds of a damaged tooth ≥ 20 {np.mean(of_it >= 20):.3f}, ≥ 100 {np.mean(of_it >= 100):.3f}"
-        )
+        shares = ", ".join(f"≥ {limit} {np.mean(of_it >= limit):.3f}" for limit in (3, 20, 100))
+        typer.echo(f"  {name}: {len(of_it)}, odds of a damaged tooth {shares}")
 
 
 ENCODER_COUNTS = 200_000
+OTHER_EFFECTS = ("eccentricity", "misalignment", "tooth_wear")
+"""Effects of the independent rig that change the transmission error without a fault of a tooth."""
+
+
+OTHER_EFFECTS = ("eccentricity", "misalignment", "tooth_wear")
+"""Effects of the independent rig that change the transmission error without a fault of a tooth."""
 
 
 def name_blindly(n_each: int) -> None:
-    """Identify faults of the independent rig's development gears by its encoders; print the share of right answers."""
+    """Identify faults of the independent rig's development gears by its encoders; print the share of right answers.
+
+    Changes without a fault of a tooth are among them, to compare the odds.
+    """
     rng = np.random.default_rng([SEED, 9])
-    rows: list[tuple[str, str, float]] = []
-    unlike = 0
-    for fault in [name for name in TOOTH_FAULTS for _ in range(n_each)]:
+    causes: list[str] = []
+    evidence: list[ToothErrorEvidence] = []
+    not_seen: list[str] = []
+    for cause in [name for name in (*TOOTH_FAULTS, *OTHER_EFFECTS) for _ in range(n_each)]:
         level = float(rng.uniform(0.5, 1.0))
-        case = draw_case(rng, "development", kind="single", effect=fault, level=level, with_reference=True)
+        case = draw_case(rng, "development", kind="single", effect=cause, level=level, with_reference=True)
         recorded = record_case(case, encoder_counts=ENCODER_COUNTS)
         for now, reference in zip(recorded.conditions, recorded.references, strict=True):
-            evidence = answer_or_none(partial(tooth_error_evidence, now, reference), now.name, [])
-            if evidence is None or evidence.is_unlike_any:
-                unlike += 1
-                continue
-            rows.append((fault, *next(iter(evidence.probabilities.items()))))
-    columns = [np.array(column) for column in zip(*rows, strict=True)]
-    _print_accuracy(f"independent rig, {unlike} unlike any or not seen", columns[0], columns[1], columns[2])
+            said = answer_or_none(partial(tooth_error_evidence, now, reference), f"{cause} {now.name}", not_seen)
+            if said is not None:
+                causes.append(cause)
+                evidence.append(said)
+    told = [i for i, cause in enumerate(causes) if cause in TOOTH_FAULTS]
+    truth = np.array(causes)
+    title = f"independent rig, {len(not_seen)} not seen"
+    _print_accuracy(title, truth[told], *named([evidence[i] for i in told]))
+    _print_odds(truth, evidence)
 
 
 def main(
@@ -496,7 +520,8 @@ def main(
     everything = together([*by_simulator.values()])
     typer.echo(f"depth of cracks: {everything.depth.round(3).tolist()}")
     rows = everything.descriptors.astype(np.float16)
-    write_arrays(to, {"descriptors": rows, "causes": everything.causes, "depth": everything.depth})
+    numbers = {"depth": everything.depth, "reach": everything.reach}
+    write_arrays(to, {"descriptors": rows, "causes": everything.causes, **numbers})
     if blind:
         name_blindly(blind)
 
