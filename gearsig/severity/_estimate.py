@@ -535,6 +535,9 @@ def estimate_crack(
 
     Notes
     -----
+    Encoders on both shafts, in both recordings, count as well (`tooth_error_evidence`): kind and depth of the same tooth
+    are combined with the vibration's, and stand in where that gives no estimate, unless the reference does not fit.
+
     Not for helical gears, planetary sets, or cracks over a part of the face width. The calibration's teeth lose section
     behind a crack as by Chen and Shao; finite-element teeth give way about twice as much, and in a pair of them (50/50
     teeth of 3 mm) cracks of 1, 2, 3, 4 and 5 mm read 2.0, 3.5, 4.2, 4.5 and 4.7 mm; the intervals hold two of the five.
@@ -583,6 +586,7 @@ def estimate_crack(
         ask = partial(_by_encoders, evidence, prepared, before, facts, odds, shaft)
         return answer_or_none(ask, "No estimate from the encoders", unseen)
 
+    answer: CrackEstimate | NoCrackSeen
     try:
         answer = _by_vibration(prepared, before, facts, used, chosen, tip_relief_um)
     except ReferenceRefusalError:
@@ -590,7 +594,9 @@ def estimate_crack(
     except RefusalError as refusal:
         if encoders is None:
             raise
-        alone, why = by_encoders(encoders, CLEARLY_A_TOOTH), f"By the vibration there is no estimate: {refusal.reason}"
+        alone: CrackEstimate | NoCrackSeen | None
+        alone = by_encoders(encoders, CLEARLY_A_TOOTH) if encoders.is_seen else _none_by_encoders(encoders, facts)
+        why = f"By the vibration there is no estimate: {refusal.reason}"
         if alone is None:
             both = f"{encoders.text} {why}"
             raise RefusalError(both, remedy=refusal.remedy, looked_at=refusal.looked_at) from None
@@ -693,6 +699,22 @@ def _by_encoders(
         reasons=(encoders.text, TEETH_COUNT if has_mark else NO_MARK, ASSUMED_BY_ENCODERS, *doubts),
         kind_probabilities={kind: weights[kind] / sum(weights.values()) for kind in KINDS},
     )
+
+
+def _none_by_encoders(encoders: ToothErrorEvidence, facts: PairFacts) -> NoCrackSeen | None:
+    """Return below which depth a crack would change the transmission error by less than its noise; None if too deep."""
+    limits = []
+    for teeth in (facts.driver_teeth, facts.driven_teeth):
+        try:
+            log_percent, half_width = _log_percent_by_encoders(encoders, facts, teeth)
+        except RefusalError:
+            return None
+        percent = exp(log_percent + half_width)  # 95 % of cracks that change it so little are less deep
+        limits.append((percent / percent_per_mm(teeth, facts.module_mm), percent))
+    below_mm, below_percent = max(limits)
+    if below_percent > LARGEST_BOUND_PERCENT:
+        return None
+    return NoCrackSeen(below_mm, below_percent, 1.0, True, reasons=(encoders.text, ASSUMED_BY_ENCODERS))
 
 
 def _log_percent_by_encoders(encoders: ToothErrorEvidence, facts: PairFacts, teeth: int) -> tuple[float, float]:

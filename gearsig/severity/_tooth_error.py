@@ -60,8 +60,8 @@ pitch above which the encoders' resolution dominates."""
 
 STATIC_MESH_HZ = 500.0
 """Mesh frequency f0 at which a static profile counts half, ln L/(1 + f/f0): the faster teeth meet, the more gears and
-drive ring. Of 46 faults of the independent rig at 270 to 2700 Hz, 22 are identified correctly, two with a probability of
-0.9 or more."""
+drive ring. Of 46 faults of the independent rig at 270 to 2700 Hz, 22 are identified correctly, two with a probability
+of 0.9 or more."""
 
 MIN_OVER_NOISE = 1.25
 """Minimum ratio of the event's RMS to the standard error of one value: the loudest window of noise alone, of which the
@@ -466,10 +466,10 @@ class ToothErrorEvidence:
     weight : float
         How much a static profile counts at this speed, 0 to 1; ln L includes it.
     rms_um : float
-        RMS of the change while the teeth that show it are in mesh.
+        RMS of the change while the teeth that show it are in mesh; where nothing shows, the smallest that would.
     places_rev : mapping
         "driver" or "driven" → middle of the pitch of the tooth that shows it, in revolutions of that gear from its
-        angle zero, 0 to 1; one gear, or both where they show it alike.
+        angle zero, 0 to 1; one gear, both where they show it alike, none where nothing shows.
     """
 
     log_likelihoods: Mapping[str, float]
@@ -485,8 +485,13 @@ class ToothErrorEvidence:
         return dict(sorted(shares.items(), key=lambda item: -item[1]))
 
     @property
+    def is_seen(self) -> bool:
+        """Whether the transmission error changed by more than its noise."""
+        return bool(self.places_rev)
+
+    @property
     def gear(self) -> str:
-        """The gear that shows it, "driver" or "driven"; empty if both do."""
+        """The gear that shows it, "driver" or "driven"; empty if both do, or none."""
         return next(iter(self.places_rev)) if len(self.places_rev) == 1 else ""
 
     @property
@@ -505,6 +510,9 @@ class ToothErrorEvidence:
     @property
     def text(self) -> str:
         """What the encoders show, in one sentence or two."""
+        if not self.is_seen:
+            finer = "Finer encoders, or a longer recording, show smaller changes."
+            return f"By the encoders, the transmission error changed by less than {self.rms_um:.2g} µm rms. {finer}"
         where = {"driver": " on the driver", "driven": " on the driven gear"}.get(self.gear, "")
         changed = f"By the encoders, the transmission error changed by {self.rms_um:.2g} µm rms where it changed most"
         odds, other = self.odds_of_a_tooth, "wear, run-out, uneven pitch or another load"
@@ -546,11 +554,12 @@ def combined_evidence(evidences: Sequence[ToothErrorEvidence]) -> ToothErrorEvid
     """
     if not evidences:
         return None
-    weights = np.array([evidence.weight for evidence in evidences])
+    seen = [evidence for evidence in evidences if evidence.is_seen] or evidences
+    weights = np.array([evidence.weight for evidence in seen])
     largest = float(weights.max())
-    clearest = max(evidences, key=lambda evidence: evidence.rms_um)
+    clearest = max(seen, key=lambda evidence: evidence.rms_um)
     log_likelihoods = {
-        name: largest * float(np.sum([evidence.log_likelihoods[name] for evidence in evidences]) / weights.sum())
+        name: largest * float(np.sum([evidence.log_likelihoods[name] for evidence in seen]) / weights.sum())
         for name in (*TOOTH_FAULTS, OTHER)
     }
     return replace(clearest, log_likelihoods=log_likelihoods, weight=largest)
@@ -571,8 +580,8 @@ def tooth_error_evidence(
     Raises
     ------
     InputError, RefusalError
-        If only one has encoders, the transmission error cannot be computed, see `transmission_error`, did not change by
-        more than its noise, or changed the wrong way round.
+        If only one has encoders, the transmission error cannot be computed, see `transmission_error`, or changed in
+        some revolutions only, or the wrong way round.
     """
     of_both = has_encoders(recording), has_encoders(reference)
     if not any(of_both):
@@ -587,12 +596,10 @@ def tooth_error_evidence(
     )
     largest = tooth_error_changes(now, healthy)
     clear = [change for change in largest if change.is_clear]
+    weight = 1.0 / (1.0 + max(now.mesh_hz, healthy.mesh_hz) / STATIC_MESH_HZ)
     if not clear:
-        noise_um = MIN_OVER_NOISE * max(change.noise_um for change in largest)
-        raise RefusalError(
-            f"the transmission error did not change by more than its noise, {noise_um:.2g} µm rms",
-            remedy="finer encoders, or a longer recording, show smaller changes",
-        )
+        smallest_um = MIN_OVER_NOISE * max(change.noise_um for change in largest)
+        return ToothErrorEvidence(dict.fromkeys((*TOOTH_FAULTS, OTHER), 0.0), weight, smallest_um, {})
     changes = [change for change in clear if change.is_repeated]
     if not changes:
         raise RefusalError(
@@ -600,7 +607,6 @@ def tooth_error_evidence(
             remedy="record more revolutions; something else on the machine may cause it, such as a bearing",
         )
     known = load_known_tooth_errors()
-    weight = 1.0 / (1.0 + max(now.mesh_hz, healthy.mesh_hz) / STATIC_MESH_HZ)
     per_gear = [known.log_likelihoods(tooth_error_descriptors(change)) for change in changes]
     static = {name: log(float(np.mean([exp(of_gear[name]) for of_gear in per_gear]))) for name in per_gear[0]}
     _check_direction(changes, static, known)

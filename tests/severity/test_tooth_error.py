@@ -169,8 +169,11 @@ def test_encoders_identify_a_crack_at_low_speed() -> None:
     assert next(iter(said.probabilities)) == "root_crack"
     assert said.probabilities["root_crack"] > 0.7
     assert said.odds_of_a_tooth > 20.0
-    with pytest.raises(RefusalError, match="did not change"):
-        tooth_error_evidence(healthy.between(0.0, 2.5), healthy.between(2.5, 5.0))
+    halves = healthy.between(0.0, 2.5), healthy.between(2.5, 5.0)
+    unchanged = tooth_error_evidence(*halves)
+    assert unchanged is not None
+    assert not unchanged.is_seen
+    assert unchanged.odds_of_a_tooth == 1.0
     with pytest.raises(RefusalError, match="in the reference"):
         tooth_error_evidence(healthy, cracked)
     with pytest.raises(RefusalError, match="in the reference"):
@@ -292,6 +295,22 @@ def test_encoders_stand_in_for_the_vibration_but_not_for_a_fitting_reference(
         estimated(monkeypatch, clear, healthy, healthy)
     with pytest.raises(RefusalError, match="at a speed"):
         estimated(monkeypatch, clear, record(2.0, speed_rpm=1400.0), healthy)
+
+
+@pytest.mark.parametrize("smallest_um", [0.05, 0.15, 0.5])
+def test_encoders_that_see_nothing_bound_the_depth_where_vibration_does_not(
+    monkeypatch: pytest.MonkeyPatch, record: Record, healthy: Recording, smallest_um: float
+) -> None:
+    nothing = evidence(1.0, smallest_um, {})
+    short = record(0.0, duration_s=0.4)
+    if smallest_um > 0.3:  # half of the root would not show
+        with pytest.raises(RefusalError, match="changed by less than"):
+            estimated(monkeypatch, nothing, short, healthy)
+        return
+    answer = estimated(monkeypatch, nothing, short, healthy)
+    assert isinstance(answer, NoCrackSeen)
+    assert answer.below_percent == pytest.approx({0.05: 15.1, 0.15: 34.2}[smallest_um], rel=0.01)
+    assert "revolutions" in answer.reasons[-1]
 
 
 def test_encoders_that_show_no_tooth_leave_the_answer_to_the_vibration(

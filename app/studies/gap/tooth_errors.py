@@ -487,19 +487,18 @@ def name_blindly(n_each: int) -> None:
     rng = np.random.default_rng([SEED, 9])
     causes: list[str] = []
     evidence: list[ToothErrorEvidence] = []
-    not_seen: list[str] = []
     for cause in [name for name in (*TOOTH_FAULTS, *OTHER_EFFECTS) for _ in range(n_each)]:
         level = float(rng.uniform(0.5, 1.0))
         case = draw_case(rng, "development", kind="single", effect=cause, level=level, with_reference=True)
         recorded = record_case(case, encoder_counts=ENCODER_COUNTS)
         for now, reference in zip(recorded.conditions, recorded.references, strict=True):
-            said = answer_or_none(partial(tooth_error_evidence, now, reference), f"{cause} {now.name}", not_seen)
-            if said is not None:
+            said = answer_or_none(partial(tooth_error_evidence, now, reference), now.name, [])
+            if said is not None and said.is_seen:
                 causes.append(cause)
                 evidence.append(said)
     told = [i for i, cause in enumerate(causes) if cause in TOOTH_FAULTS]
     truth = np.array(causes)
-    title = f"independent rig, {len(not_seen)} not seen"
+    title = f"independent rig, {2 * n_each * len((*TOOTH_FAULTS, *OTHER_EFFECTS)) - len(evidence)} not seen"
     _print_accuracy(title, truth[told], *named([evidence[i] for i in told]))
     _print_odds(truth, evidence)
 
