@@ -466,8 +466,28 @@ TEETH_COUNT = "Teeth count from 1 at the mark in order of engagement; the place 
 NO_MARK = "There is no mark on this shaft: the angle holds for this record only, and names no tooth."
 ASSUMED = (
     "The depth assumes a crack through the whole face width, in a tooth that gives way as those of the calibration do. "
-    "Finite-element teeth give way more: in them cracks of 1 to 4 mm read 1.1 to 2 times too deep."
+    "In finite-element teeth, which give way more, the same change is a crack of {depth_mm:.1f} mm; the interval holds "
+    "for both."
 )
+
+FINITE_ELEMENT_DEPTHS = np.array(
+    [[0.0, 10, 15, 20, 30, 40, 50, 60, 70, 100], [0.0, 8, 11.3, 13.3, 18.0, 23.1, 28.6, 34.7, 42.0, 60.0]]
+)
+"""Depths of cracks in percent of the root: in the calibration's teeth, and in finite-element teeth in which they change
+the static transmission error as much, within a tenth for gears of 19 to 62 teeth under 20 to 100 N/mm² per face width
+and module (`tests/benchmarks/cracked_teeth.py`; the first and the last are extrapolated)."""
+
+
+def finite_element_percent(percent: float) -> float:
+    """Return how deep a crack is, in percent of the root, if the tooth gives way as finite elements do.
+
+    Parameters
+    ----------
+    percent : float
+        If it gives way as those of the calibration do.
+    """
+    return float(np.interp(percent, *FINITE_ELEMENT_DEPTHS))
+
 
 SMALLEST_AGREEMENT = 0.4
 """Agreement of the tooth pattern with the reference's: other gears reach 0.38 once in a hundred cases; the right ones
@@ -535,12 +555,13 @@ def estimate_crack(
 
     Notes
     -----
-    Encoders on both shafts, in both recordings, count as well (`tooth_error_evidence`): kind and depth of the same tooth
-    are combined with the vibration's, and stand in where that gives no estimate, unless the reference does not fit.
+    Encoders on both shafts, in both recordings, count as well (`tooth_error_evidence`): kind and depth of the same
+    tooth are combined with the vibration's, and stand in where that gives no estimate, if the reference fits.
 
     Not for helical gears, planetary sets, or cracks over a part of the face width. The calibration's teeth lose section
-    behind a crack as by Chen and Shao; finite-element teeth give way about twice as much, and in a pair of them (50/50
-    teeth of 3 mm) cracks of 1, 2, 3, 4 and 5 mm read 2.0, 3.5, 4.2, 4.5 and 4.7 mm; the intervals hold two of the five.
+    behind a crack as by Chen and Shao; finite-element teeth give way about twice as much (`FINITE_ELEMENT_DEPTHS`). In
+    a pair of them (50/50 teeth of 3 mm) cracks of 1, 2, 3, 4 and 5 mm read 2.0, 3.5, 4.2, 4.5 and 4.7 mm. The depth is
+    that in the calibration's teeth; the interval reaches down to that in finite-element teeth, and holds four of them.
 
     On 200 simulated gearboxes with other teeth and modules than the calibration's
     (`tests/benchmarks/severity_cases.py`, seed 9157; depths 0.5 to 4 mm): with a reference, the median error is 0.36 mm
@@ -770,8 +791,9 @@ def _together(
     apart = 0 if answer.tooth is None or alone.tooth is None else abs(answer.tooth - alone.tooth)
     is_same = answer.shaft == alone.shaft and min(apart, teeth - apart) <= NEIGHBOURS
     if is_same:
-        (low, high), log_percent = answer.interval_percent, log(answer.depth_percent)
-        half = max(log(high) - log_percent, log_percent - log(low))
+        # The middle of the interval lies between both kinds of teeth, as the encoders' depth does.
+        low, high = np.log(answer.interval_percent).tolist()
+        log_percent, half = 0.5 * (low + high), 0.5 * (high - low)
         of_encoders, half_of_encoders = _log_percent_by_encoders(encoders, facts, teeth)
         is_same = abs(log_percent - of_encoders) <= hypot(half, half_of_encoders)
     if not is_same:
@@ -919,11 +941,12 @@ def _crack_estimate(
         reasons.append(f"The estimate of {centre:.0f} % lies beyond the calibration's {low:.0f} to {high:.0f} %.")
     percent = min(max(centre, low), high)
     bounds = tuple(exp(bound) for bound in model.log_interval(features))
-    interval = min(bounds[0], percent), max(min(bounds[1], 100.0), percent)
+    interval = finite_element_percent(min(bounds[0], percent)), max(min(bounds[1], 100.0), percent)
     per_mm = percent_per_mm(teeth, facts.module_mm)
     place = (best.event.centre_rev - calibration.lag_pitches / teeth) % 1.0
     further_prominences = [e.event.prominence for e in gears if e is not best]
-    reasons += [TEETH_COUNT if best.shaft.has_mark else NO_MARK, ASSUMED]
+    assumed = ASSUMED.format(depth_mm=finite_element_percent(percent) / per_mm)
+    reasons += [TEETH_COUNT if best.shaft.has_mark else NO_MARK, assumed]
     way = ALONE if best.agreement is None else WITH_REFERENCE
     return CrackEstimate(
         shaft=shaft,

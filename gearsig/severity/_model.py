@@ -340,7 +340,8 @@ class CrackEstimate(Result):
     depth_mm, depth_percent : float
         Length of a straight crack at 45° through the face width, and the share of the root's thickness it takes away.
     interval_mm, interval_percent : tuples of two floats
-        Contains the depth in 90 % of cases, for machines like the calibration's.
+        Contains the depth in 90 % of cases, for machines like the calibration's; with a lower end for teeth that give
+        way more, as finite elements do.
     p_value : float
         Probability of an event this clear on a healthy gear pair, from the calibration's healthy pairs; by encoders at
         most the inverse of the likelihood ratio (Markov's inequality); by both, the product.

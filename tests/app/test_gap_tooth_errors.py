@@ -105,4 +105,4 @@ def test_other_changes_are_not_taken_for_a_damaged_tooth(known: dict[str, KnownT
     odds = np.array([one.odds_of_a_tooth for one in evidence_on(taught, known[left_out].descriptors)])
     causes = known[left_out].causes
     assert np.mean(odds[~np.isin(causes, SINGLE_TOOTH_FAULTS)] > 20.0) <= 0.02
-    assert np.mean(odds[np.isin(causes, SINGLE_TOOTH_FAULTS)] > 20.0) > 0.7
+    assert np.mean(odds[np.isin(causes, SINGLE_TOOTH_FAULTS)] > 20.0) > 0.6
