@@ -220,7 +220,7 @@ def diagnose_forest(case: VisibleCase) -> GapReport:
     probabilities = attribution.probabilities()
     changes, teeth = [condition.over_floors for condition in conditions], conditions[0].now.frame.teeth
     shafts = {name: determined_options(name, changes, teeth) for name in probabilities}
-    return bare_report("forest", probabilities, shafts, attribution.calibration.outcome(probabilities, known))
+    return bare_report("forest", probabilities, shafts, attribution.outcome(probabilities, known))
 
 
 # --------------------

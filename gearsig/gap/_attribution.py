@@ -288,6 +288,16 @@ class Attribution(Generic[TriedT]):
         posterior = with_likelihoods(with_likelihoods(posterior, self.matches), self.tooth_error_log_likelihoods)
         return with_unknown_distributed(posterior, {n: self.scores[n] for n in self.untrained if n in self.tried})
 
+    def outcome(
+        self, probabilities: Mapping[str, float], known: Mapping[str, GapEffect] = MappingProxyType({})
+    ) -> GapOutcome:
+        """Return the outcome, see `GapCalibration.outcome`; a gap within its floor that shows no cause is none.
+
+        Healthy machines differ by as much, whatever else is possible.
+        """
+        outcome = self.calibration.outcome(probabilities, known)
+        return GapOutcome.NO_GAP if outcome is GapOutcome.UNDECIDED and self.size <= 1.0 else outcome
+
 
 MAX_TRIED, MIN_TRIED_PROBABILITY = 3, 0.06
 """The most probable effects to simulate: the maximum number, and the minimum probability."""

@@ -258,7 +258,7 @@ def diagnose_gap(
     # 5. What stands out in the clearest recording by itself, whatever the features indicate.
     tell("placing it", 0.82)
     unexpected, unexpected_messages, faults = unexpected_job.result()
-    outcome, unseen = with_unexpected(attribution.calibration.outcome(probabilities, known), unexpected)
+    outcome, unseen = with_unexpected(attribution.outcome(probabilities, known), unexpected)
     labels = _labelled_facts(attribution, conditions, clearest, known, gap)
     warnings = (*unseen, *(text for condition in conditions for text in warnings_of(condition)), *faults)
 
@@ -442,7 +442,7 @@ def _labelled_facts(
     if attribution.labelled is None:
         return None
     without = _posterior(replace(attribution, labelled=None), conditions, clearest, known, gap)
-    return LabelledFacts(attribution.labelled.counts, without, attribution.calibration.outcome(without, known))
+    return LabelledFacts(attribution.labelled.counts, without, attribution.outcome(without, known))
 
 
 def _refuse_further(learn: Sequence[LabelledRecording], run_up: Recording | None, machines: str) -> None:
