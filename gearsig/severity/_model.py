@@ -304,7 +304,7 @@ class Calibration:
             Naming every quantity that is outside.
         """
         outside = [
-            f"{name} is {value:.4g}, the calibration has {self.reach[name][0]:.4g} to {self.reach[name][1]:.4g}"
+            f"{REACH_WORDS.get(name, name)} is {value:.4g}, there {self.reach[name][0]:.4g} to {self.reach[name][1]:.4g}"
             for name, value in features.items()
             if not self.reach[name][0] * (1 - 1e-9) <= value <= self.reach[name][1] * (1 + 1e-9)
         ]
@@ -313,6 +313,16 @@ class Calibration:
                 "the calibration does not reach this machine or operating point: " + "; ".join(outside),
                 remedy="record at another speed or load, or make a calibration for such machines",
             )
+
+
+REACH_WORDS = {
+    "module_mm": "the module in mm",
+    "load_mpa": "the tangential force per face width and module in MPa",
+    "mesh_hz": "the mesh frequency in Hz",
+    "fewer_teeth": "the smaller number of teeth",
+    "more_teeth": "the larger number of teeth",
+}
+"""Quantity of a calibration's reach → in words."""
 
 
 @cache
