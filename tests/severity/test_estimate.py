@@ -156,7 +156,7 @@ def test_a_reference_of_another_machine_or_load_is_named_first(record: Record, h
         ({"module_mm": None}, "module_mm"),
         ({"face_width_mm": None}, "face_width_mm"),
         ({"module_mm": 30.0, "face_width_mm": 2.0}, "does not reach"),
-        ({"face_width_mm": 500.0}, "load_mpa"),
+        ({"face_width_mm": 500.0}, "face width and module in MPa is"),
         ({"pressure_angle_deg": 25.0}, "pressure angle"),
     ],
 )

@@ -90,5 +90,5 @@ def test_the_reach_names_what_is_outside() -> None:
     calibration = load_calibration()
     inside = {name: (low + high) / 2 for name, (low, high) in calibration.reach.items()}
     calibration.check_reach(inside)
-    with pytest.raises(RefusalError, match="module_mm is 20"):
+    with pytest.raises(RefusalError, match="module in mm is 20"):
         calibration.check_reach(inside | {"module_mm": 20.0})
