@@ -26,6 +26,7 @@ from gearsig.gap._reduction import GearFrame
 from gearsig.gap._report import (
     LIKELIER_THAN_NOT,
     NONE,
+    SETTLED,
     UNKNOWN,
     GapCause,
     GapOutcome,
@@ -411,8 +412,11 @@ def attribute(
     likely = [name for name, p in first.items() if name in known and p >= MIN_TRIED_PROBABILITY][:max_tried]
     trained = conditions[0].learned.causes
     untrained = [name for name in effects or known if name not in trained] if max_tried else []
-    if max_tried and any(name in TOOTH_FAULTS for name in likely):  # waveforms distinguish them: try all or none
-        likely += [name for name in TOOTH_FAULTS if name in first and name in known and name not in likely]
+    if max_tried and any(name in TOOTH_FAULTS for name in likely):
+        # Waveforms distinguish them, so that all are tried; only encoders, which show the tooth itself, rule one out.
+        least = SETTLED if log_likelihoods else 0.0
+        siblings = [name for name in TOOTH_FAULTS if name in known and first.get(name, -1.0) >= least]
+        likely += [name for name in siblings if name not in likely]
     likely += untrained
     tried = try_effects([known[name] for name in likely], twin, conditions, cache, on_progress, fresh=fresh)
     return replace(attribution, tried=tried, untrained=tuple(untrained))
