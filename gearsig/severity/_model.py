@@ -303,11 +303,11 @@ class Calibration:
         RefusalError
             Naming every quantity that is outside.
         """
-        outside = [
-            f"{REACH_WORDS.get(name, name)} is {value:.4g}, there {self.reach[name][0]:.4g} to {self.reach[name][1]:.4g}"
-            for name, value in features.items()
-            if not self.reach[name][0] * (1 - 1e-9) <= value <= self.reach[name][1] * (1 + 1e-9)
-        ]
+        outside = []
+        for name, value in features.items():
+            low, high = self.reach[name]
+            if not low * (1 - 1e-9) <= value <= high * (1 + 1e-9):
+                outside.append(f"{REACH_WORDS.get(name, name)} is {value:.4g}, there {low:.4g} to {high:.4g}")
         if outside:
             raise RefusalError(
                 "the calibration does not reach this machine or operating point: " + "; ".join(outside),
