@@ -705,10 +705,16 @@ SAME_GAIN_DB = 2.0
 
 
 def _gains(changes: Sequence[LevelChange]) -> tuple[list[Finding], list[LevelChange]]:
-    """Report channels whose levels have all changed alike, noise included, and return the changes of the others."""
+    """Report channels that changed rather than the machine, and return the changes of the others.
+
+    Either all its levels have changed alike, noise included, or most of what changed is in it, see `_faded_alone`.
+    """
     findings, rest = [], []
     for channel in dict.fromkeys(c.where.channels[0] for c in changes):
         of_channel = [c for c in changes if c.where.channels[0] == channel]
+        if _faded_alone(channel, changes):
+            findings.append(_faded(channel, [c for c in of_channel if c.is_change]))
+            continue
         lines = [c for c in of_channel if c.stands_out and c.kind != "bearing"]
         shifts = np.array([c.change_db for c in lines])
         gain = float(np.median(shifts))
@@ -729,6 +735,33 @@ def _gains(changes: Sequence[LevelChange]) -> tuple[list[Finding], list[LevelCha
             )
         )
     return findings, rest
+
+
+def _faded_alone(channel: str, changes: Sequence[LevelChange]) -> bool:
+    """Whether two thirds of what changed are in one channel, where most noise fell and no other channel's changed.
+
+    A loose sensor loses the high frequencies. Where noise rises in one channel alone, a machine is damaged beside it.
+    """
+    own, others = ([c for c in changes if (c.where.channels[0] == channel) is is_own] for is_own in (True, False))
+    noise, noise_beside = ([c for c in some if c.kind == "noise"] for some in (own, others))
+    n_own, n_others = (sum(c.is_change and c.kind != "bearing" for c in some) for some in (own, others))
+    n_fallen = sum(c.is_change and c.change_db < 0 for c in noise)
+    stays = bool(noise_beside) and not any(c.is_change for c in noise_beside)
+    return 2 * n_fallen > len(noise) and stays and n_own > 2 * n_others
+
+
+def _faded(channel: str, changed: Sequence[LevelChange]) -> Finding:
+    return Finding(
+        "channel-faded",
+        Kind.DATA_PROBLEM,
+        f"Most of what changed since the reference is in channel {channel} alone, noise included: check its mounting, "
+        "cable and range.",
+        Where((channel,)),
+        confidence=0.8,
+        confidence_basis="most of its noise has fallen, and no other channel's has changed",
+        evidence=(*_told(changed), "Its changes are left out; a repair beside this sensor would make it quieter, too."),
+        surer="Both recordings again with the sensor mounted alike.",
+    )
 
 
 def _unchanged(changes: Sequence[LevelChange]) -> Finding:
@@ -806,7 +839,7 @@ def _meanings(
     for shaft in signals.known_shaft_orders:
         findings += _of_shaft(shaft, risen, changes, signals)
     for pair in signals.rig.pairs:
-        findings += _of_pair(pair.name, risen)
+        findings += _of_pair(pair.name, risen, changes)
     of_parts = [c for c in risen if c.kind == "bearing"]
     named = [c.where.order for c in of_parts if c.where.bearing in claimed and c.where.order]  # bearings of one size
     parts = [
@@ -947,8 +980,10 @@ def _velocity(change: LevelChange, signals: AnalysisSignals, *, since: bool = Fa
     return float(power * change.harmonic ** (-2 * derivatives_of_velocity(signals, change.where.channels[0])))
 
 
-def _of_pair(name: str, risen: Sequence[LevelChange]) -> Iterator[Finding]:
+def _of_pair(name: str, risen: Sequence[LevelChange], changes: Sequence[LevelChange]) -> Iterator[Finding]:
     mesh = [c for c in risen if c.kind == "mesh" and c.where.gear == name]
+    fallen = _largest([c for c in changes if c.is_change and c.change_db < 0 and c.where.gear == name])
+    fallen = [c for c in fallen if c.kind == "mesh"]
     sides = [c for c in risen if c.kind == "sidebands" and c.where.gear.startswith(f"{name}/")]
     if mesh:
         confirm = (
@@ -956,7 +991,10 @@ def _of_pair(name: str, risen: Sequence[LevelChange]) -> Iterator[Finding]:
             "particles in the oil; contact pattern and backlash."
         )
         title = f"Perhaps wear, another load, or misaligned teeth at {named('gear pair', name)}."
-        yield Finding("mesh-risen", Kind.SUSPICION, title, mesh[0].where, None, 0.5, _FIT, _told(mesh), confirm)
+        share = len(mesh) / (len(mesh) + len(fallen))
+        likely = Kind.SUSPICION if share > 0.5 else Kind.NOTICE
+        evidence = (*_told(mesh), *(f"Against it: {text}" for text in _told(fallen)))
+        yield Finding("mesh-risen", likely, title, mesh[0].where, None, 0.5 * share, _FIT, evidence, confirm)
     for sideband in sides:
         confirm = "The average of that shaft: one tooth or all around; run-out, keys and couplings; another load."
         shaft = sideband.where.gear.partition("/")[2]

@@ -62,7 +62,7 @@ VIBRATION_ZONE = "vibration-zone"
 
 HINDERING = (
     *("channel-clipped", "channel-stuck", "channel-dead", "channel-wrapped", "channel-stepped", "channel-reversed"),
-    *("channel-hum", "speed-near-zero"),
+    *("channel-hum", "channel-faded", "speed-near-zero"),
 )
 """Codes of data problems that may hide a fault."""
 

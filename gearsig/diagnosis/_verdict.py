@@ -175,6 +175,7 @@ TRUST = {
     "channel-stepped": 0.75,
     "channel-reversed": 0.5,
     "channel-hum": 0.75,
+    "channel-faded": 0.75,
 }
 """Problem → factor on the confidence: a judgement, not a probability. 0.5 where places or frequencies are probably
 wrong, 0.7 and 0.75 where places are right but sizes unreliable, 0 where nothing is usable."""

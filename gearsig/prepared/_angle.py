@@ -54,6 +54,11 @@ MAINS_TOLERANCE = 0.002
 
 Twice the limit for hum in a recording's quality: these lines are only left out, or treated as confirming nothing."""
 
+N_PULLS = 10
+"""Multiples of twice a supply's frequency that are put down to its magnetic pull.
+
+The tolerance grows with the multiple, the spacing does not: the tenth covers 4 % of it, the 50th a fifth."""
+
 
 Transform = Callable[[str], ComplexArray]
 """Returns the `rfft` of a channel by its name."""
@@ -271,11 +276,14 @@ def _by_comb(
 
 
 def magnetic_pull_near(hertz: float) -> tuple[float, float] | None:
-    """Return a supply's frequency and its magnetic pull, the multiple of twice it at a given frequency, in Hz."""
+    """Return a supply's frequency and its magnetic pull, the multiple of twice it at a given frequency, in Hz.
+
+    Only the first multiples count, see `N_PULLS`.
+    """
     for mains_hz in MAINS_HZ:
-        pull_hz = 2 * mains_hz * round(hertz / (2 * mains_hz))
-        if pull_hz > 0 and abs(hertz / pull_hz - 1) <= MAINS_TOLERANCE:
-            return mains_hz, pull_hz
+        n = round(hertz / (2 * mains_hz))
+        if 1 <= n <= N_PULLS and abs(hertz / (2 * n * mains_hz) - 1) <= MAINS_TOLERANCE:
+            return mains_hz, 2 * n * mains_hz
     return None
 
 
