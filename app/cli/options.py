@@ -59,7 +59,12 @@ SamplingRateOption = Annotated[
 ]
 SpeedOption = Annotated[
     float | None,
-    quantity_option("--speed-rpm", "rpm", "RPM", "Constant speed of the reference shaft, if known accurately."),
+    quantity_option(
+        "--speed-rpm",
+        "rpm",
+        "RPM",
+        "Constant speed of the reference shaft, if known accurately; checks a speed that is measured.",
+    ),
 ]
 TachometerTimesOption = Annotated[
     Path | None, typer.Option("--tach-times", metavar="FILE", help="File with the times of the tachometer pulses in s.")

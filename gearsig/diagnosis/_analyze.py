@@ -319,7 +319,7 @@ def _angle_of(prepared: PreparedRecording) -> ShaftAngle | CannotTell:
         return CannotTell("What is the speed of the shafts?", refusal.reason, refusal.remedy)
     except InputError as error:  # it names the channel; the file is known only here
         where = error.where if error.where.startswith(source) else f"{source}: {error.where}".removesuffix(": ")
-        remedy = error.remedy or "check [speed] in the rig file, or state the speed by --speed-rpm"
+        remedy = error.remedy or "check [speed] in the rig file, or leave it out and state the speed by --speed-rpm"
         raise InputError(error.what, where=where, allowed=error.allowed, remedy=remedy) from None
 
 

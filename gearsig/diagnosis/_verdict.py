@@ -208,7 +208,7 @@ def speed_warnings(angle: ShaftAngle | CannotTell, rig: Rig) -> list[Finding]:
         ratio = angle.mean_speed_rpm / nominal
         near = min((f for n in range(2, 11) for f in (n, 1 / n)), key=lambda f: abs(ratio / f - 1))
         pulses = f" {near:.3g} pulses per revolution would explain it." if abs(ratio / near - 1) < 0.03 else ""
-        title = f"The speed, {angle.mean_speed_rpm:.5g} rpm, is {ratio:.3g} times the rig's {nominal:.5g} rpm"
+        title = f"The speed, {angle.mean_speed_rpm:.5g} rpm, is {ratio:.3g} times the nominal {nominal:.5g} rpm"
         doubts.append(
             Finding(
                 OFF_NOMINAL,
@@ -216,9 +216,9 @@ def speed_warnings(angle: ShaftAngle | CannotTell, rig: Rig) -> list[Finding]:
                 f"{title} ± {100 * tolerance:.3g} %.",
                 Where(shaft=angle.shaft),
                 Strength(angle.mean_speed_rpm, "rpm", nominal, "nominal speed", against="a nominal speed of"),
-                confidence_basis="comparison with the rig file",
+                confidence_basis="comparison with the rig file or the stated speed",
                 evidence=(f"How it was found: {angle.method}.{pulses}",),
-                surer="Check sampling rate, pulses per revolution and the speed in the rig file.",
+                surer="Check sampling rate, pulses per revolution and the nominal speed.",
             )
         )
     elif high > FASTEST_RPM:

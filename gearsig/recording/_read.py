@@ -83,7 +83,8 @@ def read_recording(
     sampling_rate_hz : float, optional
         Overrides the file's. A difference of more than 0.1 % is reported in `Recording.warnings`.
     speed : SpeedSource, optional
-        Overrides the file's and the rig's.
+        Overrides the file's and the rig's; but a constant speed only checks one that is measured, as the nominal speed
+        of the recording's rig, and a warning says so.
     part : slice, optional
         Only these samples of each channel, for HDF5, Parquet, TDMS or WAV: nothing else is decoded, and no hash is
         computed. Pulse times in the file are limited to this part and counted from its beginning.
@@ -532,6 +533,10 @@ def assemble(
     channels = tuple(
         Channel(c.name, c.quantity or quantity_of(c.name, c.unit), c.unit, c.position) for c in table.columns
     )
+    checks: tuple[str, ...] = ()
+    if isinstance(speed, ConstantSpeed) and (measured := _measured(table, channels, rig)):
+        checks = (f"the speed is taken from {measured}; the stated {speed.speed_rpm:g} rpm is compared with it",)
+        rig, speed = _with_nominal(rig, speed), None
     speed, speed_warnings = _speed(table, channels, rig, speed)
     if speed is None and not table.is_own_layout and (rig is None or rig.speed is None):
         speed_warnings = (*speed_warnings, *_unused_pulses(table, channels))
@@ -544,7 +549,7 @@ def assemble(
         speed=speed,
         provenance=Provenance(source, sha256, table.reader, table.history),
         truth=table.truth,
-        warnings=(*table.warnings, *rate_warnings, *speed_warnings),
+        warnings=(*table.warnings, *rate_warnings, *checks, *speed_warnings),
     )
     recording = recording if rig is None else recording.with_rig(rig)
     return recording if table.is_own_layout else _with_quantity_of_speed(recording)
@@ -706,6 +711,25 @@ def _stack(table: RawTable, source: str) -> FloatArray:
                 remedy="cut out the gap or interpolate it before the analysis, knowingly",
             )
     return samples
+
+
+def _measured(table: RawTable, channels: tuple[Channel, ...], rig: Rig | None) -> str:
+    """Return in words where the file has a measured speed that it or the rig names; empty if nowhere."""
+    names = {*(c.name for c in channels), *table.pulse_times_s}
+    for source in (table.speed, None if rig is None else rig.speed):
+        if isinstance(source, PulseTimes):
+            return "pulse times"
+        if source is not None and not isinstance(source, ConstantSpeed) and source.channel in names:
+            return f"channel {source.channel!r}"
+    return ""
+
+
+def _with_nominal(rig: Rig | None, stated: ConstantSpeed) -> Rig:
+    """Return the rig with a stated speed as its nominal one, converted to the shaft of its operating point."""
+    rig = Rig() if rig is None else rig
+    point = rig.operating_point
+    ratio = rig.ratio(point.shaft or rig.reference_shaft, to=stated.shaft)
+    return rig if ratio is None else replace(rig, operating_point=replace(point, speed_rpm=ratio * stated.speed_rpm))
 
 
 def _speed(
