@@ -12,8 +12,8 @@ from gearsig.checks import FloatArray, listed, short
 from gearsig.errors import InputError, RefusalError, options_named
 from gearsig.orders import first_whole_sample
 from gearsig.prepared import PreparedRecording
-from gearsig.recording import SI_FACTORS, Channel, Recording, si_factor
-from gearsig.rig import ConstantSpeed, PulseTimes, Rig, SpeedSource
+from gearsig.recording import Channel, Recording
+from gearsig.rig import SI_FACTORS, ConstantSpeed, PulseTimes, Rig, SpeedSource, si_factor
 
 MIN_REVOLUTIONS = 8
 """Of a shaft: four in each half. Fewer leave other shafts' orders in its average, and give no measure of scatter."""

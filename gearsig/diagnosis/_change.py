@@ -22,6 +22,7 @@ from gearsig.diagnosis._bearing_families import (
     speed_is_only_stated,
 )
 from gearsig.diagnosis._lines import SPREAD_OF_STATED
+from gearsig.diagnosis._reference import changed_sensors
 from gearsig.diagnosis._rotor import (
     CONFIRMS_WHIRL,
     OIL_WHIRL,
@@ -637,7 +638,7 @@ def change_findings(
         unknown = [cannot_tell("change-not-examined", title, surer=surer)]
         if not any(c.is_change for c in changes):
             return unknown
-    findings, rest = _gains(changes)
+    findings, rest = changed_sensors(changes)
     findings = [*unknown, *findings]
     changed = [c for c in rest if c.is_change and (c.change_db > 0 or c.kind != "bearing")]  # bearings do not heal
     if not changed:
@@ -698,70 +699,6 @@ def _largest(changes: Sequence[LevelChange]) -> list[LevelChange]:
         if change.label not in best or abs(change.change_db) > abs(best[change.label].change_db):
             best[change.label] = change
     return list(best.values())
-
-
-SAME_GAIN_DB = 2.0
-"""If all levels of a channel, noise included, change alike to within this, the gain has changed."""
-
-
-def _gains(changes: Sequence[LevelChange]) -> tuple[list[Finding], list[LevelChange]]:
-    """Report channels that changed rather than the machine, and return the changes of the others.
-
-    Either all its levels have changed alike, noise included, or most of what changed is in it, see `_faded_alone`.
-    """
-    findings, rest = [], []
-    for channel in dict.fromkeys(c.where.channels[0] for c in changes):
-        of_channel = [c for c in changes if c.where.channels[0] == channel]
-        if _faded_alone(channel, changes):
-            findings.append(_faded(channel, [c for c in of_channel if c.is_change]))
-            continue
-        lines = [c for c in of_channel if c.stands_out and c.kind != "bearing"]
-        shifts = np.array([c.change_db for c in lines])
-        gain = float(np.median(shifts))
-        spread = float(np.percentile(np.abs(shifts - gain), 90))
-        if len(lines) < 4 or abs(gain) < MIN_CHANGE_DB / 2 or spread > SAME_GAIN_DB:
-            rest += of_channel
-            continue
-        findings.append(
-            Finding(
-                "levels-scaled",
-                Kind.DATA_PROBLEM,
-                f"Every level of channel {channel} has changed alike by {signed(gain)} dB since the reference, "
-                "noise included: the gain, unit or sensor differs rather than the machine.",
-                Where((channel,)),
-                confidence=0.9,
-                confidence_basis=f"{len(lines)} levels within {spread:.2g} dB of each other",
-                surer="Check sensor, range and unit of both recordings.",
-            )
-        )
-    return findings, rest
-
-
-def _faded_alone(channel: str, changes: Sequence[LevelChange]) -> bool:
-    """Whether two thirds of what changed are in one channel, where most noise fell and no other channel's changed.
-
-    A loose sensor loses the high frequencies. Where noise rises in one channel alone, a machine is damaged beside it.
-    """
-    own, others = ([c for c in changes if (c.where.channels[0] == channel) is is_own] for is_own in (True, False))
-    noise, noise_beside = ([c for c in some if c.kind == "noise"] for some in (own, others))
-    n_own, n_others = (sum(c.is_change and c.kind != "bearing" for c in some) for some in (own, others))
-    n_fallen = sum(c.is_change and c.change_db < 0 for c in noise)
-    stays = bool(noise_beside) and not any(c.is_change for c in noise_beside)
-    return 2 * n_fallen > len(noise) and stays and n_own > 2 * n_others
-
-
-def _faded(channel: str, changed: Sequence[LevelChange]) -> Finding:
-    return Finding(
-        "channel-faded",
-        Kind.DATA_PROBLEM,
-        f"Most of what changed since the reference is in channel {channel} alone, noise included: check its mounting, "
-        "cable and range.",
-        Where((channel,)),
-        confidence=0.8,
-        confidence_basis="most of its noise has fallen, and no other channel's has changed",
-        evidence=(*_told(changed), "Its changes are left out; a repair beside this sensor would make it quieter, too."),
-        surer="Both recordings again with the sensor mounted alike.",
-    )
 
 
 def _unchanged(changes: Sequence[LevelChange]) -> Finding:
@@ -993,21 +930,21 @@ def _of_pair(name: str, risen: Sequence[LevelChange], changes: Sequence[LevelCha
         title = f"Perhaps wear, another load, or misaligned teeth at {named('gear pair', name)}."
         share = len(mesh) / (len(mesh) + len(fallen))
         likely = Kind.SUSPICION if share > 0.5 else Kind.NOTICE
-        evidence = (*_told(mesh), *(f"Against it: {text}" for text in _told(fallen)))
+        evidence = (*(c.text for c in mesh), *(f"Against it: {c.text}" for c in fallen))
         yield Finding("mesh-risen", likely, title, mesh[0].where, None, 0.5 * share, _FIT, evidence, confirm)
     for sideband in sides:
         confirm = "The average of that shaft: one tooth or all around; run-out, keys and couplings; another load."
         shaft = sideband.where.gear.partition("/")[2]
         title = f"Perhaps an eccentric, loose or damaged gear on shaft {shaft}."
         yield Finding(
-            "sidebands-risen", Kind.SUSPICION, title, sideband.where, None, 0.5, _FIT, _told([sideband]), confirm
+            "sidebands-risen", Kind.SUSPICION, title, sideband.where, None, 0.5, _FIT, (sideband.text,), confirm
         )
 
 
 def _of_bearing(change: LevelChange) -> Finding:
     confirm = "The same part in another band or sensor; its level over days; grease, temperature, noise when turned."
     title = f"Perhaps damage at the {change.label}."
-    return Finding("bearing-risen", Kind.SUSPICION, title, change.where, None, 0.5, _FIT, _told([change]), confirm)
+    return Finding("bearing-risen", Kind.SUSPICION, title, change.where, None, 0.5, _FIT, (change.text,), confirm)
 
 
 def _of_noise(risen: Sequence[LevelChange], *, has_bearings: bool) -> Finding:
@@ -1016,8 +953,6 @@ def _of_noise(risen: Sequence[LevelChange], *, has_bearings: bool) -> Finding:
     if has_bearings:  # a rolling element that turns out of its track, and wear all around, repeat at no steady rate
         causes = "a worn bearing or a damaged rolling element, " + causes
     title = f"Perhaps {causes}: noise has risen, but no line."
-    return Finding("noise-risen", Kind.SUSPICION, title, risen[0].where, None, 0.4, _FIT, _told(risen), confirm)
-
-
-def _told(changes: Sequence[LevelChange]) -> tuple[str, ...]:
-    return tuple(f"{c.label} in {c.where.channels[0]}: {signed(c.change_db)} dB." for c in changes)
+    return Finding(
+        "noise-risen", Kind.SUSPICION, title, risen[0].where, None, 0.4, _FIT, tuple(c.text for c in risen), confirm
+    )

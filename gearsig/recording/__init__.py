@@ -23,14 +23,12 @@ from gearsig.recording._read import (
 )
 from gearsig.recording._table import CONDITION_CHANNEL
 from gearsig.recording._types import (
-    SI_FACTORS,
     Channel,
     Provenance,
     Recording,
     check_recording,
     metres_per_second_squared,
     names_without_number,
-    si_factor,
 )
 from gearsig.recording.formats._mat import variables
 from gearsig.recording.formats._wav import parse_lea
@@ -41,7 +39,6 @@ __all__ = [
     "FORMAT_OF_EXTENSION",
     "MAINS_HZ",
     "MAINS_WANDER",
-    "SI_FACTORS",
     "WRITERS",
     "Channel",
     "ChannelProblem",
@@ -61,7 +58,6 @@ __all__ = [
     "read_recording",
     "recording_target",
     "sha256_of",
-    "si_factor",
     "speed_in_name",
     "variables",
     "without_condition",

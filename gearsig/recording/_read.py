@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gearsig.checks import FloatArray, closest_match_hint, count, instance_of, positive
+from gearsig.checks import FloatArray, closest_match_hint, count, instance_of, positive, short
 from gearsig.errors import InputError
 from gearsig.formatting import counted, file_label
 from gearsig.recording._limits import CHUNK_BYTES, check_memory, foreign_errors, read_text_bytes
@@ -34,18 +34,20 @@ from gearsig.recording._table import (
     with_pulse_channels,
 )
 from gearsig.recording._types import (
-    RPM_UNITS,
     SECONDS_PER_UNIT,
     Channel,
     Provenance,
     Recording,
     check_recording,
+    is_unit,
     quantity_of,
     split_unit,
 )
 from gearsig.recording.formats import CSV, FORMATS, FileFormat
 from gearsig.recording.formats._csv import find_layout, line_of_row, parse_rows
 from gearsig.rig import (
+    RPM_UNITS,
+    SI_FACTORS,
     ConstantSpeed,
     EncoderChannel,
     PulseTimes,
@@ -55,6 +57,7 @@ from gearsig.rig import (
     TachometerChannel,
     check_rig,
     check_speed_source,
+    si_factor,
 )
 
 
@@ -552,7 +555,30 @@ def assemble(
         warnings=(*table.warnings, *rate_warnings, *checks, *speed_warnings),
     )
     recording = recording if rig is None else recording.with_rig(rig)
-    return recording if table.is_own_layout else _with_quantity_of_speed(recording)
+    if table.is_own_layout:
+        return recording
+    recording = _with_quantity_of_speed(recording)
+    return replace(recording, warnings=(*recording.warnings, *_unknown_units(recording)))
+
+
+def _unknown_units(recording: Recording) -> Iterator[str]:
+    """Warn of units that are not known, or not units of their channel's quantity."""
+
+    def is_known(c: Channel) -> bool:
+        if c.quantity in SI_FACTORS:
+            return si_factor(c.quantity, c.unit) is not None
+        return c.quantity != "unknown" or is_unit(c.unit)  # a tachometer's or an encoder's is their speed source's
+
+    shown = [
+        f"{short(c.unit)} of channel {c.name!r}" + f" ({c.quantity.replace('_', ' ')})" * (c.quantity != "unknown")
+        for c in recording.channels
+        if c.unit not in ("", "-", "1") and not is_known(c)
+    ]
+    if shown:
+        yield (
+            f"not known as a unit: {', '.join(shown[:4])}{', …' * (len(shown) > 4)}; the values are neither converted "
+            "nor compared with limits: state quantity, unit and scale in a [[sensor]] table of the rig file"
+        )
 
 
 def _with_quantity_of_speed(recording: Recording) -> Recording:

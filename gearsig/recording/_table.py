@@ -17,13 +17,12 @@ from gearsig.formatting import counted
 from gearsig.recording._types import (
     INTERVAL_NAMES,
     RATE_NAMES,
-    RPM_UNITS,
     SECONDS_PER_UNIT,
     SPEED_NAMES,
     plain_name,
     quantity_of,
 )
-from gearsig.rig import ConstantSpeed, SpeedSource
+from gearsig.rig import RPM_UNITS, ConstantSpeed, SpeedSource
 
 NumberArray = NDArray[Any]
 
