@@ -317,9 +317,13 @@ def gears_only(rig: Rig, speed: SpeedSource | None = None) -> Rig:
 
 
 def for_simulation(rig: Rig, speed: SpeedSource | None = None) -> Rig:
-    """Return the part of the recording's rig that applies to a simulation without a rig of its own."""
+    """Return the part of the recording's rig that applies to a simulation without a rig of its own.
+
+    That includes its sampling rate, for a file that states none.
+    """
     stated = rig.speed if isinstance(rig.speed, ConstantSpeed) else None
-    return gears_only(rig, speed if speed is not None else stated)
+    machine = gears_only(rig, speed if speed is not None else stated)
+    return replace(machine, sampling_rate_hz=rig.sampling_rate_hz)
 
 
 def usable_speed(rig: Rig, recording: Recording) -> SpeedSource | None:

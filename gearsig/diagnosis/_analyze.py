@@ -52,6 +52,7 @@ from gearsig.diagnosis._verdict import (
     speed_warnings,
     spoiled,
     verdict_of,
+    with_doubt,
     withheld_crack,
     without_synchronous_hum,
 )
@@ -170,7 +171,7 @@ def _examined(
     announce("gears, bearings and shafts")
     doubt = detect_sampling_rate(signals, angle, envelopes)
     if doubt is not None:
-        findings.append(doubt)
+        findings = with_doubt(findings, doubt)
     if doubt is not None and not isinstance(recording.speed_source, TachometerChannel | EncoderChannel):
         return ended(findings)  # all orders are wrong, and so is what they would show
     findings += detect_standstill(signals)

@@ -207,7 +207,10 @@ def speed_warnings(angle: ShaftAngle | CannotTell, rig: Rig) -> list[Finding]:
     if nominal and not low * (1 - tolerance) <= nominal <= high * (1 + tolerance):
         ratio = angle.mean_speed_rpm / nominal
         near = min((f for n in range(2, 11) for f in (n, 1 / n)), key=lambda f: abs(ratio / f - 1))
-        pulses = f" {near:.3g} pulses per revolution would explain it." if abs(ratio / near - 1) < 0.03 else ""
+        explained = f" {near:.3g} pulses per revolution would explain it." if abs(ratio / near - 1) < 0.03 else ""
+        if angle.method == "constant":
+            in_hz = abs(60 * ratio - 1) < tolerance
+            explained = f" {nominal / 60:.4g} Hz, stated as rpm, would explain it." if in_hz else ""
         title = f"The speed, {angle.mean_speed_rpm:.5g} rpm, is {ratio:.3g} times the nominal {nominal:.5g} rpm"
         doubts.append(
             Finding(
@@ -217,7 +220,7 @@ def speed_warnings(angle: ShaftAngle | CannotTell, rig: Rig) -> list[Finding]:
                 Where(shaft=angle.shaft),
                 Strength(angle.mean_speed_rpm, "rpm", nominal, "nominal speed", against="a nominal speed of"),
                 confidence_basis="comparison with the rig file or the stated speed",
-                evidence=(f"How it was found: {angle.method}.{pulses}",),
+                evidence=(f"How it was found: {angle.method}.{explained}",),
                 surer="Check sampling rate, pulses per revolution and the nominal speed.",
             )
         )
@@ -231,6 +234,12 @@ def speed_warnings(angle: ShaftAngle | CannotTell, rig: Rig) -> list[Finding]:
         where = Where(shaft=angle.shaft)
         doubts.append(Finding(NEAR_ZERO, Kind.DATA_PROBLEM, title, where, surer=SURER_BEYOND_ZERO))
     return doubts
+
+
+def with_doubt(findings: Sequence[Finding], doubt: Finding) -> list[Finding]:
+    """Add a doubtful sampling rate, which takes the place of a speed off its nominal: one problem from two sides."""
+    off, others = ([f for f in findings if (f.code == OFF_NOMINAL) is is_off] for is_off in (True, False))
+    return [*others, replace(doubt, evidence=(*doubt.evidence, *(text for f in off for text in f.evidence)))]
 
 
 def without_synchronous_hum(findings: Iterable[Finding], angle: ShaftAngle | CannotTell, rig: Rig) -> list[Finding]:
@@ -314,7 +323,5 @@ def withheld_crack(findings: Iterable[Finding], *, is_asked: bool) -> CannotTell
 def said_first(findings: Sequence[Finding], *, claims: bool) -> str:
     """Return the problems that open the verdict: rate or speed always, those of channels if something is claimed."""
     titles = {f.code: f.title for f in findings if f.code in TRUST and f.kind is Kind.DATA_PROBLEM}
-    if SAMPLING_RATE in titles:
-        titles.pop(OFF_NOMINAL, None)  # the same problem, seen from the other side
     first = [title for code, title in titles.items() if not code.startswith("channel-") and code != NEAR_ZERO]
     return " ".join([*first, *(t for t in titles.values() if claims and t not in first)])

@@ -46,6 +46,9 @@ N_SHAFT_HARMONICS = 8
 N_PHASE_HARMONICS = 3
 """Mesh harmonics whose phase an angle may follow."""
 
+FASTEST_IN_HZ = 100.0
+"""Usual machines turn at up to 6000 rpm: an unconfirmed speed below this number in rpm may be one in Hz."""
+
 RULES_DB = 20.0
 """Height of a rotor's own line above the floor, and above all others within the tolerance of a stated speed."""
 
@@ -140,9 +143,10 @@ def _refined(recording: Recording, rig: Rig, stated: ShaftAngle, transform: Tran
     if by_lines is None:
         if not rig.pairs:
             _refuse_a_wandering_speed(recording, stated)
-        return replace(
-            stated, quality=0.5, notes=(*stated.notes, "The stated speed could not be confirmed from the signal.")
-        )
+        note, speed = "The stated speed could not be confirmed from the signal.", stated.mean_speed_rpm
+        if speed <= FASTEST_IN_HZ:
+            note += f" {speed:.4g} Hz, if these were meant, are {60 * speed:.5g} rpm."
+        return replace(stated, quality=0.5, notes=(*stated.notes, note))
     difference = 100 * (by_lines.mean_speed_rpm / stated.mean_speed_rpm - 1)
     lines_say = f"the signal's own lines say {by_lines.mean_speed_rpm:.6g} rpm ({signed(difference, 2)} %)"
     note = f"Stated {stated.mean_speed_rpm:.6g} rpm; {lines_say}."

@@ -10,6 +10,7 @@ from gearsig.recording._quality import MAINS_HZ, MAINS_WANDER, ChannelProblem, f
 from gearsig.recording._read import (
     FORMAT_NAMES,
     FORMAT_OF_EXTENSION,
+    RATE_GIVEN,
     WRITERS,
     is_ending,
     n_samples_of,
@@ -39,6 +40,7 @@ __all__ = [
     "FORMAT_OF_EXTENSION",
     "MAINS_HZ",
     "MAINS_WANDER",
+    "RATE_GIVEN",
     "WRITERS",
     "Channel",
     "ChannelProblem",

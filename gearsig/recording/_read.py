@@ -659,6 +659,10 @@ def _time_of_rate(table: RawTable) -> RawColumn | None:
     return first if is_even and np.ptp(steps) <= 0.5 * steps.mean() else None
 
 
+RATE_GIVEN = "the sampling rate given"
+"""Start of the warning that an argument goes before the sampling rate that a file or its rig file states."""
+
+
 def _sampling_rate(
     table: RawTable, source: str, rig: Rig | None, explicit_hz: float | None
 ) -> tuple[float, tuple[str, ...]]:
@@ -687,9 +691,9 @@ def _sampling_rate(
         )
     if explicit_hz is not None:
         chosen_hz = positive(explicit_hz, f"{source}: sampling rate given", "Hz", remedy="give --fs above zero")
-        if file_hz is not None and differ(chosen_hz, file_hz):
-            return chosen_hz, (f"the sampling rate {chosen_hz:g} Hz was given; the file states {file_hz:.9g} Hz",)
-        return chosen_hz, ()
+        stated = {"file": file_hz, "rig file": rig_hz}
+        others = [f"the {name} states {hz:.9g} Hz" for name, hz in stated.items() if hz and differ(chosen_hz, hz)]
+        return chosen_hz, (f"{RATE_GIVEN}, {chosen_hz:g} Hz, was taken; {' and '.join(others)}",) * bool(others)
     if file_hz is not None and timed_hz is not None and differ(file_hz, timed_hz):
         raise InputError(
             f"a rate of {file_hz:g} Hz is stated, the time column gives {timed_hz:.9g} Hz",
