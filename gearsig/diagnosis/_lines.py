@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 from math import gcd, isfinite
 
 import numpy as np
@@ -565,7 +566,8 @@ BY_CHANCE = 0.1
 def combination(signals: AnalysisSignals, order: float, spectrum: Spectrum, trains: Sequence[float]) -> str:
     """Return the combination of known orders that a line is; empty if it is none, or if a match is likely by chance.
 
-    Impacts of order q that modulate a mesh, or are modulated by it, stand at h·mesh ± k·q, and a shaft's order beside.
+    A mesh that both its shafts modulate has sidebands at h·mesh ± i·driver ± j·driven, i and j up to 2. Impacts of
+    order q that modulate a mesh, or are modulated by it, stand at h·mesh ± k·q, and a shaft's order beside.
 
     Parameters
     ----------
@@ -578,6 +580,35 @@ def combination(signals: AnalysisSignals, order: float, spectrum: Spectrum, trai
         Orders of impacts.
     """
     near, highest = 1.5 * spectrum.resolution, float(spectrum.positions[-1])
+
+    def matching(places: dict[str, float]) -> str:
+        inside = {text: place for text, place in places.items() if 0 < place < highest}
+        text = min(inside, key=lambda label: abs(inside[label] - order), default="")
+        is_rare = len(inside) * 2 * near <= BY_CHANCE * highest
+        return text if is_rare and text and abs(inside[text] - order) <= near else ""
+
+    return matching(_of_both_shafts(signals, highest)) or matching(_of_trains(signals, trains))
+
+
+def _of_both_shafts(signals: AnalysisSignals, highest: float) -> dict[str, float]:
+    """Return the sidebands of every mesh harmonic by both its shafts together: text → order."""
+    places: dict[str, float] = {}
+    for name, mesh in signals.known_mesh_orders.items():
+        pair = signals.rig.pair(name)
+        turns = [signals.known_shaft_orders.get(shaft) for shaft in (pair.driver, pair.driven)]
+        if turns[0] is None or turns[1] is None:
+            continue
+        for h in range(1, int(highest / mesh) + 2):
+            for i, j in product((1, -1, 2, -2), repeat=2):
+                sides = (
+                    f" {'+' if k > 0 else '−'} {abs(k)}× {shaft}" for k, shaft in ((i, pair.driver), (j, pair.driven))
+                )
+                places[f"{h}× mesh {name}{''.join(sides)}"] = h * mesh + i * turns[0] + j * turns[1]
+    return places
+
+
+def _of_trains(signals: AnalysisSignals, trains: Sequence[float]) -> dict[str, float]:
+    """Return the sums and differences of impacts, mesh harmonics and a shaft: text → order."""
     places: dict[str, float] = {}
     for train in trains:
         for h in range(N_COMBINED + 1):
@@ -592,12 +623,7 @@ def combination(signals: AnalysisSignals, order: float, spectrum: Spectrum, trai
                 places |= {
                     f"{train_text}, {sign} {j}× {shaft}": place + (j if sign == "+" else -j) * turns for sign in "+−"
                 }
-    inside = {text: place for text, place in places.items() if 0 < place < highest}
-    if len(inside) * 2 * near <= BY_CHANCE * highest:
-        text = min(inside, key=lambda label: abs(inside[label] - order), default="")
-        if text and abs(inside[text] - order) <= near:
-            return text
-    return ""
+    return places
 
 
 def hunting_multiple(signals: AnalysisSignals, order: float, near: float) -> tuple[float, str] | None:
