@@ -28,7 +28,7 @@ from gearsig.diagnosis._types import (
 )
 from gearsig.formatting import percent, sentence
 from gearsig.prepared import PreparedRecording, magnetic_pull_near
-from gearsig.recording import ChannelProblem
+from gearsig.recording import SEPARATE_RUNS, ChannelProblem
 from gearsig.rig import Rig
 
 DEPTH_UNKNOWN = "crack-depth-unknown"
@@ -148,10 +148,10 @@ def detect_data_problems(prepared: PreparedRecording) -> tuple[list[Finding], fr
         )
         for p in prepared.problems
     ]
-    findings += [
-        Finding("reader-note", Kind.NOTICE, sentence(text), confidence_basis="stated by the reader of the file")
-        for text in prepared.recording.warnings
-    ]
+    for text in prepared.recording.warnings:
+        are_runs = text.startswith(SEPARATE_RUNS)
+        code, kind = ("separate-runs", Kind.DATA_PROBLEM) if are_runs else ("reader-note", Kind.NOTICE)
+        findings.append(Finding(code, kind, sentence(text), confidence_basis="stated by the reader of the file"))
     return findings, frozenset(p.channel for p in prepared.problems if p.kind == "dead")
 
 
@@ -170,6 +170,7 @@ TRUST = {
     "mesh-above-sampling": 0.5,
     "mesh-absent": 0.75,
     MESH_ELSEWHERE: 0.5,
+    "separate-runs": 0.75,
     "channel-clipped": 0.7,
     "channel-wrapped": 0.0,
     "channel-stepped": 0.75,
@@ -178,7 +179,8 @@ TRUST = {
     "channel-faded": 0.75,
 }
 """Problem → factor on the confidence: a judgement, not a probability. 0.5 where places or frequencies are probably
-wrong, 0.7 and 0.75 where places are right but sizes unreliable, 0 where nothing is usable."""
+wrong, 0.7 and 0.75 where places are right but sizes or what channels show together are unreliable, 0 where nothing is
+usable."""
 
 TRUST_OF_SHARED_LINE = 0.5
 """The same for a finding based on a line that the mains may cause as well: nothing tells which of the two does."""

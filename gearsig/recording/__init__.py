@@ -22,7 +22,7 @@ from gearsig.recording._read import (
     without_condition,
     write_recording,
 )
-from gearsig.recording._table import CONDITION_CHANNEL
+from gearsig.recording._table import CONDITION_CHANNEL, SEPARATE_RUNS
 from gearsig.recording._types import (
     Channel,
     Provenance,
@@ -41,6 +41,7 @@ __all__ = [
     "MAINS_HZ",
     "MAINS_WANDER",
     "RATE_GIVEN",
+    "SEPARATE_RUNS",
     "WRITERS",
     "Channel",
     "ChannelProblem",

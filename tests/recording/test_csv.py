@@ -83,7 +83,7 @@ def test_headerless(tmp_path):
     assert r.sampling_rate_hz == 10
     r = read_recording(write(tmp_path / "y.csv", [f"{t!r},{b!r}" for t, _, b in rows()]))
     assert r.sampling_rate_hz == pytest.approx(FS_HZ)
-    assert "taken as the time" in r.warnings[0]
+    assert r.warnings[0] == "the first column increases uniformly and was taken as the time in seconds"
 
 
 def test_row_counter_is_left_out(tmp_path):

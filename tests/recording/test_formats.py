@@ -129,6 +129,7 @@ class TestMat5:
         assert r.channel_names == ("m_1", "m_2", "m_3")
         assert r.sampling_rate_hz == pytest.approx(5120)
         assert any("#3" in w for w in r.warnings) is not together
+        assert any(w.endswith("was taken as the time in seconds; the others are m_1 to m_3") for w in r.warnings)
         np.savetxt(tmp_path / "x.csv", matrix, fmt="%.9g")
         for name in ("x.mat#2", "x.csv#2"):
             second = read_recording(tmp_path / name)
