@@ -119,7 +119,8 @@ def _rig_at_reference(path: str | Path, rig: Rig, rig_beside: Rig, *, is_same_ma
     point, then = rig.operating_point, rig_beside.operating_point
     if not rig_beside.pairs or then.shaft != point.shaft:
         return its_rig
-    return replace(its_rig, operating_point=replace(point, torque_nm=then.torque_nm))
+    torque_nm = point.torque_nm if then.torque_nm is None else then.torque_nm
+    return replace(its_rig, operating_point=replace(point, torque_nm=torque_nm))
 
 
 def _speed_at_reference(path: str | Path, rig: Rig, speed: SpeedSource | None) -> SpeedSource | None:

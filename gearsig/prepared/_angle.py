@@ -55,6 +55,9 @@ RULES_DB = 20.0
 MAINS_TOLERANCE = 0.002
 """Largest relative drift of a supply's frequency; its harmonics, and those of motors, lie within a motor's slip.
 
+It is 100 mHz of 50 Hz: the standard frequency range is ±50 mHz in continental Europe and ±100 mHz in the Nordic grid
+(Regulation (EU) 2017/1485, annex III).
+
 Twice the limit for hum in a recording's quality: these lines are only left out, or treated as confirming nothing."""
 
 N_PULLS = 10

@@ -746,7 +746,8 @@ def _stack(table: RawTable, source: str) -> FloatArray:
 def _measured(table: RawTable, channels: tuple[Channel, ...], rig: Rig | None) -> str:
     """Return in words where the file has a measured speed that it or the rig names; empty if nowhere."""
     names = {*(c.name for c in channels), *table.pulse_times_s}
-    for source in (table.speed, None if rig is None else rig.speed):
+    of_file = table.is_own_layout and table.speed is not None  # goes before the rig's
+    for source in (table.speed, None if rig is None or of_file else rig.speed):
         if isinstance(source, PulseTimes):
             return "pulse times"
         if source is not None and not isinstance(source, ConstantSpeed) and source.channel in names:
