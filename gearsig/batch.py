@@ -96,7 +96,8 @@ def report_many(
         Created if it does not exist. A page of the same recording is replaced; any other file of that name is left,
         and the new page gets a number.
     rig : Rig or None
-        For all recordings; None: the rig file of the same name beside each, if there is one.
+        The machine of all recordings; what a rig file of the same name beside one states of its measurement goes
+        before it, and before the sampling rate. None: only that file.
     sampling_rate_hz : float or None
         For files that do not state it.
     speed : SpeedSource or None
@@ -162,9 +163,8 @@ def report_many(
         is_healthy = file.resolve() in healthy_files
         compared = None if is_healthy else healthy.get(file.resolve())
         path = folder / f"{page}.html"
-        stated_hz = reference_rate_hz if is_healthy and reference_rate_hz is not None else sampling_rate_hz
-        its_rate_hz = reference_rate_hz if compared else None
-        options = AnalysisOptions(rig, stated_hz, speed, compared, torque_nm, memory_bytes, its_rate_hz)
+        its_rate_hz = reference_rate_hz if compared or is_healthy else None
+        options = AnalysisOptions(rig, sampling_rate_hz, speed, compared, torque_nm, memory_bytes, its_rate_hz)
         jobs.append(_Job(file, name, path, options, command, is_reference=is_healthy, pdf=pdf, methods=chosen))
     # Pages made from the same files and options by the same version of gearsig are kept.
     made_of = _made_of()
@@ -229,7 +229,7 @@ def _made_of() -> Callable[[_Job], str]:
     def made_of(job: _Job) -> str:
         reference = job.options.reference
         try:
-            beside = rig_file_beside(job.path) if job.options.rig is None else None
+            beside = rig_file_beside(job.path)
             then = rig_file_beside(reference) if reference is not None else None
             files = [state(path) for path in (job.path, beside, reference, then) if path is not None]
         except OSError:

@@ -110,6 +110,15 @@ def test_two_stage_gearbox_is_left_undecided(file: str) -> None:
 
 
 @pytest.mark.slow
+def test_of_two_recordings_of_the_two_stage_gearbox_one_sensor_differs() -> None:
+    now, reference = (BY_NAME[f"two_stage_gearbox/{file}"].read() for file in ("b30hz50.csv.gz", "h30hz50.csv.gz"))
+    analysis = analyze(now, reference=reference)
+    assert found(analysis, "channel-faded").where.channels == ("a1",)
+    assert claims(analysis) == {"changed-since-reference"}
+    assert any(text.startswith("Against it: 5× mesh second in a2") for text in found(analysis, "mesh-risen").evidence)
+
+
+@pytest.mark.slow
 def test_car_run_up_reads_its_own_speed_channel() -> None:
     analysis = analyze(read_recording(DATA / "car_run_up" / "accel_with_rpm.wav"))
     assert not isinstance(analysis.shaft_angle, CannotTell)

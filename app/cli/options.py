@@ -59,7 +59,12 @@ SamplingRateOption = Annotated[
 ]
 SpeedOption = Annotated[
     float | None,
-    quantity_option("--speed-rpm", "rpm", "RPM", "Constant speed of the reference shaft, if known accurately."),
+    quantity_option(
+        "--speed-rpm",
+        "rpm",
+        "RPM",
+        "Constant speed of the reference shaft, if known accurately; checks a speed that is measured.",
+    ),
 ]
 TachometerTimesOption = Annotated[
     Path | None, typer.Option("--tach-times", metavar="FILE", help="File with the times of the tachometer pulses in s.")
@@ -131,14 +136,15 @@ def open_cluster(address: str) -> Iterator[Cluster | None]:
 
 
 def open_rig(path: Path | None, recording: Path | None = None) -> Rig | None:
-    """Read the given rig file, else announce and read the one next to the recording with the same name."""
+    """Read the given rig file, else the one next to the recording with the same name; announce what becomes of it."""
     from gearsig.rig import read_rig, rig_file_beside
 
-    if path is None and recording is not None:
-        path = rig_file_beside(recording)
-        if path is not None:
-            typer.echo(f"Using the rig file {path.name} next to {recording.name}.", err=True)
-    return read_rig(path) if path is not None else None
+    beside = rig_file_beside(recording) if recording is not None else None
+    if recording is not None and beside is not None and (path is None or path.resolve() != beside.resolve()):
+        using = "Using the rig file" if path is None else f"Using {path.name}, not the rig file"
+        typer.echo(f"{using} {beside.name} next to {recording.name}.", err=True)
+    chosen = beside if path is None else path
+    return read_rig(chosen) if chosen is not None else None
 
 
 def stated_speed(speed_rpm: float | None, tach_times: Path | None, pulses_per_revolution: int) -> SpeedSource | None:

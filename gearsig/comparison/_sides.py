@@ -12,8 +12,8 @@ from gearsig.checks import FloatArray, listed, short
 from gearsig.errors import InputError, RefusalError, options_named
 from gearsig.orders import first_whole_sample
 from gearsig.prepared import PreparedRecording
-from gearsig.recording import SI_FACTORS, Channel, Recording, si_factor
-from gearsig.rig import ConstantSpeed, PulseTimes, Rig, SpeedSource
+from gearsig.recording import Channel, Recording
+from gearsig.rig import SI_FACTORS, ConstantSpeed, PulseTimes, Rig, SpeedSource, si_factor
 
 MIN_REVOLUTIONS = 8
 """Of a shaft: four in each half. Fewer leave other shafts' orders in its average, and give no measure of scatter."""
@@ -317,9 +317,13 @@ def gears_only(rig: Rig, speed: SpeedSource | None = None) -> Rig:
 
 
 def for_simulation(rig: Rig, speed: SpeedSource | None = None) -> Rig:
-    """Return the part of the recording's rig that applies to a simulation without a rig of its own."""
+    """Return the part of the recording's rig that applies to a simulation without a rig of its own.
+
+    That includes its sampling rate, for a file that states none.
+    """
     stated = rig.speed if isinstance(rig.speed, ConstantSpeed) else None
-    return gears_only(rig, speed if speed is not None else stated)
+    machine = gears_only(rig, speed if speed is not None else stated)
+    return replace(machine, sampling_rate_hz=rig.sampling_rate_hz)
 
 
 def usable_speed(rig: Rig, recording: Recording) -> SpeedSource | None:

@@ -6,7 +6,7 @@ of a revolution is the sum over its lines, and also over its teeth.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -122,9 +122,20 @@ def differing_lines(channel: ChannelComparison) -> tuple[LineLevel, ...]:
 
 
 def common_gain_db(channel: ChannelComparison) -> float:
-    """Return the mesh harmonics' median difference in dB if it is no agreement, or levels do not compare; else 0."""
+    """Return the mesh harmonics' median difference in dB if it is no agreement; else 0.
+
+    If levels do not compare, that of the lines that both records show, mesh harmonics if there are any; else the
+    overall levels' difference.
+    """
+    if not channel.levels_compare:
+        lines = _shown_by_both(mesh_lines(channel)) or _shown_by_both(further_lines(channel))
+        return float(np.median([line.level.difference_db for line in lines] or [channel.overall.difference_db]))
     gain_db = float(np.median([line.level.difference_db for line in mesh_lines(channel)] or [0.0]))
-    return gain_db if abs(gain_db) > WITHIN_DB or not channel.levels_compare else 0.0
+    return gain_db if abs(gain_db) > WITHIN_DB else 0.0
+
+
+def _shown_by_both(lines: Iterable[LineLevel]) -> tuple[LineLevel, ...]:
+    return tuple(line for line in lines if line.simulated_is_seen and line.recorded_is_seen)
 
 
 def power_difference(level: LevelPair, gain_db: float = 0.0) -> float:
@@ -229,6 +240,8 @@ def _verdict_text(channel: ChannelComparison, alignments: Sequence[Alignment]) -
     elsewhere, power = _elsewhere_text(channel, alignments)
     if not elsewhere:
         return _levels_text(channel, alignments)
+    if not mesh_lines(channel):
+        return elsewhere if channel.levels_compare else f"The unit of one side is not known. {elsewhere}"
     texts = elsewhere, _levels_text(channel)
     gain_db = 0.0 if channel.levels_compare else common_gain_db(channel)
     apart = (
@@ -286,16 +299,17 @@ def _word(off_db: float) -> str:
 
 def _levels_text(channel: ChannelComparison, alignments: Sequence[Alignment] | None = None) -> str:
     """Return how far apart the mesh harmonics are; with alignments also that nothing else differs, if so."""
-    lines = mesh_lines(channel)
+    lines = mesh_lines(channel) or (() if channel.levels_compare else _shown_by_both(further_lines(channel)))
     if not lines:
         return "No line of the recording stands above its own noise: only the floors can be compared."
-    where = _WHERE[lines[0].kind]
+    where = _WHERE.get(lines[0].kind, "lines")
     comparable = [line for line in lines if line.simulated_is_seen or not is_hidden(line)]
     hidden = len(lines) - len(comparable)
     if not comparable:
         return f"The simulation's own scatter hides all {where} of the recording: they cannot be compared."
     further = () if alignments is None else _further_places(channel, alignments)
-    text = _lines_text(comparable, where, further, levels_compare=channel.levels_compare)
+    unknown_gain_db = None if channel.levels_compare else common_gain_db(channel)
+    text = _lines_text(comparable, where, further, unknown_gain_db)
     return f"{text} {hidden} more are hidden by the simulation's own scatter." if hidden else text
 
 
@@ -306,12 +320,12 @@ def _further_places(channel: ChannelComparison, alignments: Sequence[Alignment])
     return (*((f"{counted(n, 'other line')}",) if n else ()), *(("tooth by tooth",) if by_tooth else ()))
 
 
-def _lines_text(lines: Sequence[LineLevel], where: str, further: Sequence[str], *, levels_compare: bool) -> str:
+def _lines_text(lines: Sequence[LineLevel], where: str, further: Sequence[str], unknown_gain_db: float | None) -> str:
     differences = np.array([line.level.difference_db for line in lines])
-    gain = float(np.median(differences))
+    gain = float(np.median(differences)) if unknown_gain_db is None else unknown_gain_db
     n = f"{len(lines)} {where}" if len(lines) > 1 else f"one {where[:-1]}"
-    worst = lines[int(np.argmax(np.abs(differences - (gain if not levels_compare else 0.0))))]
-    if not levels_compare:
+    worst = lines[int(np.argmax(np.abs(differences - (unknown_gain_db or 0.0))))]
+    if unknown_gain_db is not None:
         spread = float(np.max(np.abs(differences - gain)))
         verb = "agree within" if spread <= WITHIN_DB else "differ by up to"
         return (

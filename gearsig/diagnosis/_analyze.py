@@ -52,6 +52,7 @@ from gearsig.diagnosis._verdict import (
     speed_warnings,
     spoiled,
     verdict_of,
+    with_doubt,
     withheld_crack,
     without_synchronous_hum,
 )
@@ -170,7 +171,7 @@ def _examined(
     announce("gears, bearings and shafts")
     doubt = detect_sampling_rate(signals, angle, envelopes)
     if doubt is not None:
-        findings.append(doubt)
+        findings = with_doubt(findings, doubt)
     if doubt is not None and not isinstance(recording.speed_source, TachometerChannel | EncoderChannel):
         return ended(findings)  # all orders are wrong, and so is what they would show
     findings += detect_standstill(signals)
@@ -319,7 +320,7 @@ def _angle_of(prepared: PreparedRecording) -> ShaftAngle | CannotTell:
         return CannotTell("What is the speed of the shafts?", refusal.reason, refusal.remedy)
     except InputError as error:  # it names the channel; the file is known only here
         where = error.where if error.where.startswith(source) else f"{source}: {error.where}".removesuffix(": ")
-        remedy = error.remedy or "check [speed] in the rig file, or state the speed by --speed-rpm"
+        remedy = error.remedy or "check [speed] in the rig file, or leave it out and state the speed by --speed-rpm"
         raise InputError(error.what, where=where, allowed=error.allowed, remedy=remedy) from None
 
 

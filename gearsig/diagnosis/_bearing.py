@@ -201,7 +201,7 @@ def _named_finding(signals: AnalysisSignals, candidate: Candidate, n_parts: int)
         _where(signals, candidate),
         _strength(candidate),
         confidence,
-        f"at most {percent(confidence)}: chance that lines fit the order this well {p_text(candidate.p_value)} "
+        f"chance that lines fit the order this well {p_text(candidate.p_value)} "
         "(all parts, bands, channels tried); never above 95 %, as only one recording is used",
         tuple(evidence),
         surer,
@@ -378,7 +378,7 @@ def _unnamed_finding(signals: AnalysisSignals, candidate: Candidate) -> Finding:
         where,
         _strength(candidate),
         confidence,
-        f"{_family_basis(candidate, confidence)}, all orders and bands tried; what causes it is not known",
+        f"{_family_basis(candidate)}, all orders and bands tried; what causes it is not known",
         (f"{_family_text(candidate)}.", _modulation_text(candidate), *near, *causes),
         "" if signals.rig.bearings and not shaft else surer,
     )
@@ -439,7 +439,7 @@ def _over_frequency(signals: AnalysisSignals, envelopes: list[BandEnvelope]) -> 
         replace(_where(signals, best), order=None, frequency_hz=hertz),
         _strength(best),
         confidence,
-        _family_basis(best, confidence),
+        _family_basis(best),
         (f"{_family_text(best)}.", _modulation_text(best)),
         "Give the shaft speed: then shafts, gears and bearings can be told apart.",
     )
@@ -458,9 +458,8 @@ def _strength(candidate: Candidate) -> Strength:
     return Strength(comb.amplitude, unit, comb.floor, floor_is, max(comb.ratios_db, default=None))
 
 
-def _family_basis(candidate: Candidate, confidence: float) -> str:
-    chance = p_text(candidate.p_value)
-    return f"at most {percent(confidence)}, that the family exists: its chance in noise {chance}"
+def _family_basis(candidate: Candidate) -> str:
+    return f"that the family exists: its chance in noise {p_text(candidate.p_value)}"
 
 
 def _family_text(candidate: Candidate) -> str:
@@ -514,7 +513,7 @@ def _none_shows(
     no_damage = Finding(
         "no-bearing-damage",
         Kind.INFORMATION,
-        f"No damage shows in the bearings ({', '.join(examined)}).",
+        f"No damage shows in the bearings ({', '.join(examined)}){_apart_from(depths, examined)}.",
         where,
         confidence=WOULD_SHOW,
         confidence_basis="early damage may be hidden below the gears",
@@ -589,6 +588,13 @@ def _examined(signals: AnalysisSignals, depths: Mapping[tuple[str, str], float])
         if decisive and max(decisive) <= CLEAR_MODULATION:
             examined.append(bearing.name)
     return examined
+
+
+def _apart_from(depths: Mapping[tuple[str, str], float], examined: Sequence[str]) -> str:
+    """Return which parts of the bearings examined would not have shown damage, in words; empty if all would."""
+    hidden = {name for (bearing, name), depth in depths.items() if depth > CLEAR_MODULATION and bearing in examined}
+    parts = " or ".join(BEARING_PARTS[name][0] for name in BEARING_PARTS if name in hidden)
+    return f", of which not every {parts} could be examined" if parts else ""
 
 
 def _not_examined(signals: AnalysisSignals, depths: Mapping[tuple[str, str], float], where: Where) -> Iterator[Finding]:

@@ -22,6 +22,7 @@ from gearsig.diagnosis._bearing_families import (
     speed_is_only_stated,
 )
 from gearsig.diagnosis._lines import SPREAD_OF_STATED
+from gearsig.diagnosis._reference import changed_sensors
 from gearsig.diagnosis._rotor import (
     CONFIRMS_WHIRL,
     OIL_WHIRL,
@@ -637,7 +638,7 @@ def change_findings(
         unknown = [cannot_tell("change-not-examined", title, surer=surer)]
         if not any(c.is_change for c in changes):
             return unknown
-    findings, rest = _gains(changes)
+    findings, rest = changed_sensors(changes)
     findings = [*unknown, *findings]
     changed = [c for c in rest if c.is_change and (c.change_db > 0 or c.kind != "bearing")]  # bearings do not heal
     if not changed:
@@ -698,37 +699,6 @@ def _largest(changes: Sequence[LevelChange]) -> list[LevelChange]:
         if change.label not in best or abs(change.change_db) > abs(best[change.label].change_db):
             best[change.label] = change
     return list(best.values())
-
-
-SAME_GAIN_DB = 2.0
-"""If all levels of a channel, noise included, change alike to within this, the gain has changed."""
-
-
-def _gains(changes: Sequence[LevelChange]) -> tuple[list[Finding], list[LevelChange]]:
-    """Report channels whose levels have all changed alike, noise included, and return the changes of the others."""
-    findings, rest = [], []
-    for channel in dict.fromkeys(c.where.channels[0] for c in changes):
-        of_channel = [c for c in changes if c.where.channels[0] == channel]
-        lines = [c for c in of_channel if c.stands_out and c.kind != "bearing"]
-        shifts = np.array([c.change_db for c in lines])
-        gain = float(np.median(shifts))
-        spread = float(np.percentile(np.abs(shifts - gain), 90))
-        if len(lines) < 4 or abs(gain) < MIN_CHANGE_DB / 2 or spread > SAME_GAIN_DB:
-            rest += of_channel
-            continue
-        findings.append(
-            Finding(
-                "levels-scaled",
-                Kind.DATA_PROBLEM,
-                f"Every level of channel {channel} has changed alike by {signed(gain)} dB since the reference, "
-                "noise included: the gain, unit or sensor differs rather than the machine.",
-                Where((channel,)),
-                confidence=0.9,
-                confidence_basis=f"{len(lines)} levels within {spread:.2g} dB of each other",
-                surer="Check sensor, range and unit of both recordings.",
-            )
-        )
-    return findings, rest
 
 
 def _unchanged(changes: Sequence[LevelChange]) -> Finding:
@@ -806,7 +776,7 @@ def _meanings(
     for shaft in signals.known_shaft_orders:
         findings += _of_shaft(shaft, risen, changes, signals)
     for pair in signals.rig.pairs:
-        findings += _of_pair(pair.name, risen)
+        findings += _of_pair(pair.name, risen, changes)
     of_parts = [c for c in risen if c.kind == "bearing"]
     named = [c.where.order for c in of_parts if c.where.bearing in claimed and c.where.order]  # bearings of one size
     parts = [
@@ -947,8 +917,10 @@ def _velocity(change: LevelChange, signals: AnalysisSignals, *, since: bool = Fa
     return float(power * change.harmonic ** (-2 * derivatives_of_velocity(signals, change.where.channels[0])))
 
 
-def _of_pair(name: str, risen: Sequence[LevelChange]) -> Iterator[Finding]:
+def _of_pair(name: str, risen: Sequence[LevelChange], changes: Sequence[LevelChange]) -> Iterator[Finding]:
     mesh = [c for c in risen if c.kind == "mesh" and c.where.gear == name]
+    fallen = _largest([c for c in changes if c.is_change and c.change_db < 0 and c.where.gear == name])
+    fallen = [c for c in fallen if c.kind == "mesh"]
     sides = [c for c in risen if c.kind == "sidebands" and c.where.gear.startswith(f"{name}/")]
     if mesh:
         confirm = (
@@ -956,20 +928,23 @@ def _of_pair(name: str, risen: Sequence[LevelChange]) -> Iterator[Finding]:
             "particles in the oil; contact pattern and backlash."
         )
         title = f"Perhaps wear, another load, or misaligned teeth at {named('gear pair', name)}."
-        yield Finding("mesh-risen", Kind.SUSPICION, title, mesh[0].where, None, 0.5, _FIT, _told(mesh), confirm)
+        share = len(mesh) / (len(mesh) + len(fallen))
+        likely = Kind.SUSPICION if share > 0.5 else Kind.NOTICE
+        evidence = (*(c.text for c in mesh), *(f"Against it: {c.text}" for c in fallen))
+        yield Finding("mesh-risen", likely, title, mesh[0].where, None, 0.5 * share, _FIT, evidence, confirm)
     for sideband in sides:
         confirm = "The average of that shaft: one tooth or all around; run-out, keys and couplings; another load."
         shaft = sideband.where.gear.partition("/")[2]
         title = f"Perhaps an eccentric, loose or damaged gear on shaft {shaft}."
         yield Finding(
-            "sidebands-risen", Kind.SUSPICION, title, sideband.where, None, 0.5, _FIT, _told([sideband]), confirm
+            "sidebands-risen", Kind.SUSPICION, title, sideband.where, None, 0.5, _FIT, (sideband.text,), confirm
         )
 
 
 def _of_bearing(change: LevelChange) -> Finding:
     confirm = "The same part in another band or sensor; its level over days; grease, temperature, noise when turned."
     title = f"Perhaps damage at the {change.label}."
-    return Finding("bearing-risen", Kind.SUSPICION, title, change.where, None, 0.5, _FIT, _told([change]), confirm)
+    return Finding("bearing-risen", Kind.SUSPICION, title, change.where, None, 0.5, _FIT, (change.text,), confirm)
 
 
 def _of_noise(risen: Sequence[LevelChange], *, has_bearings: bool) -> Finding:
@@ -978,8 +953,6 @@ def _of_noise(risen: Sequence[LevelChange], *, has_bearings: bool) -> Finding:
     if has_bearings:  # a rolling element that turns out of its track, and wear all around, repeat at no steady rate
         causes = "a worn bearing or a damaged rolling element, " + causes
     title = f"Perhaps {causes}: noise has risen, but no line."
-    return Finding("noise-risen", Kind.SUSPICION, title, risen[0].where, None, 0.4, _FIT, _told(risen), confirm)
-
-
-def _told(changes: Sequence[LevelChange]) -> tuple[str, ...]:
-    return tuple(f"{c.label} in {c.where.channels[0]}: {signed(c.change_db)} dB." for c in changes)
+    return Finding(
+        "noise-risen", Kind.SUSPICION, title, risen[0].where, None, 0.4, _FIT, tuple(c.text for c in risen), confirm
+    )

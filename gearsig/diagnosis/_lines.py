@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 from math import gcd, isfinite
 
 import numpy as np
@@ -513,9 +514,12 @@ def _unexplained(signals: AnalysisSignals, trains: Sequence[float], named: Seque
     _, channel, i, excess = best
     line, where = PlacedLine.at(excess, i), signals.where(float(excess.spectrum.positions[i]), channel)
     hunting = hunting_multiple(signals, line.position, 1.5 * excess.spectrum.resolution)
-    origin = combination(signals, line.position, excess.spectrum, trains)
+    origin = combination(_of_trains(signals, trains), line.position, excess.spectrum)
     if not origin and hunting is not None and _is_among_multiples(excess, line.position, hunting[0]):
-        origin = hunting[1]
+        origin = hunting[1]  # teeth that differ explain more lines than the sidebands of both shafts
+    if not origin:
+        highest = float(excess.spectrum.positions[-1])
+        origin = combination(_of_both_shafts(signals, highest), line.position, excess.spectrum)
     known = "shaft or mesh" if signals.rig.pairs else "shaft"
     title = f"The strongest line that belongs to no {'single' if origin else 'known'} {known}"
     evidence = [] if origin or hunting is None else [f"It is near {hunting[1]}, perhaps by chance."]
@@ -562,22 +566,46 @@ BY_CHANCE = 0.1
 """Share of all places that combinations may cover for a match to be significant."""
 
 
-def combination(signals: AnalysisSignals, order: float, spectrum: Spectrum, trains: Sequence[float]) -> str:
+def combination(places: Mapping[str, float], order: float, spectrum: Spectrum) -> str:
     """Return the combination of known orders that a line is; empty if it is none, or if a match is likely by chance.
-
-    Impacts of order q that modulate a mesh, or are modulated by it, stand at h·mesh ± k·q, and a shaft's order beside.
 
     Parameters
     ----------
-    signals : AnalysisSignals
+    places : mapping of str to float
+        Combinations in words, and their orders.
     order : float
         Of the reference shaft.
     spectrum : Spectrum
         The spectrum that shows the line.
-    trains : sequence of float
-        Orders of impacts.
     """
     near, highest = 1.5 * spectrum.resolution, float(spectrum.positions[-1])
+    inside = {text: place for text, place in places.items() if 0 < place < highest}
+    if len(inside) * 2 * near <= BY_CHANCE * highest:
+        text = min(inside, key=lambda label: abs(inside[label] - order), default="")
+        if text and abs(inside[text] - order) <= near:
+            return text
+    return ""
+
+
+def _of_both_shafts(signals: AnalysisSignals, highest: float) -> dict[str, float]:
+    """Return the orders h·mesh ± i·driver ± j·driven, i and j up to 2, of meshes that both their shafts modulate."""
+    places: dict[str, float] = {}
+    for name, mesh in signals.known_mesh_orders.items():
+        pair = signals.rig.pair(name)
+        driver, driven = (signals.known_shaft_orders.get(shaft) for shaft in (pair.driver, pair.driven))
+        if driver is None or driven is None:
+            continue
+        for h, i, j in product(range(1, int(highest / mesh) + 2), (1, -1, 2, -2), (1, -1, 2, -2)):
+            sides = (f"{'+' if k > 0 else '−'} {abs(k)}× {shaft}" for k, shaft in ((i, pair.driver), (j, pair.driven)))
+            places[" ".join([f"{h}× mesh {name}", *sides])] = h * mesh + i * driver + j * driven
+    return places
+
+
+def _of_trains(signals: AnalysisSignals, trains: Sequence[float]) -> dict[str, float]:
+    """Return the orders h·mesh ± k·q of impacts of order q that modulate a mesh or are modulated by it.
+
+    Beside each, once or twice a shaft's order away, there may be another.
+    """
     places: dict[str, float] = {}
     for train in trains:
         for h in range(N_COMBINED + 1):
@@ -592,12 +620,7 @@ def combination(signals: AnalysisSignals, order: float, spectrum: Spectrum, trai
                 places |= {
                     f"{train_text}, {sign} {j}× {shaft}": place + (j if sign == "+" else -j) * turns for sign in "+−"
                 }
-    inside = {text: place for text, place in places.items() if 0 < place < highest}
-    if len(inside) * 2 * near <= BY_CHANCE * highest:
-        text = min(inside, key=lambda label: abs(inside[label] - order), default="")
-        if text and abs(inside[text] - order) <= near:
-            return text
-    return ""
+    return places
 
 
 def hunting_multiple(signals: AnalysisSignals, order: float, near: float) -> tuple[float, str] | None:

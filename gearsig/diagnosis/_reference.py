@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite, log10
 from pathlib import Path
+
+import numpy as np
 
 from gearsig.diagnosis._types import (
     MIN_CHANGE_DB,
@@ -117,7 +119,8 @@ def _rig_at_reference(path: str | Path, rig: Rig, rig_beside: Rig, *, is_same_ma
     point, then = rig.operating_point, rig_beside.operating_point
     if not rig_beside.pairs or then.shaft != point.shaft:
         return its_rig
-    return replace(its_rig, operating_point=replace(point, torque_nm=then.torque_nm))
+    torque_nm = point.torque_nm if then.torque_nm is None else then.torque_nm
+    return replace(its_rig, operating_point=replace(point, torque_nm=torque_nm))
 
 
 def _speed_at_reference(path: str | Path, rig: Rig, speed: SpeedSource | None) -> SpeedSource | None:
@@ -239,6 +242,73 @@ def _beside(finding: Finding, reference: Analysis, measured: LevelChange | None)
         title = f"{title.removesuffix('.')}, as strong in the reference: it is not new."
         title = f"Perhaps {title[:1].lower()}{title[1:]}" if kind is Kind.NOTICE else title
     return replace(finding, kind=kind, title=title, evidence=(*finding.evidence, text))
+
+
+SAME_GAIN_DB = 2.0
+"""If all levels of a channel, noise included, change alike to within this, the gain has changed."""
+
+
+def changed_sensors(changes: Sequence[LevelChange]) -> tuple[list[Finding], list[LevelChange]]:
+    """Report channels that changed rather than the machine, and return the changes of the others.
+
+    Either all its levels have changed alike, noise included, or most of what changed is in it, see `_faded_alone`.
+    """
+    findings, rest = [], []
+    for channel in dict.fromkeys(c.where.channels[0] for c in changes):
+        of_channel = [c for c in changes if c.where.channels[0] == channel]
+        lines = [c for c in of_channel if c.stands_out and c.kind != "bearing"]
+        shifts = np.array([c.change_db for c in lines])
+        gain = float(np.median(shifts))
+        spread = float(np.percentile(np.abs(shifts - gain), 90))
+        if len(lines) < 4 or abs(gain) < MIN_CHANGE_DB / 2 or spread > SAME_GAIN_DB:
+            if _faded_alone(channel, changes):
+                findings.append(_faded(channel, [c for c in of_channel if c.is_change]))
+            else:
+                rest += of_channel
+            continue
+        findings.append(
+            Finding(
+                "levels-scaled",
+                Kind.DATA_PROBLEM,
+                f"Every level of channel {channel} has changed alike by {signed(gain)} dB since the reference, "
+                "noise included: the gain, unit or sensor differs rather than the machine.",
+                Where((channel,)),
+                confidence=0.9,
+                confidence_basis=f"{len(lines)} levels within {spread:.2g} dB of each other",
+                surer="Check sensor, range and unit of both recordings.",
+            )
+        )
+    return findings, rest
+
+
+def _faded_alone(channel: str, changes: Sequence[LevelChange]) -> bool:
+    """Whether two thirds of what changed are in one channel, where most noise fell and no other channel's changed.
+
+    A loose sensor loses the high frequencies. Where noise rises in one channel alone, a machine is damaged beside it.
+    """
+    own, others = ([c for c in changes if (c.where.channels[0] == channel) is is_own] for is_own in (True, False))
+    noise, noise_beside = ([c for c in some if c.kind == "noise"] for some in (own, others))
+    n_own, n_others = (sum(c.is_change and c.kind != "bearing" for c in some) for some in (own, others))
+    n_fallen = sum(c.is_change and c.change_db < 0 for c in noise)
+    stays = bool(noise_beside) and not any(c.is_change for c in noise_beside)
+    return 2 * n_fallen > len(noise) and stays and n_own > 2 * n_others
+
+
+def _faded(channel: str, changed: Sequence[LevelChange]) -> Finding:
+    return Finding(
+        "channel-faded",
+        Kind.DATA_PROBLEM,
+        f"Most of what changed since the reference is in channel {channel} alone, noise included: check its mounting, "
+        "cable and range.",
+        Where((channel,)),
+        confidence=0.8,
+        confidence_basis="most of its noise has fallen, and no other channel's has changed",
+        evidence=(
+            *(c.text for c in changed),
+            "Its changes are left out; a repair beside this sensor would make it quieter, too.",
+        ),
+        surer="Both recordings again with the sensor mounted alike.",
+    )
 
 
 def in_reference(finding: Finding, reference: Analysis) -> ReferenceFinding | None:

@@ -19,8 +19,9 @@ from gearsig.diagnosis._lines import SPREAD_OF_STATED, mains_lines, speed_is_con
 from gearsig.diagnosis._rotor import derivatives_of_velocity
 from gearsig.diagnosis._signals import AnalysisSignals, BandEnvelope
 from gearsig.diagnosis._types import CannotTell, Finding, Kind
-from gearsig.formatting import unit_text
+from gearsig.formatting import sentence, unit_text
 from gearsig.prepared import STATED_SPEED_TOLERANCE, LinesOverFloor
+from gearsig.recording import RATE_GIVEN
 from gearsig.rig import ConstantSpeed, EncoderChannel, TachometerChannel
 
 SAMPLING_RATE = "sampling-rate-doubtful"
@@ -159,6 +160,9 @@ def _finding(
         nearly = [f"{a} or {b}" for a, b in zip(hertz[1:], rpm[1:], strict=True)]
         clock = "Orders are the same with either, and no lines of the mains tell which."
         surer = f"Check the stated speed first, which is quickly measured, then the {' and '.join(['rate', *also])}."
+    given = [sentence(text) for text in signals.recording.warnings if text.startswith(RATE_GIVEN)]
+    if given:
+        surer = "Leave out the sampling rate given (--fs), unless the one stated is known to be wrong."
     return Finding(
         SAMPLING_RATE,
         Kind.DATA_PROBLEM,
@@ -166,7 +170,7 @@ def _finding(
         f"{', or '.join(nearly)}{' nearly as well' if nearly else ''}.",
         confidence=0.9,
         confidence_basis="what the factor explains that the stated figures do not",
-        evidence=(evidence, clock),
+        evidence=(evidence, clock, *given),
         surer=surer,
     )
 

@@ -852,25 +852,30 @@ def _why_blind(signals: AnalysisSignals, shaft: ShaftSignals) -> str:
 
 def _not_examined(signals: AnalysisSignals, examined: set[str]) -> list[Finding]:
     """Report for each shaft with gears why its teeth were not examined."""
-    reasons: dict[str, list[str]] = {}
+    reasons: dict[tuple[str, str], list[str]] = {}
     for shaft in dict.fromkeys(s for pair in signals.rig.pairs for s in (pair.driver, pair.driven)):
         if shaft not in examined:
             reasons.setdefault(_reason(signals, shaft), []).append(shaft)
-    surer = "A longer recording with a tachometer, the correct teeth of all gears, a higher sampling rate."
-    titles = [f"Teeth on {_shafts_text(shafts)} cannot be examined: {reason}." for reason, shafts in reasons.items()]
-    return [cannot_tell("tooth-not-examined", title, surer=surer) for title in titles]
+    return [
+        cannot_tell("tooth-not-examined", f"Teeth on {_shafts_text(shafts)} cannot be examined: {why}.", surer=surer)
+        for (why, surer), shafts in reasons.items()
+    ]
 
 
-def _reason(signals: AnalysisSignals, name: str) -> str:
+def _reason(signals: AnalysisSignals, name: str) -> tuple[str, str]:
+    """Return why a shaft's teeth are not examined, and what would help."""
     if signals.angle is None:
-        return "the speed is not known"
+        return "the speed is not known", "A tachometer, or a stated speed."
     ratio = signals.rig.ratio(name)
     if ratio is None:
-        return "a tooth count on the way to it is missing"
+        sides = ("driver_teeth", "driven_teeth")
+        missing = [f"{side} of {pair.name}" for pair in signals.rig.pairs for side in sides if not getattr(pair, side)]
+        return "a tooth count on the way to it is missing", f"What the rig file lacks: {', '.join(missing)}."
     revolutions, needed = signals.angle.n_revolutions * ratio, signals.settings.minimum_revolutions
     if revolutions < needed:
-        return f"the record holds {revolutions:.3g} of its revolutions and {needed} are needed"
+        return f"the record holds {revolutions:.3g} of its revolutions and {needed} are needed", "A longer recording."
     for shaft in signals.shafts:
         if shaft.shaft == name and shaft.separated:
-            return _why_blind(signals, shaft)
-    return "its gear has no known teeth, its mesh is above half the sampling rate, or the record is too short"
+            return _why_blind(signals, shaft), "The correct teeth, speed and sampling rate; a higher load."
+    why = "its gear has no known teeth, its mesh is above half the sampling rate, or the record is too short"
+    return why, "The teeth of its gear, a higher sampling rate, or a longer recording."

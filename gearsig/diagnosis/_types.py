@@ -9,7 +9,7 @@ from math import e, exp, log
 
 from gearsig.angle import ShaftAngle
 from gearsig.checks import FloatArray, count, positive, within
-from gearsig.formatting import power_of_ten
+from gearsig.formatting import power_of_ten, signed
 from gearsig.indicators import Indicator
 from gearsig.motion import StartStop
 from gearsig.orders import OrderMap, SynchronousAverage
@@ -62,7 +62,7 @@ VIBRATION_ZONE = "vibration-zone"
 
 HINDERING = (
     *("channel-clipped", "channel-stuck", "channel-dead", "channel-wrapped", "channel-stepped", "channel-reversed"),
-    *("channel-hum", "speed-near-zero"),
+    *("channel-hum", "channel-faded", "speed-near-zero"),
 )
 """Codes of data problems that may hide a fault."""
 
@@ -283,6 +283,11 @@ class LevelChange:
     def change_db(self) -> float:
         """Level now minus the reference's level, in dB."""
         return self.level_db - self.reference_db
+
+    @property
+    def text(self) -> str:
+        """What has changed by how much, as a sentence of evidence."""
+        return f"{self.label} in {self.where.channels[0]}: {signed(self.change_db)} dB."
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from gearsig.diagnosis._types import (
 )
 from gearsig.formatting import percent, sentence
 from gearsig.prepared import PreparedRecording, magnetic_pull_near
-from gearsig.recording import ChannelProblem
+from gearsig.recording import SEPARATE_RUNS, ChannelProblem
 from gearsig.rig import Rig
 
 DEPTH_UNKNOWN = "crack-depth-unknown"
@@ -148,10 +148,10 @@ def detect_data_problems(prepared: PreparedRecording) -> tuple[list[Finding], fr
         )
         for p in prepared.problems
     ]
-    findings += [
-        Finding("reader-note", Kind.NOTICE, sentence(text), confidence_basis="stated by the reader of the file")
-        for text in prepared.recording.warnings
-    ]
+    for text in prepared.recording.warnings:
+        are_runs = text.startswith(SEPARATE_RUNS)
+        code, kind = ("separate-runs", Kind.DATA_PROBLEM) if are_runs else ("reader-note", Kind.NOTICE)
+        findings.append(Finding(code, kind, sentence(text), confidence_basis="stated by the reader of the file"))
     return findings, frozenset(p.channel for p in prepared.problems if p.kind == "dead")
 
 
@@ -170,14 +170,17 @@ TRUST = {
     "mesh-above-sampling": 0.5,
     "mesh-absent": 0.75,
     MESH_ELSEWHERE: 0.5,
+    "separate-runs": 0.75,
     "channel-clipped": 0.7,
     "channel-wrapped": 0.0,
     "channel-stepped": 0.75,
     "channel-reversed": 0.5,
     "channel-hum": 0.75,
+    "channel-faded": 0.75,
 }
 """Problem → factor on the confidence: a judgement, not a probability. 0.5 where places or frequencies are probably
-wrong, 0.7 and 0.75 where places are right but sizes unreliable, 0 where nothing is usable."""
+wrong, 0.7 and 0.75 where places are right but sizes or what channels show together are unreliable, 0 where nothing is
+usable."""
 
 TRUST_OF_SHARED_LINE = 0.5
 """The same for a finding based on a line that the mains may cause as well: nothing tells which of the two does."""
@@ -206,8 +209,11 @@ def speed_warnings(angle: ShaftAngle | CannotTell, rig: Rig) -> list[Finding]:
     if nominal and not low * (1 - tolerance) <= nominal <= high * (1 + tolerance):
         ratio = angle.mean_speed_rpm / nominal
         near = min((f for n in range(2, 11) for f in (n, 1 / n)), key=lambda f: abs(ratio / f - 1))
-        pulses = f" {near:.3g} pulses per revolution would explain it." if abs(ratio / near - 1) < 0.03 else ""
-        title = f"The speed, {angle.mean_speed_rpm:.5g} rpm, is {ratio:.3g} times the rig's {nominal:.5g} rpm"
+        explained = f" {near:.3g} pulses per revolution would explain it." if abs(ratio / near - 1) < 0.03 else ""
+        if angle.method == "constant":
+            in_hz = abs(60 * ratio - 1) < tolerance
+            explained = f" {nominal / 60:.4g} Hz, stated as rpm, would explain it." if in_hz else ""
+        title = f"The speed, {angle.mean_speed_rpm:.5g} rpm, is {ratio:.3g} times the nominal {nominal:.5g} rpm"
         doubts.append(
             Finding(
                 OFF_NOMINAL,
@@ -215,9 +221,9 @@ def speed_warnings(angle: ShaftAngle | CannotTell, rig: Rig) -> list[Finding]:
                 f"{title} ± {100 * tolerance:.3g} %.",
                 Where(shaft=angle.shaft),
                 Strength(angle.mean_speed_rpm, "rpm", nominal, "nominal speed", against="a nominal speed of"),
-                confidence_basis="comparison with the rig file",
-                evidence=(f"How it was found: {angle.method}.{pulses}",),
-                surer="Check sampling rate, pulses per revolution and the speed in the rig file.",
+                confidence_basis="comparison with the rig file or the stated speed",
+                evidence=(f"How it was found: {angle.method}.{explained}",),
+                surer="Check sampling rate, pulses per revolution and the nominal speed.",
             )
         )
     elif high > FASTEST_RPM:
@@ -230,6 +236,12 @@ def speed_warnings(angle: ShaftAngle | CannotTell, rig: Rig) -> list[Finding]:
         where = Where(shaft=angle.shaft)
         doubts.append(Finding(NEAR_ZERO, Kind.DATA_PROBLEM, title, where, surer=SURER_BEYOND_ZERO))
     return doubts
+
+
+def with_doubt(findings: Sequence[Finding], doubt: Finding) -> list[Finding]:
+    """Add a doubtful sampling rate, which takes the place of a speed off its nominal: one problem from two sides."""
+    off, others = ([f for f in findings if (f.code == OFF_NOMINAL) is is_off] for is_off in (True, False))
+    return [*others, replace(doubt, evidence=(*doubt.evidence, *(text for f in off for text in f.evidence)))]
 
 
 def without_synchronous_hum(findings: Iterable[Finding], angle: ShaftAngle | CannotTell, rig: Rig) -> list[Finding]:
@@ -313,7 +325,5 @@ def withheld_crack(findings: Iterable[Finding], *, is_asked: bool) -> CannotTell
 def said_first(findings: Sequence[Finding], *, claims: bool) -> str:
     """Return the problems that open the verdict: rate or speed always, those of channels if something is claimed."""
     titles = {f.code: f.title for f in findings if f.code in TRUST and f.kind is Kind.DATA_PROBLEM}
-    if SAMPLING_RATE in titles:
-        titles.pop(OFF_NOMINAL, None)  # the same problem, seen from the other side
     first = [title for code, title in titles.items() if not code.startswith("channel-") and code != NEAR_ZERO]
     return " ".join([*first, *(t for t in titles.values() if claims and t not in first)])

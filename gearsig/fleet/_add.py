@@ -40,7 +40,8 @@ class AnalysisOptions:
     Parameters
     ----------
     rig : Rig or None
-        For all recordings; None: the rig file of the same name beside each, if there is one.
+        The machine of all recordings; what a rig file of the same name beside one states of its measurement goes
+        before it, and before the sampling rate. None: only that file.
     sampling_rate_hz : float or None
         For files that do not state it.
     speed : SpeedSource or None
@@ -52,7 +53,7 @@ class AnalysisOptions:
     memory_bytes : float
         Memory that the analysis of one recording may take; for longer ones, see `gearsig.diagnosis.analyze_file`.
     reference_rate_hz : float or None
-        Sampling rate of the reference, if it differs.
+        Sampling rate of the reference, if it differs. Without a reference, the recording itself is one.
     """
 
     rig: Rig | None = None
@@ -68,21 +69,28 @@ class AnalysisOptions:
 
         A nominal speed, e.g. from the file name, replaces the rig's nominal and constant speeds.
         """
-        from gearsig.diagnosis import analyze_file, read_reference
+        from gearsig.diagnosis import analyze_file, read_reference, rig_and_rate_of_reference
 
-        rig = self.rig
-        if rig is None and (rig_file := rig_file_beside(path)) is not None:
+        is_reference = self.reference is None or self.reference.resolve() == path.resolve()
+        own_hz = self.reference_rate_hz if is_reference else None
+        rig, rate_hz = rig_and_rate_of_reference(path, self.rig, self.sampling_rate_hz, own_hz, is_same_machine=True)
+        if self.rig is None and (rig_file := rig_file_beside(path)) is not None:
             rig = read_rig(rig_file)
-        reading: dict[str, Any] = {"sampling_rate_hz": self.sampling_rate_hz, "speed": self.speed}
-        reading["memory_bytes"] = self.memory_bytes
+        reading: dict[str, Any] = {"speed": self.speed, "memory_bytes": self.memory_bytes}
         healthy = None
-        if self.reference is not None and self.reference.resolve() != path.resolve():
-            healthy = read_reference(self.reference, rig, reference_rate_hz=self.reference_rate_hz, **reading)
+        if self.reference is not None and not is_reference:
+            healthy = read_reference(
+                self.reference,
+                rig,
+                sampling_rate_hz=self.sampling_rate_hz,
+                reference_rate_hz=self.reference_rate_hz,
+                **reading,
+            )
         if nominal_speed_rpm is not None:
             rig = rig if rig is not None else Rig()
             point = replace(rig.operating_point, speed_rpm=nominal_speed_rpm)
             rig = replace(rig, operating_point=point, speed=None if isinstance(rig.speed, ConstantSpeed) else rig.speed)
-        return analyze_file(path, rig, reference=healthy, torque_nm=self.torque_nm, **reading)
+        return analyze_file(path, rig, reference=healthy, torque_nm=self.torque_nm, sampling_rate_hz=rate_hz, **reading)
 
 
 @dataclass(frozen=True)
@@ -422,8 +430,10 @@ def _setups(options: AnalysisOptions) -> Callable[[Origin], str]:
 
     @cache
     def setup(origin: Origin) -> str:
-        rig_file = rig_file_beside(origin.path) if options.rig is None else None
-        rig = rig_to_dict(options.rig) if options.rig is not None else of_rig_file(rig_file) if rig_file else None
+        rig_file = rig_file_beside(origin.path)
+        rig: object = of_rig_file(rig_file) if rig_file else None
+        if options.rig is not None:
+            rig = rig_to_dict(options.rig) if rig is None else [rig_to_dict(options.rig), rig]
         nominal_rpm = _nominal_speed_rpm(origin, options)
         return _digest([rig, *shared, *([f"nominal {nominal_rpm:g} rpm"] if nominal_rpm is not None else [])])
 

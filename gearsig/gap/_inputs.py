@@ -100,9 +100,8 @@ def read_gap_inputs(request: GapRequest, on_file: Callable[[str], object] = lamb
     for path, name, rig in zip(files, names, _rigs(request, files), strict=True):
         on_file(path.name)
         is_reference = len(recordings) >= n
-        rate_hz = request.sampling_rate_hz
-        if is_reference:
-            _, rate_hz = rig_and_rate_of_reference(path, None, rate_hz, request.reference_rate_hz)
+        reference_hz = request.reference_rate_hz if is_reference else None
+        _, rate_hz = rig_and_rate_of_reference(path, None, request.sampling_rate_hz, reference_hz)
         with options_named(REFERENCE_OPTIONS if is_reference else {}):
             stated = None if path == request.run_up else speed  # a run-up's speed is not constant
             recording = read_whole(path, rig, sampling_rate_hz=rate_hz, speed=stated)

@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from gearsig.checks import FloatArray, frozen_array, read_only
 from gearsig.compiled import njit
 from gearsig.errors import InputError
-from gearsig.recording import SI_FACTORS, Channel, Recording, si_factor
+from gearsig.recording import Channel, Recording
 from gearsig.results import Result
+from gearsig.rig import SI_FACTORS, si_factor
 from gearsig.spectra import Spectrum, amplitude_spectrum, array_rate_hz, joined_length, with_continuous_ends
 
 # --------------------

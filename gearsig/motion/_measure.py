@@ -14,6 +14,7 @@ from gearsig.formatting import counted
 from gearsig.recording import Channel, Recording, check_recording
 from gearsig.results import Result
 from gearsig.rig import (
+    SI_FACTORS,
     SIDES,
     EncoderChannel,
     GearPair,
@@ -23,6 +24,7 @@ from gearsig.rig import (
     check_rig,
     contact_pair,
     path_of_contact,
+    si_factor,
 )
 
 
@@ -163,15 +165,6 @@ QUANTITY_OF = {"angle": ("angle", "encoder"), "speed": ("rotational_speed",), "a
 ROLES = (*(f"{side} {what}" for what in QUANTITY_OF for side in SIDES), "torque", "force")
 """Roles of channels: angle, speed and acceleration of each gear, torque of the driver's shaft, tooth force."""
 
-_UNITS = {
-    "angle": {"rad": 1.0, "mrad": 1e-3, "deg": pi / 180.0, "°": pi / 180.0, "rev": 2.0 * pi},
-    "speed": {"rad/s": 1.0, "deg/s": pi / 180.0, "°/s": pi / 180.0, "rpm": pi / 30.0, "1/min": pi / 30.0,
-              "r/min": pi / 30.0, "rev/s": 2.0 * pi},
-    "acceleration": {"rad/s^2": 1.0, "rad/s2": 1.0, "rad/s²": 1.0, "deg/s^2": pi / 180.0, "deg/s²": pi / 180.0},
-    "torque": {"nm": 1.0, "n m": 1.0, "n·m": 1.0, "n*m": 1.0, "knm": 1e3, "kn m": 1e3},
-    "force": {"n": 1.0, "kn": 1e3},
-}  # fmt: skip
-
 
 def find_roles(recording: Recording, pair: GearPair, assigned: Mapping[str, str] | None = None) -> dict[str, str]:
     """Find the channel of each role that the recording has.
@@ -225,16 +218,15 @@ def _si_scale(channel: Channel, rig: Rig, quantity: str) -> float:
     source = rig.speed
     if quantity == "angle" and isinstance(source, EncoderChannel) and source.channel == channel.name:
         return 2.0 * pi / source.units_per_revolution
-    known = _UNITS[quantity]
-    unit = " ".join(channel.unit.split())
-    for spelt in (unit, unit.casefold()):
-        if spelt in known:
-            return known[spelt]
-    raise InputError(
-        f"the unit of channel {channel.name!r} is {channel.unit!r}",
-        allowed=", ".join(known),
-        remedy="give unit (and scale) in a [[sensor]] table of the rig file",
-    )
+    measured = QUANTITY_OF[quantity][0] if quantity in QUANTITY_OF else quantity
+    factor = si_factor(measured, channel.unit)
+    if factor is None:
+        raise InputError(
+            f"the unit of channel {channel.name!r} is {channel.unit!r}",
+            allowed=", ".join(SI_FACTORS[measured]),
+            remedy="give unit (and scale) in a [[sensor]] table of the rig file",
+        )
+    return factor
 
 
 def _fits(channel: Channel, role: str, pair: GearPair) -> bool:

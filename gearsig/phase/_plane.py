@@ -11,8 +11,9 @@ import numpy as np
 from gearsig.checks import FloatArray, freeze, frozen_array, instance_of, positive, within
 from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import counted
-from gearsig.recording import Recording, si_factor
+from gearsig.recording import Recording
 from gearsig.results import Result
+from gearsig.rig import si_factor
 from gearsig.spectra import named_signal
 
 PortraitKind = Literal["phase plane", "delay embedding", "states"]

@@ -46,13 +46,24 @@ N_SHAFT_HARMONICS = 8
 N_PHASE_HARMONICS = 3
 """Mesh harmonics whose phase an angle may follow."""
 
+FASTEST_IN_HZ = 100.0
+"""Usual machines turn at up to 6000 rpm: an unconfirmed speed below this number in rpm may be one in Hz."""
+
 RULES_DB = 20.0
 """Height of a rotor's own line above the floor, and above all others within the tolerance of a stated speed."""
 
 MAINS_TOLERANCE = 0.002
 """Largest relative drift of a supply's frequency; its harmonics, and those of motors, lie within a motor's slip.
 
+It is 100 mHz of 50 Hz: the standard frequency range is ±50 mHz in continental Europe and ±100 mHz in the Nordic grid
+(Regulation (EU) 2017/1485, annex III).
+
 Twice the limit for hum in a recording's quality: these lines are only left out, or treated as confirming nothing."""
+
+N_PULLS = 10
+"""Multiples of twice a supply's frequency that are put down to its magnetic pull.
+
+The tolerance grows with the multiple, the spacing does not: the tenth covers 4 % of it, the 50th a fifth."""
 
 
 Transform = Callable[[str], ComplexArray]
@@ -135,9 +146,10 @@ def _refined(recording: Recording, rig: Rig, stated: ShaftAngle, transform: Tran
     if by_lines is None:
         if not rig.pairs:
             _refuse_a_wandering_speed(recording, stated)
-        return replace(
-            stated, quality=0.5, notes=(*stated.notes, "The stated speed could not be confirmed from the signal.")
-        )
+        note, speed = "The stated speed could not be confirmed from the signal.", stated.mean_speed_rpm
+        if speed <= FASTEST_IN_HZ:
+            note += f" {speed:.4g} Hz, if these were meant, are {60 * speed:.5g} rpm."
+        return replace(stated, quality=0.5, notes=(*stated.notes, note))
     difference = 100 * (by_lines.mean_speed_rpm / stated.mean_speed_rpm - 1)
     lines_say = f"the signal's own lines say {by_lines.mean_speed_rpm:.6g} rpm ({signed(difference, 2)} %)"
     note = f"Stated {stated.mean_speed_rpm:.6g} rpm; {lines_say}."
@@ -271,11 +283,14 @@ def _by_comb(
 
 
 def magnetic_pull_near(hertz: float) -> tuple[float, float] | None:
-    """Return a supply's frequency and its magnetic pull, the multiple of twice it at a given frequency, in Hz."""
+    """Return a supply's frequency and its magnetic pull, the multiple of twice it at a given frequency, in Hz.
+
+    Only the first multiples count, see `N_PULLS`.
+    """
     for mains_hz in MAINS_HZ:
-        pull_hz = 2 * mains_hz * round(hertz / (2 * mains_hz))
-        if pull_hz > 0 and abs(hertz / pull_hz - 1) <= MAINS_TOLERANCE:
-            return mains_hz, pull_hz
+        n = round(hertz / (2 * mains_hz))
+        if 1 <= n <= N_PULLS and abs(hertz / (2 * n * mains_hz) - 1) <= MAINS_TOLERANCE:
+            return mains_hz, 2 * n * mains_hz
     return None
 
 

@@ -10,6 +10,7 @@ from gearsig.recording._quality import MAINS_HZ, MAINS_WANDER, ChannelProblem, f
 from gearsig.recording._read import (
     FORMAT_NAMES,
     FORMAT_OF_EXTENSION,
+    RATE_GIVEN,
     WRITERS,
     is_ending,
     n_samples_of,
@@ -21,16 +22,14 @@ from gearsig.recording._read import (
     without_condition,
     write_recording,
 )
-from gearsig.recording._table import CONDITION_CHANNEL
+from gearsig.recording._table import CONDITION_CHANNEL, SEPARATE_RUNS
 from gearsig.recording._types import (
-    SI_FACTORS,
     Channel,
     Provenance,
     Recording,
     check_recording,
     metres_per_second_squared,
     names_without_number,
-    si_factor,
 )
 from gearsig.recording.formats._mat import variables
 from gearsig.recording.formats._wav import parse_lea
@@ -41,7 +40,8 @@ __all__ = [
     "FORMAT_OF_EXTENSION",
     "MAINS_HZ",
     "MAINS_WANDER",
-    "SI_FACTORS",
+    "RATE_GIVEN",
+    "SEPARATE_RUNS",
     "WRITERS",
     "Channel",
     "ChannelProblem",
@@ -61,7 +61,6 @@ __all__ = [
     "read_recording",
     "recording_target",
     "sha256_of",
-    "si_factor",
     "speed_in_name",
     "variables",
     "without_condition",

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gearsig.checks import FloatArray, closest_match_hint, count, instance_of, positive
+from gearsig.checks import FloatArray, closest_match_hint, count, instance_of, positive, short
 from gearsig.errors import InputError
 from gearsig.formatting import counted, file_label
 from gearsig.recording._limits import CHUNK_BYTES, check_memory, foreign_errors, read_text_bytes
@@ -34,18 +34,20 @@ from gearsig.recording._table import (
     with_pulse_channels,
 )
 from gearsig.recording._types import (
-    RPM_UNITS,
     SECONDS_PER_UNIT,
     Channel,
     Provenance,
     Recording,
     check_recording,
+    is_unit,
     quantity_of,
     split_unit,
 )
 from gearsig.recording.formats import CSV, FORMATS, FileFormat
 from gearsig.recording.formats._csv import find_layout, line_of_row, parse_rows
 from gearsig.rig import (
+    RPM_UNITS,
+    SI_FACTORS,
     ConstantSpeed,
     EncoderChannel,
     PulseTimes,
@@ -55,6 +57,7 @@ from gearsig.rig import (
     TachometerChannel,
     check_rig,
     check_speed_source,
+    si_factor,
 )
 
 
@@ -83,7 +86,8 @@ def read_recording(
     sampling_rate_hz : float, optional
         Overrides the file's. A difference of more than 0.1 % is reported in `Recording.warnings`.
     speed : SpeedSource, optional
-        Overrides the file's and the rig's.
+        Overrides the file's and the rig's; but a constant speed only checks one that is measured, as the nominal speed
+        of the recording's rig, and a warning says so.
     part : slice, optional
         Only these samples of each channel, for HDF5, Parquet, TDMS or WAV: nothing else is decoded, and no hash is
         computed. Pulse times in the file are limited to this part and counted from its beginning.
@@ -532,6 +536,10 @@ def assemble(
     channels = tuple(
         Channel(c.name, c.quantity or quantity_of(c.name, c.unit), c.unit, c.position) for c in table.columns
     )
+    checks: tuple[str, ...] = ()
+    if isinstance(speed, ConstantSpeed) and (measured := _measured(table, channels, rig)):
+        checks = (f"the speed is taken from {measured}; the stated {speed.speed_rpm:g} rpm is compared with it",)
+        rig, speed = _with_nominal(rig, speed), None
     speed, speed_warnings = _speed(table, channels, rig, speed)
     if speed is None and not table.is_own_layout and (rig is None or rig.speed is None):
         speed_warnings = (*speed_warnings, *_unused_pulses(table, channels))
@@ -544,10 +552,33 @@ def assemble(
         speed=speed,
         provenance=Provenance(source, sha256, table.reader, table.history),
         truth=table.truth,
-        warnings=(*table.warnings, *rate_warnings, *speed_warnings),
+        warnings=(*table.warnings, *rate_warnings, *checks, *speed_warnings),
     )
     recording = recording if rig is None else recording.with_rig(rig)
-    return recording if table.is_own_layout else _with_quantity_of_speed(recording)
+    if table.is_own_layout:
+        return recording
+    recording = _with_quantity_of_speed(recording)
+    return replace(recording, warnings=(*recording.warnings, *_unknown_units(recording)))
+
+
+def _unknown_units(recording: Recording) -> Iterator[str]:
+    """Warn of units that are not known, or not units of their channel's quantity."""
+
+    def is_known(c: Channel) -> bool:
+        if c.quantity in SI_FACTORS:
+            return si_factor(c.quantity, c.unit) is not None
+        return c.quantity != "unknown" or is_unit(c.unit)  # a tachometer's or an encoder's is their speed source's
+
+    shown = [
+        f"{short(c.unit)} of channel {c.name!r}" + f" ({c.quantity.replace('_', ' ')})" * (c.quantity != "unknown")
+        for c in recording.channels
+        if c.unit not in ("", "-", "1") and not is_known(c)
+    ]
+    if shown:
+        yield (
+            f"not known as a unit: {', '.join(shown[:4])}{', …' * (len(shown) > 4)}; the values are neither converted "
+            "nor compared with limits: state quantity, unit and scale in a [[sensor]] table of the rig file"
+        )
 
 
 def _with_quantity_of_speed(recording: Recording) -> Recording:
@@ -628,6 +659,10 @@ def _time_of_rate(table: RawTable) -> RawColumn | None:
     return first if is_even and np.ptp(steps) <= 0.5 * steps.mean() else None
 
 
+RATE_GIVEN = "the sampling rate given"
+"""Start of the warning that an argument goes before the sampling rate that a file or its rig file states."""
+
+
 def _sampling_rate(
     table: RawTable, source: str, rig: Rig | None, explicit_hz: float | None
 ) -> tuple[float, tuple[str, ...]]:
@@ -656,9 +691,9 @@ def _sampling_rate(
         )
     if explicit_hz is not None:
         chosen_hz = positive(explicit_hz, f"{source}: sampling rate given", "Hz", remedy="give --fs above zero")
-        if file_hz is not None and differ(chosen_hz, file_hz):
-            return chosen_hz, (f"the sampling rate {chosen_hz:g} Hz was given; the file states {file_hz:.9g} Hz",)
-        return chosen_hz, ()
+        stated = {"file": file_hz, "rig file": rig_hz}
+        others = [f"the {name} states {hz:.9g} Hz" for name, hz in stated.items() if hz and differ(chosen_hz, hz)]
+        return chosen_hz, (f"{RATE_GIVEN}, {chosen_hz:g} Hz, was taken; {' and '.join(others)}",) * bool(others)
     if file_hz is not None and timed_hz is not None and differ(file_hz, timed_hz):
         raise InputError(
             f"a rate of {file_hz:g} Hz is stated, the time column gives {timed_hz:.9g} Hz",
@@ -706,6 +741,26 @@ def _stack(table: RawTable, source: str) -> FloatArray:
                 remedy="cut out the gap or interpolate it before the analysis, knowingly",
             )
     return samples
+
+
+def _measured(table: RawTable, channels: tuple[Channel, ...], rig: Rig | None) -> str:
+    """Return in words where the file has a measured speed that it or the rig names; empty if nowhere."""
+    names = {*(c.name for c in channels), *table.pulse_times_s}
+    of_file = table.is_own_layout and table.speed is not None  # goes before the rig's
+    for source in (table.speed, None if rig is None or of_file else rig.speed):
+        if isinstance(source, PulseTimes):
+            return "pulse times"
+        if source is not None and not isinstance(source, ConstantSpeed) and source.channel in names:
+            return f"channel {source.channel!r}"
+    return ""
+
+
+def _with_nominal(rig: Rig | None, stated: ConstantSpeed) -> Rig:
+    """Return the rig with a stated speed as its nominal one, converted to the shaft of its operating point."""
+    rig = Rig() if rig is None else rig
+    point = rig.operating_point
+    ratio = rig.ratio(point.shaft or rig.reference_shaft, to=stated.shaft)
+    return rig if ratio is None else replace(rig, operating_point=replace(point, speed_rpm=ratio * stated.speed_rpm))
 
 
 def _speed(

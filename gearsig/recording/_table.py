@@ -17,13 +17,12 @@ from gearsig.formatting import counted
 from gearsig.recording._types import (
     INTERVAL_NAMES,
     RATE_NAMES,
-    RPM_UNITS,
     SECONDS_PER_UNIT,
     SPEED_NAMES,
     plain_name,
     quantity_of,
 )
-from gearsig.rig import ConstantSpeed, SpeedSource
+from gearsig.rig import RPM_UNITS, ConstantSpeed, SpeedSource
 
 NumberArray = NDArray[Any]
 
@@ -209,7 +208,7 @@ def without_clock(
                 allowed="the waveform, sample by sample",
                 remedy="export the time waveform; if column 1 is the time, say so in a header: time [s]",
             )
-        note = f"{first.name!r} increases uniformly and was taken as the time in seconds"
+        note = "the first column increases uniformly and was taken as the time in seconds"
         return columns[1:], RawColumn("time", first.values, "s"), [note]
     return columns, None, []
 
@@ -297,8 +296,8 @@ def ask_whether_runs(columns: list[RawColumn], where: str) -> list[str]:
             _, gamma2 = coherence(a.values[:n_samples], b.values[:n_samples], nperseg=length, noverlap=0)
             if not float(np.median(gamma2[2:-1])) < chance:
                 return []
-    question = f"{SEPARATE_RUNS} The {len(columns)} columns share no noise, as channels of one machine do."
-    return [f"{question} If they are conditions, read one at a time: {where}#1 to {where}#{len(columns)}"]
+    question = f"{SEPARATE_RUNS} The {len(columns)} columns share no noise; channels of one machine would."
+    return [f"{question} If they are runs, read one at a time: {where}#1 to {where}#{len(columns)}"]
 
 
 def one_condition(table: RawTable, number: int, where: str) -> RawTable:
@@ -599,9 +598,11 @@ def table_from_arrays(arrays: NamedArrays, reader: str, where: str) -> RawTable:
         of_array = _columns(path, array, arrays, where)
         if array.ndim == 2 and 1 not in array.shape and time is None and not clocks:
             of_array, time, notes = without_clock(of_array)
-            warnings += notes
             if notes:
                 of_array = [replace(c, name=_column_name(path, i, where)) for i, c in enumerate(of_array, 1)]
+                leaves = [c.name.rpartition(".")[2] for c in of_array]
+                notes[-1] += f"; the others are {leaves[0]} to {leaves[-1]}" if len(leaves) > 1 else ""
+            warnings += notes
             if time is not None or len(of_array) > N_COMPARED:
                 warnings += ask_whether_runs(of_array, where)
         columns += of_array

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from math import pi
 from os import PathLike
 from types import MappingProxyType, UnionType
 from typing import TYPE_CHECKING, Any
@@ -27,7 +26,17 @@ from gearsig.checks import (
 from gearsig.errors import InputError
 from gearsig.formatting import counted, unit_text
 from gearsig.results import verdict_html
-from gearsig.rig import QUANTITIES, PulseTimes, Rig, SpeedSource, check_rig, check_speed_source
+from gearsig.rig import (
+    QUANTITIES,
+    PulseTimes,
+    Rig,
+    SpeedSource,
+    check_rig,
+    check_speed_source,
+    quantity_of_unit,
+    same_unit,
+    si_factor,
+)
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -67,39 +76,6 @@ SECONDS_PER_UNIT = {
     "min": 60.0,
     "h": 3600.0,
 }
-RPM_UNITS = frozenset(("rpm", "r/min", "tr/min", "u/min", "1/min", "min^-1"))
-_G, _INCH = 9.80665, 0.0254
-_LENGTHS = {"m": 1.0, "mm": 1e-3, "µm": 1e-6, "mil": 1e-3 * _INCH}
-
-SI_FACTORS: dict[str, dict[str, float]] = {
-    "acceleration": {
-        "m/s²": 1.0,
-        "ms-2": 1.0,
-        "mm/s²": 1e-3,
-        "µm/s²": 1e-6,
-        "g": _G,
-        "gn": _G,
-        "g_n": _G,
-        "g-s": _G,
-        "mg": 1e-3 * _G,
-    },
-    "velocity": {"m/s": 1.0, "mm/s": 1e-3, "µm/s": 1e-6, "in/s": _INCH, "ips": _INCH},
-    "displacement": _LENGTHS,
-    "transmission_error": _LENGTHS,
-    "sound_pressure": {"Pa": 1.0},
-    "force": {"N": 1.0, "kN": 1e3},
-    "torque": {"N·m": 1.0, "kN·m": 1e3},
-    "rotational_speed": {**dict.fromkeys(sorted(RPM_UNITS), 2 * pi / 60), "rad/s": 1.0},
-    "angle": {"rad": 1.0},
-    "angular_acceleration": {"rad/s²": 1.0},
-    "temperature": {"°C": 1.0, "degC": 1.0},  # for differences only: its zero is not the kelvin's
-    "voltage": {"V": 1.0, "mV": 1e-3},
-    "current": {"A": 1.0, "mA": 1e-3},
-}
-"""Quantity → unit → factor to the SI unit, for every known unit.
-
-Each unit is listed in one spelling; `si_factor` recognises the others ("m/s^2", "m/s**2", "Nm")."""
-
 # A file's text may be crafted to make matching slow: quantifiers are possessive, and the text is stripped first.
 _SIGN = re.compile(r"[=:;,\t]")
 _QUANTITY = re.compile(
@@ -201,52 +177,7 @@ def _in_line(line: str, names: frozenset[str]) -> tuple[float | None, str]:
 def is_unit(text: str) -> bool:
     """Whether the text is a known unit of a quantity or of time."""
     word = text.strip().casefold()
-    return _plain_unit(text) in _QUANTITY_OF_UNIT or (word != "" and word in SECONDS_PER_UNIT)
-
-
-def same_unit(first: str, second: str) -> bool:
-    """Whether two units are the same, however they are spelled.
-
-    Examples
-    --------
-    >>> same_unit("m/s²", "m/s^2"), same_unit("m/s2", "m/s**2"), same_unit("g", "m/s^2")
-    (True, True, False)
-    """
-    return _plain_unit(first) == _plain_unit(second)
-
-
-def _plain_unit(unit: str) -> str:
-    squares = unit.strip().casefold().replace("²", "2").replace("**", "").replace("^", "")
-    return re.sub(r"[\s·*]+", "", squares).replace("/s/s", "/s2").replace("μ", "µ").replace("um", "µm")
-
-
-_FACTORS = {
-    quantity: {_plain_unit(unit): factor for unit, factor in units.items()} for quantity, units in SI_FACTORS.items()
-}
-# A length is a displacement, unless a channel is said to be a transmission error.
-_QUANTITY_OF_UNIT = {
-    unit: quantity for quantity, units in _FACTORS.items() if quantity != "transmission_error" for unit in units
-}
-
-
-def si_factor(quantity: str, unit: str) -> float | None:
-    """Return the factor from a unit of a quantity to its SI unit; None if it is not known.
-
-    Parameters
-    ----------
-    quantity : str
-        One of `QUANTITIES`.
-    unit : str
-        In any spelling.
-
-    Examples
-    --------
-    >>> si_factor("velocity", "in/s"), si_factor("acceleration", "m/s**2"), si_factor("torque", "kN m")
-    (0.0254, 1.0, 1000.0)
-    >>> si_factor("velocity", "g") is None
-    True
-    """
-    return _FACTORS.get(quantity, {}).get(_plain_unit(unit))
+    return quantity_of_unit(text) is not None or (word != "" and word in SECONDS_PER_UNIT)
 
 
 def quantity_of(name: str, unit: str) -> str:
@@ -259,7 +190,7 @@ def quantity_of(name: str, unit: str) -> str:
     >>> quantity_of("a1", "m/s^2"), quantity_of("Tacho", "V"), quantity_of("a1", ""), quantity_of("phase_current_1", "")
     ('acceleration', 'tachometer', 'unknown', 'current')
     """
-    quantity = _QUANTITY_OF_UNIT.get(_plain_unit(unit), "unknown")
+    quantity = quantity_of_unit(unit) or "unknown"
     if quantity in ("unknown", "voltage") and re.match(r"tach|keyphas", name.strip().casefold()):
         return "tachometer"
     if quantity == "unknown" and plain_name(name) in ("rpm", "speedrpm"):

@@ -19,7 +19,6 @@ from gearsig.formatting import readable, unit_text
 from gearsig.motion import StartStop
 from gearsig.orders import OrderMap, SynchronousAverage
 from gearsig.plot import FAULT, QUIET, CaptionedFigure, ChartLine, Cursor, LinePanel, Picture, embed
-from gearsig.recording import si_factor
 from gearsig.report._files import compiled, render, write_pdf
 from gearsig.report._methods import fitting_methods, method_pictures
 from gearsig.report._sections import (
@@ -33,6 +32,7 @@ from gearsig.report._sections import (
     speed_rows,
     truth_rows,
 )
+from gearsig.rig import si_factor
 from gearsig.severity import CrackEstimate
 from gearsig.spectra import LARGEST_SLIP, Spectrum
 

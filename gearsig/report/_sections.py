@@ -93,7 +93,7 @@ def is_confidence_stated(finding: Finding) -> bool:
 def sureness_text(finding: Finding) -> str:
     """Return the maximum confidence of a finding, and its basis."""
     basis = finding.confidence_basis
-    if not basis or basis.startswith("at most") or not is_confidence_stated(finding):
+    if not basis or not is_confidence_stated(finding):
         return basis
     return f"at most {percent(finding.confidence)}: {basis}"
 

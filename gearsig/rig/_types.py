@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from math import isclose, radians
+from math import isclose, pi, radians
 from os import PathLike
 
 from gearsig.checks import (
@@ -255,6 +256,100 @@ QUANTITIES = (
 """What a channel may measure."""
 
 
+RPM_UNITS = frozenset(("rpm", "r/min", "tr/min", "u/min", "1/min", "min^-1"))
+_G, _INCH = 9.80665, 0.0254
+_LENGTHS = {"m": 1.0, "mm": 1e-3, "µm": 1e-6, "mil": 1e-3 * _INCH}
+_ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": pi / 180, "°": pi / 180, "rev": 2 * pi}
+
+SI_FACTORS: dict[str, dict[str, float]] = {
+    "acceleration": {
+        "m/s²": 1.0,
+        "ms-2": 1.0,
+        "mm/s²": 1e-3,
+        "µm/s²": 1e-6,
+        "g": _G,
+        "gn": _G,
+        "g_n": _G,
+        "g-s": _G,
+        "mg": 1e-3 * _G,
+    },
+    "velocity": {"m/s": 1.0, "mm/s": 1e-3, "µm/s": 1e-6, "in/s": _INCH, "ips": _INCH},
+    "displacement": _LENGTHS,
+    "transmission_error": _LENGTHS,
+    "sound_pressure": {"Pa": 1.0},
+    "force": {"N": 1.0, "kN": 1e3},
+    "torque": {"N·m": 1.0, "kN·m": 1e3},
+    "rotational_speed": {
+        **dict.fromkeys(sorted(RPM_UNITS), 2 * pi / 60),
+        **{f"{unit}/s": factor for unit, factor in _ANGLES.items()},
+    },
+    "angle": _ANGLES,
+    "angular_acceleration": {f"{unit}/s²": factor for unit, factor in _ANGLES.items()},
+    "temperature": {"°C": 1.0, "degC": 1.0},  # for differences only: its zero is not the kelvin's
+    "voltage": {"V": 1.0, "mV": 1e-3},
+    "current": {"A": 1.0, "mA": 1e-3},
+}
+"""Quantity → unit → factor to the SI unit, for every known unit.
+
+Each unit is listed in one spelling; `si_factor` recognises the others ("m/s^2", "m/s**2", "Nm")."""
+
+
+def si_factor(quantity: str, unit: str) -> float | None:
+    """Return the factor from a unit of a quantity to its SI unit; None if it is not known.
+
+    Parameters
+    ----------
+    quantity : str
+        One of `QUANTITIES`.
+    unit : str
+        In any spelling.
+
+    Examples
+    --------
+    >>> si_factor("velocity", "in/s"), si_factor("acceleration", "m/s**2"), si_factor("torque", "kN m")
+    (0.0254, 1.0, 1000.0)
+    >>> si_factor("velocity", "g") is None
+    True
+    """
+    return _FACTORS.get(quantity, {}).get(_plain_unit(unit))
+
+
+def quantity_of_unit(unit: str) -> str | None:
+    """Return the quantity that a unit in any spelling belongs to; None if it is not known.
+
+    Examples
+    --------
+    >>> quantity_of_unit("m/s^2"), quantity_of_unit("furlong")
+    ('acceleration', None)
+    """
+    return _QUANTITY_OF_UNIT.get(_plain_unit(unit))
+
+
+def same_unit(first: str, second: str) -> bool:
+    """Whether two units are the same, however they are spelled.
+
+    Examples
+    --------
+    >>> same_unit("m/s²", "m/s^2"), same_unit("m/s2", "m/s**2"), same_unit("g", "m/s^2")
+    (True, True, False)
+    """
+    return _plain_unit(first) == _plain_unit(second)
+
+
+def _plain_unit(unit: str) -> str:
+    squares = unit.strip().casefold().replace("²", "2").replace("**", "").replace("^", "")
+    return re.sub(r"[\s·*]+", "", squares).replace("/s/s", "/s2").replace("μ", "µ").replace("um", "µm")
+
+
+_FACTORS = {
+    quantity: {_plain_unit(unit): factor for unit, factor in units.items()} for quantity, units in SI_FACTORS.items()
+}
+# A length is a displacement, unless a channel is said to be a transmission error.
+_QUANTITY_OF_UNIT = {
+    unit: quantity for quantity, units in _FACTORS.items() if quantity != "transmission_error" for unit in units
+}
+
+
 @dataclass(frozen=True)
 class Shaft:
     """A rotating shaft.
@@ -347,6 +442,12 @@ class Sensor:
         check_texts(self, "channel", "unit", "position")
         if self.quantity:
             one_of(self.quantity, f"quantity of sensor {self.channel!r}", QUANTITIES)
+        if self.unit and self.quantity in SI_FACTORS and si_factor(self.quantity, self.unit) is None:
+            raise InputError(
+                f"unit of sensor {self.channel!r} is {self.unit!r}",
+                allowed=f"for {self.quantity}: {', '.join(SI_FACTORS[self.quantity])}",
+                remedy="give one of these; scale converts the numbers in the file to it",
+            )
         for label, value in (("scale", self.scale), ("offset", self.offset)):
             label_text = f"{label} of sensor {self.channel!r}"
             if number(value, label_text) == 0.0 and label == "scale":

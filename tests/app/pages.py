@@ -132,7 +132,8 @@ def machine(rate_hz: float = 2000.0, duration_s: float = 8.0) -> tuple[bytes, st
 def opened_machine(method: str, *, quantity: str = "acceleration", **values: Any) -> AppTest:
     """Open the recording of `machine` at a method."""
     content, rig = machine()
-    rig = rig.replace('"acceleration"', f'"{quantity}"')
+    unit = {"sound_pressure": "Pa", "displacement": "mm"}.get(quantity, "m/s^2")
+    rig = rig.replace('"acceleration"', f'"{quantity}"').replace('"m/s^2"', f'"{unit}"')
     values[method_key(method, sha256(content).hexdigest(), 2000.0)] = method
     return opened_file("orders.csv", content, rig, tab=view_of(method), **values)
 

@@ -3,15 +3,17 @@
 import csv
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import html5lib
 import numpy as np
 import pytest
 
-from app.cli.compare import DATA, PAGE, TABLE, read_pair
+from app.cli.compare import DATA, PAGE, TABLE, open_simulation, read_pair
 from gearsig.errors import InputError
 from gearsig.recording import Channel, Recording
+from gearsig.rig import read_rig
 from tests.app.test_cli import run
 from tests.comparison.machines import LINES, TEETH, gear_record
 
@@ -116,6 +118,13 @@ def test_bad_input_is_one_line(
     assert err.startswith("gearsig: ")
     assert err.count("\n") == 1
     assert message in err
+
+
+def test_the_sampling_rate_of_the_recording_s_rig_applies_to_a_simulation_that_states_none(files: Path) -> None:
+    rate_hz = gear_record(duration_s=1.0).sampling_rate_hz
+    rig = read_rig(files / "gear.toml")
+    opened = open_simulation(files / "bare.csv", None, replace(rig, sampling_rate_hz=rate_hz), None, None)
+    assert opened.sampling_rate_hz == rate_hz
 
 
 def test_the_only_channels_are_compared_whatever_their_names(capsys: pytest.CaptureFixture[str], files: Path) -> None:

@@ -13,7 +13,7 @@ from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import plus_minus
 from gearsig.recording import Channel, Recording
 from gearsig.report import comparison_page, comparison_text
-from gearsig.rig import GearPair, PulseTimes, Rig, Shaft
+from gearsig.rig import ConstantSpeed, GearPair, PulseTimes, Rig, Shaft
 from tests.comparison.machines import LINES, RIG, TEETH, gear_record
 
 
@@ -105,6 +105,34 @@ def test_teeth_that_are_all_alike_are_aligned_to_whole_teeth_only() -> None:
     pitch_deg = 360.0 / 23
     assert (found.alignments[0].shift_deg - 3.6 + pitch_deg / 2) % pitch_deg == pytest.approx(pitch_deg / 2, abs=0.1)
     assert any("in the simulation is which in the recording" in note for note in found.notes)
+
+
+@pytest.mark.parametrize(
+    ("recorded_lines", "verdict"),
+    [
+        ({}, "agree within 0.0 dB at 3 lines."),
+        (
+            {9.3: 7.0},
+            "Order 9.2969 differs most after a common gain of +40.0 dB: there the simulation is too weak by 20.0",
+        ),
+    ],
+)
+def test_of_unknown_units_lines_of_no_shaft_are_compared_after_a_common_gain(
+    recorded_lines: dict[float, float], verdict: str
+) -> None:
+    lines = {3.6: 1.0, 5.4: 0.5, 9.3: 0.7}
+    t = np.arange(60_000) / 10_000.0
+
+    def record(gain: float, unit: str, lines: dict[float, float], seed: int) -> Recording:
+        x = 0.1 * np.random.default_rng(seed).normal(size=len(t))
+        x += sum(a * np.cos(2 * np.pi * order * 25.0 * t) for order, a in lines.items())
+        quantity = "acceleration" if unit else "unknown"
+        return Recording(gain * x[None], 10_000.0, (Channel("a1", quantity, unit),), ConstantSpeed(1500.0))
+
+    found = compare(record(0.01, "", lines, 1), record(1.0, "m/s^2", lines | recorded_lines, 2))
+    assert found.verdict.startswith("The unit of one side is not known")
+    assert "a common gain of +40.0 dB" in found.verdict
+    assert verdict in found.verdict
 
 
 def test_noise_alone_shows_no_line_and_no_agreement() -> None:

@@ -131,6 +131,12 @@ def test_too_few_revolutions() -> None:
     assert analysis.verdict.startswith("Cannot tell")
 
 
+def test_a_missing_tooth_count_is_what_is_asked_for() -> None:
+    pair = replace(RIG.pairs[0], driven_teeth=None)
+    found = finding(analyze(record().with_rig(replace(RIG, pairs=(pair,)))), "tooth-not-examined")
+    assert found.surer == "What the rig file lacks: driven_teeth of stage."
+
+
 def test_a_rig_that_disagrees_with_the_sampling_rate() -> None:
     recording = record(replace(GOOD, speed=ConstantProfile(1320.0)))
     wrong = replace(

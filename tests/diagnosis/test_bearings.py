@@ -119,7 +119,10 @@ def test_more_than_two_parts_at_once_are_a_suspicion() -> None:
 
 def test_one_hidden_part_has_one_order() -> None:
     rig = replace(RIG, bearings=(Bearing("b", RIG.shafts[0].name, bpfo_order=3.37, ftf_order=0.4),))
-    hidden = finding(analyze(replace(steady(), rig=rig).between(0.0, 1.7)), "bearing-part-hidden")
+    analysis = analyze(replace(steady(), rig=rig).between(0.0, 1.7))
+    hidden = finding(analysis, "bearing-part-hidden")
+    title = "No damage shows in the bearings (b), of which not every cage could be examined."
+    assert finding(analysis, "no-bearing-damage").title == title
     assert hidden.title.startswith("Not examined: cage of b. Its order falls on")
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.signal import resample_poly
+from scipy.signal import butter, resample_poly, sosfilt
 
 from gearsig.diagnosis import Analysis, Kind, LevelChange, Outcome, analyze
 from gearsig.recording import Channel, Recording
@@ -150,6 +150,30 @@ def test_another_gain_is_no_other_machine() -> None:
     analysis = analyze(replace(record, samples=5.0 * record.samples), reference=rotor(HEALTHY, seed=2))
     assert finding(analysis, "levels-scaled").kind is Kind.DATA_PROBLEM
     assert "changed-since-reference" not in codes(analysis)
+
+
+@pytest.mark.parametrize("is_loose", [True, False])
+def test_where_one_channel_alone_has_lost_its_noise_its_mounting_is_to_be_checked(*, is_loose: bool) -> None:
+    """A loose sensor loses what is above its new resonance; where all lose it, the machine has become quieter."""
+    channels = tuple(Channel(name, "acceleration", "m/s^2") for name in ("a1", "a2", "a3"))
+
+    def recording(first_seed: int) -> Recording:
+        seeds = range(first_seed, first_seed + 3)
+        lines = HEALTHY | dict.fromkeys((4.0, 5.0, 6.0, 7.0, 8.0), 0.02)
+        samples = np.vstack([rotor(lines, seed=seed).samples for seed in seeds])
+        return replace(rotor(HEALTHY, seed=0), samples=samples, channels=channels)
+
+    now, healthy = recording(10), recording(20)
+    muffled = now.samples.copy()
+    lost = slice(0, 1) if is_loose else slice(None)
+    muffled[lost] = sosfilt(butter(2, 60.0, fs=SAMPLING_RATE_HZ, output="sos"), muffled[lost])
+    analysis = analyze(replace(now, samples=muffled), reference=healthy)
+    assert ("channel-faded" in codes(analysis, Kind.DATA_PROBLEM)) is is_loose
+    assert ("changed-since-reference" in codes(analysis)) is not is_loose
+    if is_loose:
+        title = finding(analysis, "channel-faded").title
+        assert title.endswith("in channel a1 alone, noise included: check its mounting, cable and range.")
+        assert finding(analysis, "channel-faded").where.channels == ("a1",)
 
 
 @pytest.mark.parametrize(

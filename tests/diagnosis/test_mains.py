@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gearsig.diagnosis import Analysis, Kind, analyze
+from gearsig.prepared import magnetic_pull_near
 from gearsig.recording import Channel, Recording
 from gearsig.rig import ConstantSpeed, Rig, Shaft
 from tests.diagnosis.machines import codes, finding
@@ -43,3 +44,14 @@ def test_with_a_speed_that_explains_them_not_they_are_the_mains() -> None:
 @pytest.mark.parametrize(("hertz", "seconds"), [(60.12, 2.0), (49.9, 10.0), (50.4, 3.0)])
 def test_a_line_beyond_what_supplies_wander_is_not_the_mains(hertz: float, seconds: float) -> None:
     assert "mains-hum" not in codes(with_lines(hertz, seconds=seconds))
+
+
+@pytest.mark.parametrize(
+    ("hertz", "pull"),
+    [(100.1, (50.0, 100.0)), (719.0, (60.0, 720.0)), (110.0, None), (2885.6, None), (5497.1, None)],
+)
+def test_only_the_first_multiples_of_twice_a_supply_s_frequency_are_its_pull(
+    hertz: float, pull: tuple[float, float] | None
+) -> None:
+    """At 2885.6 Hz the tolerance and both supplies cover a fifth of all places."""
+    assert magnetic_pull_near(hertz) == pull

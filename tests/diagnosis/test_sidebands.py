@@ -352,7 +352,7 @@ def test_a_line_is_called_a_multiple_of_the_hunting_tooth_order_only_among_other
     rng, rate_hz, turns_hz, hunting = np.random.default_rng(seed), 4096.0, 20.0, 0.2
     turns = turns_hz * np.arange(round(20.0 * rate_hz)) / rate_hz
     mesh, noise = np.cos(2 * pi * 27 * turns), rng.normal(size=len(turns))
-    strange = 4.0 * np.cos(2 * pi * 278 * hunting * turns)
+    strange = 4.0 * np.cos(2 * pi * 284 * hunting * turns)  # no sideband of the mesh
     phases = rng.uniform(0, 2 * pi, 40)
     differing = sum(np.cos(2 * pi * (k + 1) * hunting * turns + phase) for k, phase in enumerate(phases))
     machine = replace(rig(27, 45), speed=ConstantSpeed(60 * turns_hz, "in"))

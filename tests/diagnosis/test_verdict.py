@@ -1,8 +1,16 @@
 """The verdict says no more than the findings do."""
 
+from dataclasses import replace
+
 import pytest
 
-from gearsig.diagnosis import Finding, Kind, from_p_value, ranked, verdict_of
+from gearsig.diagnosis import Finding, Kind, analyze, from_p_value, ranked, verdict_of
+from tests.diagnosis.machines import motor
+
+
+def test_whether_columns_are_separate_runs_is_asked_first() -> None:
+    runs = replace(motor("", 0), warnings=("Are these separate runs? The 3 columns share no noise.",))
+    assert analyze(runs).verdict.startswith("Are these separate runs?")
 
 
 def test_faults_come_first_and_the_surest_of_them() -> None:

@@ -58,16 +58,16 @@ def through_zero(x):
 
 
 CASES = {
-    "rate ten times too high": (spoiled(rate=10 * RATE), {"sampling-rate-doubtful", "speed-off-nominal"}),
-    "rate ten times too low": (spoiled(rate=RATE / 10), {"sampling-rate-doubtful", "speed-off-nominal"}),
+    "rate ten times too high": (spoiled(rate=10 * RATE), {"sampling-rate-doubtful"}),
+    "rate ten times too low": (spoiled(rate=RATE / 10), {"sampling-rate-doubtful"}),
     "rate a fifth too high": (spoiled(rate=1.2 * RATE), {"speed-off-nominal"}),
     "stated speed a tenth too high": (spoiled(speed=ConstantSpeed(1650.0, "input")), {"speed-off-nominal"}),
     "rate too low for the stated speed": (
         spoiled(rate=RATE / 10, speed=ConstantSpeed(1500.0, "input")),
         {"mesh-above-sampling"},
     ),
-    "two pulses": (spoiled(pulses=np.maximum(PULSES, np.roll(PULSES, round(TURN / 2)))), {"speed-off-nominal"}),
-    "half the pulses": (spoiled(pulses=half_the_pulses()), {"speed-off-nominal"}),
+    "two pulses": (spoiled(pulses=np.maximum(PULSES, np.roll(PULSES, round(TURN / 2)))), {"sampling-rate-doubtful"}),
+    "half the pulses": (spoiled(pulses=half_the_pulses()), {"sampling-rate-doubtful"}),
     "reversed": (spoiled(SHAKE[::-1], PULSES[::-1]), {"channel-reversed"}),
     "clipped at 30 %": (spoiled(clipped(0.3)), {"channel-clipped"}),
     "clipped at 5 %": (spoiled(clipped(0.05)), {"channel-clipped"}),
@@ -97,6 +97,13 @@ def test_spoiled_is_noticed_said_and_lowered(name):
     problems = {f.code for f in found.findings if f.kind is Kind.DATA_PROBLEM}
     assert problems <= codes | {"sampling-rate-doubtful", "channel-stuck"}
     assert any(seen[code].title in found.verdict for code in problems) or not problems
+
+
+def test_a_rate_given_although_the_file_states_another_is_one_problem_with_one_remedy():
+    given = read_recording(FOLDER / "damaged_tooth.csv.gz", rig=RIG, sampling_rate_hz=2 * RATE)
+    (problem,) = [f for f in analyze(given).findings if f.kind is Kind.DATA_PROBLEM]
+    assert problem.code == "sampling-rate-doubtful"
+    assert problem.surer.startswith("Leave out the sampling rate given (--fs)")
 
 
 @pytest.mark.parametrize("has_nominal", [True, False])

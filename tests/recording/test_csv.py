@@ -83,7 +83,7 @@ def test_headerless(tmp_path):
     assert r.sampling_rate_hz == 10
     r = read_recording(write(tmp_path / "y.csv", [f"{t!r},{b!r}" for t, _, b in rows()]))
     assert r.sampling_rate_hz == pytest.approx(FS_HZ)
-    assert "taken as the time" in r.warnings[0]
+    assert r.warnings[0] == "the first column increases uniformly and was taken as the time in seconds"
 
 
 def test_row_counter_is_left_out(tmp_path):
@@ -114,6 +114,8 @@ def test_rate_precedence(tmp_path):
     assert r.sampling_rate_hz == 1000
     assert "25600" in r.warnings[0]
     assert read_recording(path, sampling_rate_hz=25601).warnings == ()
+    r = read_recording(path, sampling_rate_hz=25601, rig=Rig(sampling_rate_hz=1000))
+    assert r.warnings == ("the sampling rate given, 25601 Hz, was taken; the rig file states 1000 Hz",)
     r = read_recording(path, rig=Rig(sampling_rate_hz=1000))
     assert r.sampling_rate_hz == pytest.approx(25600)
     assert "rig" in r.warnings[0]

@@ -3,6 +3,7 @@
 import gc
 import struct
 import wave
+from dataclasses import replace
 
 import h5py
 import numpy as np
@@ -16,7 +17,17 @@ from scipy.sparse import csc_array
 
 from gearsig.errors import InputError
 from gearsig.recording import parse_lea, read_recording, variables
-from gearsig.rig import ConstantSpeed, PulseTimes, Rig, Sensor, Shaft, SpeedChannel, TachometerChannel
+from gearsig.rig import (
+    ConstantSpeed,
+    GearPair,
+    OperatingPoint,
+    PulseTimes,
+    Rig,
+    Sensor,
+    Shaft,
+    SpeedChannel,
+    TachometerChannel,
+)
 
 RNG = np.random.default_rng(7)
 X = RNG.standard_normal(1000)
@@ -84,6 +95,20 @@ class TestMat5:
         r = read_recording(tmp_path / "x.mat", speed=ConstantSpeed(1796.5))  # as the file, but for its digits
         assert not any("1796" in warning for warning in r.warnings)
 
+    def test_a_given_speed_only_checks_a_measured_one(self, tmp_path):
+        savemat(tmp_path / "x.mat", {"DE_time": X, "tacho": Y, "fs": 50.0})
+        pair = GearPair("stage", "in", "out", 20, 40)
+        point = OperatingPoint("out", torque_nm=5.0)
+        rig = Rig(shafts=(Shaft("in"), Shaft("out")), pairs=(pair,), operating_point=point)
+        measured = replace(rig, speed=TachometerChannel("tacho", shaft="in"))
+        r = read_recording(tmp_path / "x.mat", rig=measured, speed=ConstantSpeed(1500.0))
+        assert r.speed_source == TachometerChannel("tacho", shaft="in")
+        assert r.rig.operating_point == replace(point, speed_rpm=750.0)
+        assert "the speed is taken from channel 'tacho'; the stated 1500 rpm is compared with it" in r.warnings
+        absent = replace(rig, speed=TachometerChannel("elsewhere", shaft="in"))
+        r = read_recording(tmp_path / "x.mat", rig=absent, speed=ConstantSpeed(1500.0))
+        assert r.speed_source == ConstantSpeed(1500.0)
+
     def test_times_beside_their_channels(self, tmp_path):
         t = np.arange(1000) / 50
         names = {"Data1_AI_1": X, "Data1_time_AI_1": t, "Data1_AI_2": Y, "Data1_time_AI_2": t}
@@ -104,6 +129,7 @@ class TestMat5:
         assert r.channel_names == ("m_1", "m_2", "m_3")
         assert r.sampling_rate_hz == pytest.approx(5120)
         assert any("#3" in w for w in r.warnings) is not together
+        assert any(w.endswith("was taken as the time in seconds; the others are m_1 to m_3") for w in r.warnings)
         np.savetxt(tmp_path / "x.csv", matrix, fmt="%.9g")
         for name in ("x.mat#2", "x.csv#2"):
             second = read_recording(tmp_path / name)

@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from math import pi
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from gearsig.errors import InputError
-from gearsig.recording import SI_FACTORS, Channel, Recording, read_recording, si_factor
-from gearsig.rig import QUANTITIES, PulseTimes, Rig, Sensor, TachometerChannel
+from gearsig.recording import Channel, Recording, read_recording
+from gearsig.rig import QUANTITIES, SI_FACTORS, PulseTimes, Rig, Sensor, TachometerChannel, si_factor
 
 
 def recording(unit: str) -> Recording:
@@ -82,9 +83,9 @@ SPELLINGS = {
     "sound_pressure": ("Pa",),
     "force": ("N", "kN"),
     "torque": ("Nm", "N*m", "N·m", "N m"),
-    "rotational_speed": ("rpm", "r/min", "tr/min", "u/min", "1/min", "min^-1", "rad/s"),
-    "angle": ("rad",),
-    "angular_acceleration": ("rad/s^2", "rad/s2", "rad/s²"),
+    "rotational_speed": ("rpm", "r/min", "tr/min", "u/min", "1/min", "min^-1", "rad/s", "deg/s", "rev/s"),
+    "angle": ("rad", "mrad", "deg", "°", "rev"),
+    "angular_acceleration": ("rad/s^2", "rad/s2", "rad/s²", "deg/s²"),
     "temperature": ("°C", "degC"),
     "voltage": ("V", "mV"),
     "current": ("A", "mA"),
@@ -98,6 +99,22 @@ def test_every_unit_that_a_reader_knows_has_its_factor(quantity: str, unit: str,
     (channel,) = read_recording(tmp_path / "x.csv").channels
     assert (channel.quantity, channel.unit) == (quantity, unit)
     assert si_factor(quantity, unit) is not None
+
+
+@pytest.mark.parametrize(
+    ("unit", "sensor", "said"),
+    [
+        ("furlong", {}, "'furlong' of channel 'a1'"),
+        ("mm", {"quantity": "acceleration"}, "'mm' of channel 'a1' (acceleration)"),
+        ("furlong", {"quantity": "displacement", "unit": "m", "scale": 201.168}, ""),
+        ("counts", {"quantity": "encoder"}, ""),
+    ],
+)
+def test_a_unit_that_is_not_known_is_said(unit: str, sensor: dict[str, Any], said: str, tmp_path: Path) -> None:
+    (tmp_path / "x.csv").write_text(f"time [s],a1 [{unit}]\n" + "".join(f"{i / 100},{i % 7}\n" for i in range(100)))
+    recording = read_recording(tmp_path / "x.csv", rig=Rig(sensors=(Sensor("a1", **sensor),)))
+    told = [text for text in recording.warnings if text.startswith("not known as a unit: ")]
+    assert [text.partition(": ")[2].partition(";")[0] for text in told] == ([said] if said else [])
 
 
 def test_every_quantity_with_a_unit_has_its_units() -> None:

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,9 @@ from gearsig.batch import report_many
 from gearsig.cache import part_beside
 from gearsig.diagnosis import Outcome
 from gearsig.errors import InputError
+from gearsig.fleet import AnalysisOptions
 from gearsig.report import Entry, Failure
+from gearsig.rig import Rig, Shaft
 
 RATE_HZ = 2048.0
 
@@ -145,7 +148,23 @@ def test_the_reference_has_its_own_rate_on_its_page_and_beside_the_others(record
     one, _ = recordings
     stated = {"sampling_rate_hz": 12e3, "n_processes": 1}
     report_many(recordings, tmp_path / "a", reference=one, reference_rate_hz=48e3, **stated)
-    assert rates == {"one.csv": (48e3, None), "two.csv": (12e3, 48e3)}
+    assert rates == {"one.csv": (12e3, 48e3), "two.csv": (12e3, 48e3)}
+
+
+def test_what_the_file_beside_a_recording_states_goes_before_options_for_many(tmp_path):
+    """On the reference's own page as beside the others; a rate stated for the reference goes before both."""
+    for seed, name in enumerate(("one", "two")):
+        np.savetxt(tmp_path / f"{name}.csv", np.random.default_rng(seed).normal(size=2048), header="a1", comments="")
+    one, two = tmp_path / "one.csv", tmp_path / "two.csv"
+    one.with_suffix(".toml").write_text('sampling_rate_hz = 48e3\n[[sensor]]\nchannel = "a1"\nunit = "g"\n')
+    options = AnalysisOptions(Rig(shafts=(Shaft("motor"),)), 12e3, reference=one)
+    healthy = options.analyze(one).recording
+    assert (healthy.sampling_rate_hz, healthy.channels[0].unit) == (48e3, "g")
+    assert healthy.rig.shaft_names == ("motor",)
+    compared = options.analyze(two)
+    assert compared.recording.sampling_rate_hz == 12e3
+    assert compared.reference.recording.sampling_rate_hz == 48e3
+    assert replace(options, reference=None, reference_rate_hz=24e3).analyze(one).recording.sampling_rate_hz == 24e3
 
 
 def test_unexpected_errors_ask_for_a_report(recordings, tmp_path, monkeypatch):

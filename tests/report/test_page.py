@@ -195,11 +195,10 @@ def test_levels_that_changed_are_told_apart_by_their_channels_with_a_minus_sign(
     assert [row.label for row in change_rows(replace(gearbox, level_changes=levels[:1]))] == ["noise 2 to 3 kHz"]
 
 
-def test_how_sure_is_said_once():
-    basis = "at most 95 %: chance of it in noise < 1e-6"
-    finding = Finding("x", Kind.FAULT, "X.", confidence=0.95, confidence_basis=basis)
-    assert finding_card(finding).confidence_basis == basis
-    assert finding_card(replace(finding, confidence_basis="height")).confidence_basis == "at most 95 %: height"
+def test_how_sure_follows_a_lowered_confidence():
+    finding = Finding("x", Kind.FAULT, "X.", confidence=0.95, confidence_basis="height")
+    assert finding_card(finding).confidence_basis == "at most 95 %: height"
+    assert finding_card(replace(finding, confidence=0.5)).confidence_basis == "at most 50 %: height"
 
 
 def test_a_strength_without_unit_says_that_it_is_unknown():

@@ -13,6 +13,7 @@ from gearsig.rig import (
     MachineSize,
     OperatingPoint,
     Rig,
+    Sensor,
     Shaft,
     TachometerChannel,
     hunting_tooth_order,
@@ -168,3 +169,10 @@ def test_a_rig_is_shown_as_a_person_would_write_it() -> None:
     assert "pump &lt;4&gt;" in rig._repr_html_()
     assert all(text in rig._repr_html_() for text in facts.values())
     assert repr(Rig()) == "Rig ''"
+
+
+@pytest.mark.parametrize(("quantity", "unit"), [("acceleration", "mm"), ("acceleration", "m/s2rms"), ("angle", "V")])
+def test_a_sensor_s_unit_is_one_of_its_quantity(quantity: str, unit: str) -> None:
+    with pytest.raises(InputError, match=rf"unit of sensor 'a1' is '{unit}' \(allowed: for {quantity}: "):
+        Sensor("a1", quantity, unit)
+    assert Sensor("a1", "encoder", "counts").unit == "counts"
