@@ -24,7 +24,7 @@ from threading import Thread
 from time import monotonic
 
 from gearsig.cache import write_text
-from gearsig.errors import GearsigError, InputError, RefusalError
+from gearsig.errors import GearsigError, InputError, RefusalError, not_written
 from gearsig.gap import PROCESSES, GapReport, GapRequest, read_gap_inputs
 from gearsig.processes import one_pool, stop
 from gearsig.report import check_writable, from_plain, plain, read_gap_json, write_gap_json, write_gap_page
@@ -121,9 +121,7 @@ def write_results(report: GapReport, folder: Path, *, command: str = "") -> tupl
         finally:
             shutil.rmtree(unfinished, ignore_errors=True)
     except OSError as error:
-        raise InputError(
-            f"cannot be written ({error.strerror or error})", where=str(folder), remedy="choose another with -o"
-        ) from None
+        raise not_written(error, folder, "choose another with -o") from None
     return tuple(folder / name for name in (PAGE, JSON, TWIN) if (folder / name).exists())
 
 

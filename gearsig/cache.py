@@ -20,7 +20,7 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
-from gearsig.errors import InputError
+from gearsig.errors import InputError, not_written
 
 FRESH = "add --fresh to gearsig simulate, flexible, gear-body or gap, which clears such files away, or delete this one"
 """Remedy for a cached file from another version of the code."""
@@ -104,7 +104,7 @@ def write_whole(path: Path, write: Callable[[IO[bytes]], object], *, remedy: str
             write(file)
         part.replace(path)
     except OSError as error:
-        raise InputError(f"cannot be written ({error.strerror or error})", where=str(path), remedy=remedy) from None
+        raise not_written(error, path, remedy) from None
     finally:  # also on Ctrl-C
         with suppress(OSError):
             part.unlink(missing_ok=True)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib import import_module
+from pathlib import Path
 from types import ModuleType
 from typing import TypeVar
 
@@ -62,6 +64,20 @@ class RefusalError(GearsigError):
     def __init__(self, reason: str, *, remedy: str = "", looked_at: object = None) -> None:
         self.reason, self.remedy, self.looked_at = reason, remedy, looked_at
         super().__init__(_one_line(f"{reason}; {remedy}" if remedy else reason))
+
+
+def not_written(error: OSError, where: str | Path, remedy: str = "") -> InputError:
+    """Return the error for a file or folder that the operating system does not let write.
+
+    Parameters
+    ----------
+    error : OSError
+        Messages of libraries also contain memory addresses; that of its number is said where it has one.
+    where : str or Path
+    remedy : str
+    """
+    reason = os.strerror(error.errno) if error.errno else error
+    return InputError(f"cannot be written ({reason})", where=str(where), remedy=remedy)
 
 
 def answer_or_none(

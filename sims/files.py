@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from gearsig.cache import part_beside
-from gearsig.errors import GearsigError, InputError
+from gearsig.errors import GearsigError, InputError, not_written
 from gearsig.recording import Recording, n_samples_of, read_recording, recording_target, write_recording
 from gearsig.rig import read_rig, write_rig
 
@@ -89,9 +89,7 @@ def write_set(recording: Recording, names: FileSet) -> None:
     try:
         unfinished.mkdir()
     except OSError as error:
-        raise InputError(
-            f"cannot be written ({error.strerror})", where=str(names.recording), remedy="choose another folder"
-        ) from None
+        raise not_written(error, names.recording, "choose another folder") from None
     parts = FileSet(*(unfinished / name.name for name in names))
     try:
         write_recording(recording, parts.recording)
@@ -99,11 +97,7 @@ def write_set(recording: Recording, names: FileSet) -> None:
         parts.truth.write_text(_truth_json(recording) + "\n", encoding="utf-8")
         _move(parts, names)
     except OSError as error:
-        raise InputError(
-            f"cannot be written ({error.strerror or error})",
-            where=str(names.recording),
-            remedy="make room on the disk, or choose another folder",
-        ) from error
+        raise not_written(error, names.recording, "make room on the disk, or choose another folder") from error
     finally:
         shutil.rmtree(unfinished, ignore_errors=True)
 

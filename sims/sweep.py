@@ -13,7 +13,7 @@ from typing import Any
 
 from gearsig.cache import remove_parts, write_text
 from gearsig.checks import count, one_of, positive
-from gearsig.errors import GearsigError, InputError, unexpected_text
+from gearsig.errors import GearsigError, InputError, not_written, unexpected_text
 from gearsig.formatting import csv_rows
 from gearsig.processes import killed_text, n_processors, run_jobs
 from gearsig.recording import WRITERS
@@ -297,9 +297,7 @@ def claimed(folder: Path, definition: Mapping[str, Any], name: str = DEFINITION,
         else:
             write_text(folder / name, text)
     except OSError as error:
-        raise InputError(
-            f"cannot be written ({error.strerror or error})", where=str(folder), remedy="choose another with -o"
-        ) from None
+        raise not_written(error, folder, "choose another with -o") from None
     return folder
 
 

@@ -12,7 +12,7 @@ import streamlit as st
 
 from app.dashboard import address, state, work
 from app.dashboard.widgets.texts import show_error
-from gearsig.errors import GearsigError, InputError
+from gearsig.errors import GearsigError, not_written
 
 FOLDER = Path(__file__).parent
 # Module name, which is also the page's address, → title and icon; a module is imported when its page is first opened.
@@ -37,7 +37,7 @@ def show(name: str) -> None:
         if error.errno != ENOSPC:
             raise
         remedy = "make room there, or start the dashboard with TMPDIR set to another folder"
-        show_error(InputError(f"cannot be written ({error.strerror})", where=gettempdir(), remedy=remedy))
+        show_error(not_written(error, gettempdir(), remedy))
 
 
 st.set_page_config(page_title="gearsig", page_icon=str(FOLDER / "icon.svg"), layout="wide")

@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, TypeVar
 
 from gearsig.cache import remove_parts, write_whole
-from gearsig.errors import InputError
+from gearsig.errors import InputError, not_written
 
 if TYPE_CHECKING:
     from duckdb import DuckDBPyConnection
@@ -357,9 +357,7 @@ class Store:
         except Timeout:
             return None
         except OSError as error:
-            raise InputError(
-                f"cannot be written ({error.strerror})", where=str(self.folder), remedy="choose another with --store"
-            ) from None
+            raise not_written(error, self.folder, "choose another with --store") from None
         return lock
 
     def n_new(self) -> int:
@@ -384,7 +382,7 @@ class Store:
             self._remove_stale()
             self.read(lambda connection: self._merge(connection, everything=everything))
         except OSError as error:
-            raise InputError(f"cannot be written ({error.strerror})", where=str(self.folder)) from None
+            raise not_written(error, self.folder) from None
         finally:
             lock.release()
         return True

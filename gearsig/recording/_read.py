@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from gearsig.checks import FloatArray, closest_match_hint, count, instance_of, positive, short
-from gearsig.errors import InputError
+from gearsig.errors import InputError, not_written
 from gearsig.formatting import counted, file_label
 from gearsig.recording._limits import CHUNK_BYTES, check_memory, foreign_errors, read_text_bytes
 from gearsig.recording._table import (
@@ -363,9 +363,7 @@ def write_recording(recording: Recording, path: str | Path) -> Path:
     try:
         handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.stem[:32]}-", suffix=target.suffix)
     except OSError as error:
-        raise InputError(
-            f"cannot be written ({error.strerror})", where=target.name, remedy="choose a folder that can be written to"
-        ) from error
+        raise not_written(error, target.name, "choose a folder that can be written to") from error
     os.close(handle)
     unfinished = Path(name)
     try:
@@ -375,13 +373,7 @@ def write_recording(recording: Recording, path: str | Path) -> Path:
         unfinished.chmod(0o666 & ~mask)
         unfinished.replace(target)
     except OSError as error:
-        # Messages of libraries also contain memory addresses.
-        reason = os.strerror(error.errno) if error.errno else error
-        raise InputError(
-            f"cannot be written ({reason})",
-            where=target.name,
-            remedy="make room on the disk, or choose another folder",
-        ) from error
+        raise not_written(error, target.name, "make room on the disk, or choose another folder") from error
     finally:
         unfinished.unlink(missing_ok=True)
     return target

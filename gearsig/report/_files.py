@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from gearsig import __version__
 from gearsig.cache import made_folder, write_text, write_whole
-from gearsig.errors import InputError
+from gearsig.errors import InputError, not_written
 from gearsig.plot import Picture, font_folder
 from gearsig.recording import without_condition
 from gearsig.rig import recording_stem
@@ -88,9 +88,7 @@ def check_writable(folder: Path, option: str = "-o") -> None:
 
 
 def _unwritable(path: Path, error: OSError, option: str = "-o") -> InputError:
-    return InputError(
-        f"cannot be written ({error.strerror or error})", where=str(path), remedy=f"choose another folder with {option}"
-    )
+    return not_written(error, path, f"choose another folder with {option}")
 
 
 def _safe(source: str) -> str:

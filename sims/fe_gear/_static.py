@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gearsig.checks import FloatArray, positive, within
-from gearsig.errors import InputError
+from gearsig.errors import InputError, not_written
 from sims.fe_gear._blank import mesh_size_for, one_thread
 from sims.fe_gear._cyclic import ComplexArray, CyclicGear, CyclicModes, Held, cyclic_modes, mode_field
 from sims.fe_gear._mesh import IntArray, SectorMesh, cell_gradients_at_nodes, lame_pa, sector_mesh
@@ -264,7 +264,7 @@ def write_vtk(path: str | Path, mesh: SectorMesh, values: Mapping[str, FloatArra
     try:
         meshio.Mesh(points, [(kind, cells)], point_data=point_data).write(target)
     except OSError as error:
-        raise InputError(f"cannot be written ({error.strerror})", where=str(target)) from None
+        raise not_written(error, target) from None
     return target
 
 
