@@ -13,7 +13,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from itertools import islice
-from multiprocessing import connection, parent_process
+from multiprocessing import connection, current_process, parent_process
 from multiprocessing.context import SpawnContext, SpawnProcess
 from multiprocessing.util import Finalize
 from pathlib import Path
@@ -43,12 +43,7 @@ def process_pool(n_processes: int) -> Iterator[ProcessPoolExecutor]:
     InputError
         If the system has no room for the semaphores that control them.
     """
-    try:
-        pool = ProcessPoolExecutor(n_processes, mp_context=_Context(), initializer=_start_worker)
-    except OSError as error:
-        raise InputError(
-            f"no processes can be started ({error})", remedy="make room in shared memory (/dev/shm)"
-        ) from None
+    pool = _new_pool(n_processes)
     try:
         yield pool
     except (KeyboardInterrupt, GeneratorExit):  # an interrupted process must not wait for jobs that take minutes
@@ -57,6 +52,15 @@ def process_pool(n_processes: int) -> Iterator[ProcessPoolExecutor]:
         raise
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _new_pool(n_processes: int) -> ProcessPoolExecutor:
+    try:
+        return ProcessPoolExecutor(n_processes, mp_context=_Context(), initializer=_start_worker)
+    except OSError as error:
+        raise InputError(
+            f"no processes can be started ({error})", remedy="make room in shared memory (/dev/shm)"
+        ) from None
 
 
 _KEPT: ContextVar[list[ProcessPoolExecutor]] = ContextVar("kept")
@@ -142,13 +146,15 @@ def call_apart(
     ------
     MemoryError, or what the function makes of it
         If it asks for more.
+    InputError
+        If no process can be started.
     BrokenProcessPool
         If the process died, or exceeded the limit and was killed; the next call gets a new process.
     """
     global _APART  # noqa: PLW0603 - one process for all calls, which starts in a second
     with _CALLING:
         if _APART is None:
-            _APART = ProcessPoolExecutor(1, mp_context=_Context(), initializer=_start_worker)
+            _APART = _new_pool(1)
             # A worker waits for its own processes before the executor's exit handler would end them. They end when they
             # are told through its queues, which close with priority 10.
             Finalize(None, _APART.shutdown, exitpriority=20)
@@ -221,19 +227,31 @@ def can_be_sent(value: object) -> bool:
 
 
 class _Process(SpawnProcess):
-    """A fresh process that does not run the caller's script.
+    """A fresh process that does not run the caller's script, and that a daemonic process may start, too.
 
     Python would run it again in each, up to the point where processes are started: from a script without
-    `if __name__ == "__main__":`, which is common, none would ever start.
+    `if __name__ == "__main__":`, which is common, none would ever start. It keeps daemonic processes, such as Dask's
+    workers under a nanny, from starting any, as these would be left when they are ended: ours end with their parent.
     """
 
     def start(self) -> None:
-        with _STARTING, _script_out_of_sight(), _one_thread():
+        with _STARTING, _script_out_of_sight(), _one_thread(), _not_daemonic():
             super().start()
 
 
 class _Context(SpawnContext):
     Process = _Process
+
+
+@contextmanager
+def _not_daemonic() -> Iterator[None]:
+    """Temporarily let this process start others even if it is daemonic."""
+    here = current_process()
+    before, here.daemon = here.daemon, False
+    try:
+        yield
+    finally:
+        here.daemon = before
 
 
 @contextmanager
