@@ -14,11 +14,12 @@ from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from itertools import islice
 from multiprocessing import connection, current_process, parent_process
+from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnContext, SpawnProcess
-from multiprocessing.util import Finalize
 from pathlib import Path
 from threading import Lock, Thread
-from typing import Any, TypeVar
+from traceback import format_exc
+from typing import Any, TypeVar, cast
 
 from gearsig.errors import InputError
 
@@ -29,7 +30,7 @@ _THREAD_SETTINGS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"
 _MAIN = "__main__"
 _STARTING = Lock()
 _CALLING = Lock()
-_APART: ProcessPoolExecutor | None = None
+_APART: _Apart | None = None
 
 
 @contextmanager
@@ -43,7 +44,12 @@ def process_pool(n_processes: int) -> Iterator[ProcessPoolExecutor]:
     InputError
         If the system has no room for the semaphores that control them.
     """
-    pool = _new_pool(n_processes)
+    try:
+        pool = ProcessPoolExecutor(n_processes, mp_context=_Context(), initializer=_start_worker)
+    except OSError as error:
+        raise InputError(
+            f"no processes can be started ({error})", remedy="make room in shared memory (/dev/shm)"
+        ) from None
     try:
         yield pool
     except (KeyboardInterrupt, GeneratorExit):  # an interrupted process must not wait for jobs that take minutes
@@ -52,15 +58,6 @@ def process_pool(n_processes: int) -> Iterator[ProcessPoolExecutor]:
         raise
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
-
-
-def _new_pool(n_processes: int) -> ProcessPoolExecutor:
-    try:
-        return ProcessPoolExecutor(n_processes, mp_context=_Context(), initializer=_start_worker)
-    except OSError as error:
-        raise InputError(
-            f"no processes can be started ({error})", remedy="make room in shared memory (/dev/shm)"
-        ) from None
 
 
 _KEPT: ContextVar[list[ProcessPoolExecutor]] = ContextVar("kept")
@@ -153,27 +150,68 @@ def call_apart(
     """
     global _APART  # noqa: PLW0603 - one process for all calls, which starts in a second
     with _CALLING:
-        if _APART is None:
-            _APART = _new_pool(1)
-            # A worker waits for its own processes before the executor's exit handler would end them. They end when they
-            # are told through its queues, which close with priority 10.
-            Finalize(None, _APART.shutdown, exitpriority=20)
+        apart = _APART if _APART is not None and _APART.is_alive() else _Apart()
+        _APART = None  # whatever keeps it from answering ends it
         try:
-            _APART.submit(_nothing).result()  # wait for the start: the time from here on is the function's
-            longest_wait_s = 20.0 * longest_s if hasattr(signal, "setitimer") else longest_s
-            return _APART.submit(_counted, function, arguments, longest_s, most_bytes).result(longest_wait_s)
-        except TimeoutError:
-            for process in list(_APART._processes.values()):
-                process.kill()
-            _APART = None
-            raise BrokenProcessPool(f"no answer for {longest_wait_s:g} s") from None
-        except BrokenProcessPool:
-            _APART = None
+            succeeded, result = apart.call(function, arguments, longest_s, most_bytes)
+        except BaseException:
+            apart.kill()
             raise
+        _APART = apart
+    if not succeeded:
+        raise result
+    return cast("Result", result)
 
 
-def _nothing() -> None:
-    """Do nothing: a reply shows that the process has started."""
+class _Apart:
+    """A process that makes one call after another.
+
+    No pool: a pool's semaphores outlive a process that is killed, as workers are on Ctrl-C.
+    """
+
+    def __init__(self) -> None:
+        self._here, there = connection.Pipe()
+        self._process = _Process(target=_answer, args=(there,), daemon=True)
+        try:
+            self._process.start()
+            there.close()
+            self._here.recv()  # it has started: the time from here on is the functions'
+        except (OSError, EOFError) as error:
+            raise InputError(f"no process can be started ({error})", remedy="end other programs") from None
+
+    def is_alive(self) -> bool:
+        """Whether it runs, and is not that of the process from which this one was forked."""
+        return self._process._parent_pid == os.getpid() and self._process.is_alive()  # type: ignore[attr-defined]
+
+    def call(self, function: object, arguments: object, longest_s: float, most_bytes: int | None) -> tuple[bool, Any]:
+        """Return whether a call succeeded, and its result or error."""
+        longest_wait_s = 20.0 * longest_s if hasattr(signal, "setitimer") else longest_s
+        try:
+            self._here.send((function, arguments, longest_s, most_bytes))
+            if self._here.poll(longest_wait_s):
+                return cast("tuple[bool, Any]", self._here.recv())
+        except (OSError, EOFError):
+            raise BrokenProcessPool("the process died") from None
+        raise BrokenProcessPool(f"no answer for {longest_wait_s:g} s")
+
+    def kill(self) -> None:
+        self._process.kill()
+        self._process.join()
+        self._here.close()
+
+
+def _answer(there: Connection) -> None:
+    """Make the calls that come from the parent process, until it ends."""
+    _start_worker()
+    with suppress(EOFError, OSError):
+        there.send(None)
+        while True:
+            call = there.recv()
+            try:
+                there.send((True, _counted(*call)))
+            except Exception as error:  # noqa: BLE001 - raised again by the parent
+                error.add_note(format_exc())
+                there.send((False, error))
 
 
 def _counted(

@@ -8,6 +8,7 @@ import sys
 import time
 from concurrent.futures.process import BrokenProcessPool
 from importlib.util import find_spec
+from multiprocessing import get_all_start_methods
 from pathlib import Path
 
 import numpy as np
@@ -63,14 +64,17 @@ def work(paths):
         print(len(read_recording(path).channels), flush=True)
 
 if __name__ == "__main__":
-    process = get_context("spawn").Process(target=work, args=(sys.argv[1:],), daemon=True)
+    start, *paths = sys.argv[1:]
+    work(paths)
+    process = get_context(start).Process(target=work, args=(paths,), daemon=True)
     process.start()
     process.join()
     print("ended", process.exitcode)
 """
 
 
-def test_files_are_read_in_a_daemonic_process(tmp_path: Path) -> None:
+@pytest.mark.parametrize("start", get_all_start_methods())
+def test_files_are_read_in_a_daemonic_process(tmp_path: Path, start: str) -> None:
     paths = [Path(__file__).parents[1] / "sample_data" / "root_crack_0mm.h5"]
     if find_spec("asammdf") is not None:
         from asammdf import MDF, Signal
@@ -82,10 +86,10 @@ def test_files_are_read_in_a_daemonic_process(tmp_path: Path) -> None:
     script = tmp_path / "script.py"
     script.write_text(DAEMONIC)
     done = subprocess.run(
-        [sys.executable, str(script), *map(str, paths)], capture_output=True, text=True, check=True, timeout=120
+        [sys.executable, str(script), start, *map(str, paths)], capture_output=True, text=True, check=True, timeout=120
     )
     assert done.stdout.split()[-2:] == ["ended", "0"], done.stderr
-    assert len(done.stdout.split()) == len(paths) + 2
+    assert len(done.stdout.split()) == 2 * len(paths) + 2
     assert done.stderr == ""
 
 
