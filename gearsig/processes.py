@@ -273,8 +273,13 @@ class _Process(SpawnProcess):
     """
 
     def start(self) -> None:
-        with _STARTING, _script_out_of_sight(), _one_thread(), _not_daemonic():
-            super().start()
+        try:
+            with _STARTING, _script_out_of_sight(), _one_thread(), _not_daemonic(), _no_ctrl_c():
+                super().start()
+        except KeyboardInterrupt:  # nobody knows the process yet
+            if self._popen is not None:  # type: ignore[attr-defined]  # there is no public attribute
+                self.kill()
+            raise
 
 
 class _Context(SpawnContext):
@@ -290,6 +295,22 @@ def _not_daemonic() -> Iterator[None]:
         yield
     finally:
         here.daemon = before
+
+
+@contextmanager
+def _no_ctrl_c() -> Iterator[None]:
+    """Let a fresh process notice Ctrl-C only when `_start_worker` has decided what it does there: not as it imports."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    from multiprocessing import resource_tracker
+
+    resource_tracker.ensure_running()  # it would start, and let signals in, between this and the process
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextmanager
@@ -322,6 +343,8 @@ def _script_out_of_sight() -> Iterator[None]:
 def _start_worker() -> None:
     """Let Ctrl-C end a worker at once without a traceback, as the parent cleans up; end it with its parent."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     parent = parent_process()
     if parent is not None and hasattr(signal, "SIGIO"):
         # The kernel ends it when the parent's end of this pipe closes, even where compiled code holds the interpreter.

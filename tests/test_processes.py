@@ -38,11 +38,15 @@ def test_a_script_without_a_guard_runs_once(tmp_path: Path) -> None:
 
 
 APART_IN_A_WORKER = """
+import signal, sys, time
+from contextlib import suppress
 from functools import partial
 from gearsig.processes import call_apart, process_pool
 
-with process_pool(1) as pool:
-    print(pool.submit(partial(call_apart, abs, -2, longest_s=30.0)).result())
+signal.signal(signal.SIGINT, signal.default_int_handler)  # whoever runs the tests may ignore Ctrl-C
+with suppress(KeyboardInterrupt), process_pool(1) as pool:
+    print(pool.submit(partial(call_apart, abs, -2, longest_s=30.0)).result(), flush=True)
+    time.sleep(float(sys.argv[1]))
 print("ended")
 """
 
@@ -50,8 +54,20 @@ print("ended")
 def test_a_worker_that_called_a_function_apart_ends(tmp_path: Path) -> None:
     script = tmp_path / "script.py"
     script.write_text(APART_IN_A_WORKER)
-    done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=True, timeout=120)
+    command = [sys.executable, str(script), "0"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=120)
     assert done.stdout.split() == ["2", "ended"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C is sent to a group of processes")
+def test_a_worker_that_called_a_function_apart_ends_silently_on_ctrl_c(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(APART_IN_A_WORKER)
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen([sys.executable, str(script), "600"], start_new_session=True, **pipes) as running:
+        assert running.stdout.readline() == "2\n"
+        os.killpg(running.pid, signal.SIGINT)
+        assert running.communicate(timeout=60) == ("ended\n", "")
 
 
 DAEMONIC = """
