@@ -494,6 +494,13 @@ def test_a_dashboard_whose_output_nobody_reads_stops_when_it_is_told_to() -> Non
             server.kill()
 
 
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="Linux' /proc is a folder that nobody can write to")
+def test_a_demo_that_cannot_write_ends_before_its_work(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run(capsys, "demo", "-o", "/proc/report")
+    assert (code, out) == (2, "")
+    assert "-o" in err
+
+
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no device that is always full")
 def test_output_to_a_full_disk_is_one_line_and_a_code() -> None:
     command = [sys.executable, "-c", "from app.cli.main import main; main(['rig', 'example'])"]
