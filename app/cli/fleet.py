@@ -340,6 +340,7 @@ def watch(
             o = event.added.origin
             where = " ".join(part for part in (o.machine, o.point) if part)
             words = f"{where} {o.date:%Y-%m-%d %H:%M} {o.path.name}: {event.added.outcome}: {event.text}"
+            words += f" (no longer in the fleet as {event.added.replaced})" if event.added.replaced else ""
         typer.echo(
             f"{event.time:%Y-%m-%dT%H:%M:%SZ} {event.kind}: {words}", err=event.kind in ("problem", "passed over")
         )

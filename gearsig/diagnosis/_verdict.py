@@ -50,7 +50,13 @@ def ranked(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 
     def key(finding: Finding) -> tuple[bool, bool, int, float, float]:
         ratio = finding.strength.ratio_db if finding.strength is not None else None
-        return (finding.kind is not Kind.FAULT, finding.code != CHANGED, _RANK[finding.kind], -finding.confidence, -(ratio or 0.0))
+        return (
+            finding.kind is not Kind.FAULT,
+            finding.code != CHANGED,
+            _RANK[finding.kind],
+            -finding.confidence,
+            -(ratio or 0.0),
+        )
 
     return tuple(sorted(findings, key=key))
 
