@@ -49,6 +49,8 @@ def _compile_and_load(mark: Path) -> None:
 def _compile_or_say() -> None:
     """Compile all, or end with one line; Ctrl-C, which the terminal sends to this process too, ends it silently."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    if hasattr(os, "nice"):
+        os.nice(10)  # whoever opens a recording meanwhile goes first
     try:
         compile_all()
     except Exception as error:  # noqa: BLE001 - whatever it is, the server serves
