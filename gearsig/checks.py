@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from contextlib import suppress
 from functools import cache
 from os import PathLike
-from pathlib import PurePath
+from pathlib import Path, PurePath
 from types import UnionType
 from typing import Any, TypeVar, get_args, get_type_hints
 
@@ -208,6 +208,24 @@ def closest_match_hint(value: object, choices: Iterable[str]) -> str:
     named = {choice.casefold(): choice for choice in choices}
     matches = get_close_matches(str(value)[:200].casefold(), list(named), n=1)
     return f"did you mean {named[matches[0]]}?" if matches else ""
+
+
+def missing_file_hint(path: Path) -> str:
+    """Return the file of a similar name in the folder of a missing one, or else where it was looked for.
+
+    Endings do not count: all recordings of a folder may have the same.
+    """
+    from difflib import SequenceMatcher, get_close_matches
+
+    folder = path.parent.absolute()
+    if not folder.is_dir():
+        return f"there is no folder {path.parent}"
+    stem = path.stem.casefold()
+    with suppress(OSError):  # it may be closed to this user
+        for name in get_close_matches(path.name, [sibling.name for sibling in folder.iterdir()], n=10):
+            if SequenceMatcher(None, stem, Path(name).stem.casefold()).ratio() > 0.75:
+                return f"did you mean {name}? It was looked for in {folder}"
+    return f"it was looked for in {folder}"
 
 
 def frozen_array(values: Any, name: str, *, ndim: int, finite: bool = True) -> FloatArray:

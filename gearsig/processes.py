@@ -13,12 +13,13 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from itertools import islice
-from multiprocessing import connection, parent_process
+from multiprocessing import connection, current_process, parent_process
+from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnContext, SpawnProcess
-from multiprocessing.util import Finalize
 from pathlib import Path
 from threading import Lock, Thread
-from typing import Any, TypeVar
+from traceback import format_exc
+from typing import Any, TypeVar, cast
 
 from gearsig.errors import InputError
 
@@ -29,7 +30,7 @@ _THREAD_SETTINGS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"
 _MAIN = "__main__"
 _STARTING = Lock()
 _CALLING = Lock()
-_APART: ProcessPoolExecutor | None = None
+_APART: _Apart | None = None
 
 
 @contextmanager
@@ -142,32 +143,75 @@ def call_apart(
     ------
     MemoryError, or what the function makes of it
         If it asks for more.
+    InputError
+        If no process can be started.
     BrokenProcessPool
         If the process died, or exceeded the limit and was killed; the next call gets a new process.
     """
     global _APART  # noqa: PLW0603 - one process for all calls, which starts in a second
     with _CALLING:
-        if _APART is None:
-            _APART = ProcessPoolExecutor(1, mp_context=_Context(), initializer=_start_worker)
-            # A worker waits for its own processes before the executor's exit handler would end them. They end when they
-            # are told through its queues, which close with priority 10.
-            Finalize(None, _APART.shutdown, exitpriority=20)
+        apart = _APART if _APART is not None and _APART.is_alive() else _Apart()
+        _APART = None  # whatever keeps it from answering ends it
         try:
-            _APART.submit(_nothing).result()  # wait for the start: the time from here on is the function's
-            longest_wait_s = 20.0 * longest_s if hasattr(signal, "setitimer") else longest_s
-            return _APART.submit(_counted, function, arguments, longest_s, most_bytes).result(longest_wait_s)
-        except TimeoutError:
-            for process in list(_APART._processes.values()):
-                process.kill()
-            _APART = None
-            raise BrokenProcessPool(f"no answer for {longest_wait_s:g} s") from None
-        except BrokenProcessPool:
-            _APART = None
+            succeeded, result = apart.call(function, arguments, longest_s, most_bytes)
+        except BaseException:
+            apart.kill()
             raise
+        _APART = apart
+    if not succeeded:
+        raise result
+    return cast("Result", result)
 
 
-def _nothing() -> None:
-    """Do nothing: a reply shows that the process has started."""
+class _Apart:
+    """A process that makes one call after another.
+
+    No pool: a pool's semaphores outlive a process that is killed, as workers are on Ctrl-C.
+    """
+
+    def __init__(self) -> None:
+        self._here, there = connection.Pipe()
+        self._process = _Process(target=_answer, args=(there,), daemon=True)
+        try:
+            self._process.start()
+            there.close()
+            self._here.recv()  # it has started: the time from here on is the functions'
+        except (OSError, EOFError) as error:
+            raise InputError(f"no process can be started ({error})", remedy="end other programs") from None
+
+    def is_alive(self) -> bool:
+        """Whether it runs, and is not that of the process from which this one was forked."""
+        return self._process._parent_pid == os.getpid() and self._process.is_alive()  # type: ignore[attr-defined]
+
+    def call(self, function: object, arguments: object, longest_s: float, most_bytes: int | None) -> tuple[bool, Any]:
+        """Return whether a call succeeded, and its result or error."""
+        longest_wait_s = 20.0 * longest_s if hasattr(signal, "setitimer") else longest_s
+        try:
+            self._here.send((function, arguments, longest_s, most_bytes))
+            if self._here.poll(longest_wait_s):
+                return cast("tuple[bool, Any]", self._here.recv())
+        except (OSError, EOFError):
+            raise BrokenProcessPool("the process died") from None
+        raise BrokenProcessPool(f"no answer for {longest_wait_s:g} s")
+
+    def kill(self) -> None:
+        self._process.kill()
+        self._process.join()
+        self._here.close()
+
+
+def _answer(there: Connection) -> None:
+    """Make the calls that come from the parent process, until it ends."""
+    _start_worker()
+    with suppress(EOFError, OSError):
+        there.send(None)
+        while True:
+            call = there.recv()
+            try:
+                there.send((True, _counted(*call)))
+            except Exception as error:  # noqa: BLE001 - raised again by the parent
+                error.add_note(format_exc())
+                there.send((False, error))
 
 
 def _counted(
@@ -221,19 +265,52 @@ def can_be_sent(value: object) -> bool:
 
 
 class _Process(SpawnProcess):
-    """A fresh process that does not run the caller's script.
+    """A fresh process that does not run the caller's script, and that a daemonic process may start, too.
 
     Python would run it again in each, up to the point where processes are started: from a script without
-    `if __name__ == "__main__":`, which is common, none would ever start.
+    `if __name__ == "__main__":`, which is common, none would ever start. It keeps daemonic processes, such as Dask's
+    workers under a nanny, from starting any, as these would be left when they are ended: ours end with their parent.
     """
 
     def start(self) -> None:
-        with _STARTING, _script_out_of_sight(), _one_thread():
-            super().start()
+        try:
+            with _STARTING, _script_out_of_sight(), _one_thread(), _not_daemonic(), _no_ctrl_c():
+                super().start()
+        except KeyboardInterrupt:  # nobody knows the process yet
+            if self._popen is not None:  # type: ignore[attr-defined]  # there is no public attribute
+                self.kill()
+            raise
 
 
 class _Context(SpawnContext):
     Process = _Process
+
+
+@contextmanager
+def _not_daemonic() -> Iterator[None]:
+    """Temporarily let this process start others even if it is daemonic."""
+    here = current_process()
+    before, here.daemon = here.daemon, False
+    try:
+        yield
+    finally:
+        here.daemon = before
+
+
+@contextmanager
+def _no_ctrl_c() -> Iterator[None]:
+    """Let a fresh process notice Ctrl-C only when `_start_worker` has decided what it does there: not as it imports."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    from multiprocessing import resource_tracker
+
+    resource_tracker.ensure_running()  # it would start, and let signals in, between this and the process
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextmanager
@@ -266,6 +343,8 @@ def _script_out_of_sight() -> Iterator[None]:
 def _start_worker() -> None:
     """Let Ctrl-C end a worker at once without a traceback, as the parent cleans up; end it with its parent."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     parent = parent_process()
     if parent is not None and hasattr(signal, "SIGIO"):
         # The kernel ends it when the parent's end of this pipe closes, even where compiled code holds the interpreter.

@@ -253,7 +253,7 @@ def _hint(name: str, names: Sequence[str]) -> str:
     closest = closest_match_hint(name, names)
     words = get_close_matches(name.partition("_")[0], {n.partition("_")[0] for n in names}, n=1)
     if closest or not words:
-        return closest or "`gearsig simulate --list` shows them all"
+        return closest or "`gearsig simulate MODEL --list` shows them all"
     return f"there are {', '.join(n for n in names if n.partition('_')[0] == words[0])}"
 
 

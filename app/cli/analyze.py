@@ -117,10 +117,9 @@ def demo(
     """Diagnose the sample recordings, write a report of them, and say where it is."""
     from app.samples import samples
     from gearsig.diagnosis import analyze
-    from gearsig.report import analysis_text
+    from gearsig.report import analysis_text, check_writable
 
-    if output.exists() and not output.is_dir():
-        raise InputError("is a file, not a folder", where=str(output), remedy="choose another folder with -o")
+    check_writable(output)
     chosen = samples()
     first = next((s for s in chosen if "damaged" in s.recording.stem), chosen[0])
     typer.echo(f"$ gearsig analyze {first.recording}\n")

@@ -25,6 +25,7 @@ OPTIONS = (
     "browser.gatherUsageStats=false",
     "client.toolbarMode=minimal",
     "client.showErrorLinks=false",
+    "logger.level=warning",
     "runner.postScriptGC=false",  # the pages collect while nobody waits, see `work.collect_garbage_later`
 )
 """Flags override environment variables of the user; files are not read, see `_read_no_configuration`."""
@@ -40,6 +41,7 @@ def dashboard(
     _read_no_configuration()
     _hide_streamlit_offers()
     _print_also_to_nobody()
+    _say_where_it_is(port)
     with TemporaryDirectory(prefix="gearsig-") as folder:
         _tell_page_its_server(Path(folder))
         compiled.begin()
@@ -109,6 +111,18 @@ def _print_also_to_nobody() -> None:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
     cli_util.print_to_cli = print_if_read
+
+
+def _say_where_it_is(port: int) -> None:
+    """Print one line once the server answers, in place of Streamlit's own."""
+    from streamlit import cli_util
+    from streamlit.web import bootstrap
+
+    def say(is_running_hello: bool) -> None:
+        del is_running_hello
+        cli_util.print_to_cli(f"The dashboard is at http://localhost:{port} (Ctrl-C ends it).")
+
+    bootstrap._print_url = say
 
 
 def _tell_page_its_server(folder: Path) -> None:

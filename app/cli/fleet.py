@@ -145,7 +145,7 @@ def status(
     json: options.JsonOption = False,
 ) -> None:
     """Show the measuring points, the worst first: diagnosis of the last recording, alarms, largest increases."""
-    from gearsig.fleet import counts_text, trends_text
+    from gearsig.fleet import counts_text, diagnosis_text, trends_text
 
     table = _open(store).status()
     if machine:
@@ -161,7 +161,7 @@ def status(
             str(row["point"]) or "–",
             f"{row['last']:%Y-%m-%d %H:%M}",
             str(row["n_recordings"]) + (f" (+{row['n_failed']} failed)" if row["n_failed"] else ""),
-            str(row["outcome"] or "–"),
+            diagnosis_text(row),
             trends_text(row),
         )
         for row in shown.to_dict("records")
@@ -340,6 +340,7 @@ def watch(
             o = event.added.origin
             where = " ".join(part for part in (o.machine, o.point) if part)
             words = f"{where} {o.date:%Y-%m-%d %H:%M} {o.path.name}: {event.added.outcome}: {event.text}"
+            words += f" (no longer in the fleet as {event.added.replaced})" if event.added.replaced else ""
         typer.echo(
             f"{event.time:%Y-%m-%dT%H:%M:%SZ} {event.kind}: {words}", err=event.kind in ("problem", "passed over")
         )
@@ -435,6 +436,7 @@ def _show_added(result: AddResult, store: Path, workers: Cluster | None, *, json
     from gearsig.formatting import counted
 
     ran = workers.text() if workers else ""
+    replaced = [added for added in result.added if added.replaced]
     if json:
         failures = [{"file": str(a.origin.path), "reason": a.verdict} for a in result.failures]
         summary = {
@@ -442,11 +444,14 @@ def _show_added(result: AddResult, store: Path, workers: Cluster | None, *, json
             "known": result.n_known,
             "taken_by_others": result.n_elsewhere,
             "failures": failures,
+            "replaced": [{"file": str(a.origin.path), "earlier": a.replaced} for a in replaced],
             "excluded": _excluded_json(result.excluded),
             "ran": ran,
         }
         _print_json(summary)
         return
+    for moved in replaced:
+        typer.echo(f"{moved.origin.path}: no longer in the fleet as {moved.replaced}", err=True)
     for failure in result.failures:
         typer.echo(f"{failure.origin.path}: not analysed: {failure.verdict}", err=True)
     parts = [f"{counted(len(result.added) - len(result.failures), 'recording')} added to {store}"]

@@ -44,7 +44,8 @@ def simulate(
     output: Annotated[Path | None, options.output_option("Recording: .csv .h5 .parquet .wav or .mat.", "FILE")] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
     listing: Annotated[
-        bool, typer.Option("--list", help="Show models, presets, parameters with units and ranges, effects.")
+        bool,
+        typer.Option("--list", help="Show the models or, of one, presets, parameters with units and ranges, effects."),
     ] = False,
     check: Annotated[
         bool, typer.Option("--check", help="Check that a smaller time step changes nothing that matters.")
@@ -63,8 +64,7 @@ def simulate(
         if preset:
             typer.echo(preset_text(presets.preset(model or next(iter(registry.simulators())), preset)))
         else:
-            chosen = registry.simulators().values() if model is None else (registry.simulator(model),)
-            typer.echo("\n\n".join(_model_text(simulator) for simulator in chosen))
+            typer.echo(_model_text(registry.simulator(model)) if model else _models_text())
         return
     if mode:
         settings = [*(settings or []), f"mode={mode}"]
@@ -122,6 +122,22 @@ def preset_text(preset: Preset) -> str:
             )
     lines += ["", "Parameters (the others have the model's defaults)"]
     return "\n".join([*lines, *(f"  {name} = {value}" for name, value in preset.parameters.items())])
+
+
+def _models_text() -> str:
+    from sims import presets, registry
+
+    models = [
+        _columns(
+            [
+                (simulator.name, simulator.title),
+                ("", f"presets: {', '.join(presets.presets(simulator.name))}"),
+                ("", f"effects: {', '.join(simulator.effects) or 'none'}"),
+            ]
+        )
+        for simulator in registry.simulators().values()
+    ]
+    return "\n\n".join(["Models (all about one, with units and ranges: gearsig simulate MODEL --list)", *models])
 
 
 def _model_text(simulator: Simulator) -> str:

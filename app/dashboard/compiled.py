@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import os
+import signal
+import sys
 from contextlib import suppress
 from importlib.metadata import version
 from multiprocessing import get_context
@@ -12,7 +14,7 @@ from threading import Thread
 from time import sleep
 
 from gearsig.cache import cache_folder, keep
-from gearsig.errors import GearsigError
+from gearsig.errors import GearsigError, unexpected_text
 
 SERVER_FIRST_S = 5.0
 """Delay before compiled code is loaded, which would otherwise hold up the server and its first page."""
@@ -35,13 +37,24 @@ def is_being_made() -> bool:
 
 def _compile_and_load(mark: Path) -> None:
     # not a pool: the server would wait for it on exit
-    process = get_context("spawn").Process(target=compile_all, daemon=True)
+    process = get_context("spawn").Process(target=_compile_or_say, daemon=True)
     process.start()
     process.join()
     if process.exitcode == 0:
         keep(mark, lambda file: file.write(b"compiled\n"))
         run_every_model()
-    # otherwise the first simulation compiles the code and reports what is wrong
+    # otherwise the first answers compile the code and report what is wrong
+
+
+def _compile_or_say() -> None:
+    """Compile all, or end with one line; Ctrl-C, which the terminal sends to this process too, ends it silently."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    if hasattr(os, "nice"):
+        os.nice(10)  # whoever opens a recording meanwhile goes first
+    try:
+        compile_all()
+    except Exception as error:  # noqa: BLE001 - whatever it is, the server serves
+        sys.exit(f"Code could not be compiled ahead, so the first answers take longer: {unexpected_text(error)}")
 
 
 def compile_all() -> None:

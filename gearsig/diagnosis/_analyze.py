@@ -412,7 +412,10 @@ def _check_size(recording: Recording) -> None:
     where = recording.provenance.source or "recording"
     if recording.n_samples < MINIMUM_SAMPLES:
         raise InputError(
-            f"{recording.n_samples} samples are too few", where=where, allowed=f"{MINIMUM_SAMPLES} or more"
+            f"{recording.n_samples} samples are too few",
+            where=where,
+            allowed=f"{MINIMUM_SAMPLES} or more",
+            remedy="record at least ten revolutions of the slowest shaft",
         )
     if max(float(recording.samples.max()), -float(recording.samples.min())) > LARGEST_VALUE:
         allowed = f"values up to {LARGEST_VALUE:g}"

@@ -451,9 +451,9 @@ def p_text(p_value: float) -> str:
 
     Examples
     --------
-    >>> p_text(3.2e-4), p_text(5e-141)
-    ('3 × 10⁻⁴', '< 10⁻⁶')
+    >>> p_text(3.2e-4), p_text(0.0098), p_text(5e-141)
+    ('3 × 10⁻⁴', '0.01', '< 10⁻⁶')
     """
     if p_value < 1e-6:
         return "< 10⁻⁶"
-    return power_of_ten(p_value) if p_value < 0.01 else f"{p_value:.1g}"
+    return power_of_ten(p_value) if p_value < 0.0095 else f"{p_value:.1g}"

@@ -46,11 +46,17 @@ _RANK = {kind: i for i, kind in enumerate(Kind)}
 
 
 def ranked(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """Return the findings, most important first: by change, then by kind, confidence and strength."""
+    """Return the findings, most important first: faults, then by change, kind, confidence and strength."""
 
-    def key(finding: Finding) -> tuple[bool, int, float, float]:
+    def key(finding: Finding) -> tuple[bool, bool, int, float, float]:
         ratio = finding.strength.ratio_db if finding.strength is not None else None
-        return (finding.code != CHANGED, _RANK[finding.kind], -finding.confidence, -(ratio or 0.0))
+        return (
+            finding.kind is not Kind.FAULT,
+            finding.code != CHANGED,
+            _RANK[finding.kind],
+            -finding.confidence,
+            -(ratio or 0.0),
+        )
 
     return tuple(sorted(findings, key=key))
 

@@ -104,11 +104,15 @@ class AddedRecording:
         "fault", "suspicion", "cannot tell", "no fault", or "failed".
     verdict : str
         In one sentence; for a failure, the reason.
+    replaced : str
+        Machine, point and date under which the fleet held the result of this file, which this one replaces; empty if
+        it held none, or under the same.
     """
 
     origin: Origin
     outcome: str
     verdict: str
+    replaced: str = ""
 
     @property
     def failed(self) -> bool:
@@ -175,6 +179,7 @@ def add_recordings(
     results: list[AddedRecording] = []
     workers = min(max(len(missing), 1), n_processors()) if n_processes is None else n_processes
     claims: dict[str, ExitStack] = {}
+    earlier: dict[Origin, str] = {}
 
     def jobs() -> Iterator[_AnalysisJob]:
         remaining = iter(missing)
@@ -193,7 +198,7 @@ def add_recordings(
             of_content = _of_content(store, held)
             for origin, sha256 in held.items():
                 setup = setups(origin)
-                key, *before = of_content.get(origin, ("",))
+                key, *before, earlier[origin] = of_content.get(origin, ("", ""))
                 if before == [setup, __version__]:
                     unseen.append(origin)
                     claims.pop(_digest(_identity(origin, setup))).close()
@@ -207,7 +212,8 @@ def add_recordings(
                 if row["key"]:
                     store.add(row, indicators)
                 claims.pop(_digest(_identity(origin, setups(origin)))).close()
-                results.append(AddedRecording(origin, str(row["outcome"]), str(row["verdict"] or row["reason"])))
+                text = str(row["verdict"] or row["reason"])
+                results.append(AddedRecording(origin, str(row["outcome"]), text, earlier[origin]))
                 if on_progress is not None:
                     on_progress(len(results), len(missing), results[-1])
                 if len(results) % 64 == 0:
@@ -246,7 +252,7 @@ def analyse_file(job: _AnalysisJob) -> tuple[Row, list[Row], Origin]:
         if (analysis.recording.provenance.sha256 or sha256_of(path)) != job.sha256:  # no hash is computed of parts
             return _row(job, outcome=FAILED, reason="it was changed while it was read", key=""), [], job.origin
     except GearsigError as error:
-        return _row(job, outcome=FAILED, reason=str(error)), [], job.origin
+        return _row(job, outcome=FAILED, reason=str(error).removeprefix(f"{path.name}: ")), [], job.origin
     except Exception as error:  # noqa: BLE001 - one broken file must not stop the rest; the reason is passed on
         return _row(job, outcome=FAILED, reason=unexpected_text(error)), [], job.origin
     facts = _facts(analysis, job.options)
@@ -374,10 +380,10 @@ def _identity(origin: Origin, setup: str) -> tuple[Any, ...]:
 
 
 def _of_content(store: Store, files: Mapping[Origin, str]) -> dict[Origin, tuple[str, ...]]:
-    """Return key, setup and version of the latest result of a file's content for the same machine, point and date.
+    """Return key, setup, version and "" of the latest result of a file's content for the same machine, point and date.
 
-    If there is none, return only the key of a result that the new one replaces: that of the same file for another
-    machine, point or date, or its failure before it was copied completely.
+    If there is none, return the key of a result that the new one replaces: that of the same file for another machine,
+    point or date, with a text of these, or its failure before it was copied completely.
     """
     sql = (
         "SELECT sha256, machine, point, date, source, key, setup, version, outcome FROM recordings "
@@ -386,8 +392,10 @@ def _of_content(store: Store, files: Mapping[Origin, str]) -> dict[Origin, tuple
     )
     arguments = [[*files.values()], [_printable(origin.path) for origin in files]]
     rows = store.read(lambda connection: connection.execute(sql, arguments).fetchall())
-    of_place = {tuple(row[:4]): tuple(row[5:8]) for row in rows}
-    of_file = {(row[0], row[4]): row[5] for row in rows} | {row[4]: row[5] for row in rows if row[8] == FAILED}
+    of_place = {tuple(row[:4]): (*row[5:8], "") for row in rows}
+    of_file: dict[object, tuple[str, str]]
+    of_file = {(row[0], row[4]): (row[5], _place_text(*row[1:4])) for row in rows}
+    of_file |= {row[4]: (row[5], "") for row in rows if row[8] == FAILED}
     result: dict[Origin, tuple[str, ...]] = {}
     for origin, sha256 in files.items():
         place, source = (sha256, origin.machine, origin.point, origin.date), _printable(origin.path)
@@ -395,8 +403,12 @@ def _of_content(store: Store, files: Mapping[Origin, str]) -> dict[Origin, tuple
         if place in of_place:
             result[origin] = of_place[place]
         elif replaced is not None:
-            result[origin] = (replaced,)
+            result[origin] = replaced
     return result
+
+
+def _place_text(machine: str, point: str, date: datetime) -> str:
+    return ", ".join(part for part in (machine, point, f"{date:%Y-%m-%d %H:%M}") if part)
 
 
 def _nominal_speed_rpm(origin: Origin, options: AnalysisOptions) -> float | None:

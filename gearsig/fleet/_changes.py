@@ -157,6 +157,13 @@ def series_level(row: Mapping[Any, Any]) -> str:
     return level_name(int(row["level"]), str(row["basis"]))
 
 
+def diagnosis_text(row: Mapping[Any, Any]) -> str:
+    """Return what a measuring point's last conclusive recording shows, from a row of `Fleet.status`."""
+    if row["outcome"] in ("fault", "suspicion"):
+        return str(row["verdict"])
+    return row["outcome"] if isinstance(row["outcome"], str) else "–"  # missing where none could be analysed
+
+
 def trends_text(row: Mapping[Any, Any]) -> str:
     """Return a summary of a measuring point's trends, from a row of `Fleet.status`."""
     from pandas import isna

@@ -9,7 +9,7 @@ from datetime import UTC, datetime, timedelta
 from functools import cache
 from pathlib import Path
 
-from gearsig.checks import closest_match_hint
+from gearsig.checks import missing_file_hint
 from gearsig.errors import InputError
 from gearsig.formatting import counted, file_label
 from gearsig.rig import Rig, read_rig, rig_file_beside
@@ -267,9 +267,9 @@ def _check_is_there(path: Path) -> None:
         without_condition(path)[0].stat()
     except (OSError, ValueError) as error:
         problem = getattr(error, "strerror", None) or "the name is not possible"
-        names = [sibling.name for sibling in path.parent.iterdir()] if path.parent.is_dir() else []
-        remedy = closest_match_hint(path.name, names) or "check the name"
-        raise InputError(f"cannot be read ({problem})", where=file_label(path, whole=True), remedy=remedy) from None
+        raise InputError(
+            f"cannot be read ({problem})", where=file_label(path, whole=True), remedy=missing_file_hint(path)
+        ) from None
 
 
 def no_recordings(places: Iterable[str | Path], *, complaint: str = "") -> InputError:

@@ -240,7 +240,8 @@ def _from_utf16(path: Path) -> bytes:
 def foreign_errors(where: str, file_format: str) -> Iterator[None]:
     """Raise `InputError` if reading fails inside the block; gearsig's own errors pass, with the file's name added.
 
-    Check the caller's other arguments before the block, or the file is blamed for them.
+    So do errors of the program: failed assertions, and modules that cannot be imported. Check the caller's other
+    arguments before the block, or the file is blamed for them.
     """
     try:
         yield
@@ -254,7 +255,7 @@ def foreign_errors(where: str, file_format: str) -> Iterator[None]:
             allowed=error.allowed,
             remedy=error.remedy or "export it again",
         ) from error
-    except GearsigError:
+    except (GearsigError, AssertionError, ImportError):
         raise
     except MemoryError as error:
         raise InputError(

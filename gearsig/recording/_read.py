@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gearsig.checks import FloatArray, closest_match_hint, count, instance_of, positive, short
+from gearsig.checks import FloatArray, count, instance_of, missing_file_hint, positive, short
 from gearsig.errors import InputError, not_written
 from gearsig.formatting import counted, file_label
 from gearsig.recording._limits import CHUNK_BYTES, check_memory, foreign_errors, read_text_bytes
@@ -235,17 +235,18 @@ def identify(path: Path) -> FileFormat:
         status = path.stat()
     except (OSError, ValueError) as error:
         hint = ""
-        if path.parent.is_dir() and path.name:
-            names = [sibling.name for sibling in path.parent.iterdir()]
-            before = path.name.rpartition("#")[0]
-            hint = _columns_hint(path.with_name(before)) if before in names else closest_match_hint(path.name, names)
+        if path.name:
+            whole = path.with_name(path.name.rpartition("#")[0] or path.name)
+            hint = _columns_hint(whole) if whole != path and whole.exists() else missing_file_hint(path)
         reason = getattr(error, "strerror", None) or str(error)
         raise InputError(
             f"cannot be opened ({reason})", where=path.name or str(path), allowed="a readable file", remedy=hint
         ) from None
     if not stat.S_ISREG(status.st_mode):
-        kind = "a folder" if stat.S_ISDIR(status.st_mode) else "no regular file"
-        raise InputError(f"is {kind}", where=path.name or str(path), allowed="one file", remedy="name the file itself")
+        what, remedy = "is no regular file", "name the file itself"
+        if stat.S_ISDIR(status.st_mode):
+            what, remedy = "is a folder", "name a file in it, or analyse all of them: gearsig report FOLDER -o report"
+        raise InputError(what, where=path.name or str(path), allowed="one file", remedy=remedy)
     if status.st_size == 0:
         raise InputError("is empty", where=path.name, allowed="a file with data", remedy="copy or export it again")
     endings = [suffix.lower() for suffix in path.suffixes] or [""]

@@ -10,7 +10,17 @@ from typing import Any
 from gearsig import __version__
 from gearsig.cache import write_text
 from gearsig.errors import InputError
-from gearsig.fleet import AlarmChange, Fleet, FleetChanges, Trend, change_text, counts_text, fleet_changes, trends_text
+from gearsig.fleet import (
+    AlarmChange,
+    Fleet,
+    FleetChanges,
+    Trend,
+    change_text,
+    counts_text,
+    diagnosis_text,
+    fleet_changes,
+    trends_text,
+)
 from gearsig.formatting import moment_text, readable, unit_text
 from gearsig.plot import Picture, svg_panel, trend_panel
 from gearsig.report._files import compiled, date_text, render, write_pdf
@@ -41,7 +51,7 @@ def _page_values(fleet: Fleet, since: datetime | None) -> dict[str, Any]:
                 **{name: row[name] for name in ("level", "machine", "point", "n_recordings")},
                 "css_class": LEVEL_CLASSES[row["level"]],
                 "last": f"{row['last']:%Y-%m-%d %H:%M}",
-                "outcome": row["outcome"] or "–",
+                "outcome": diagnosis_text(row),
                 "trends": trends_text(row),
             }
             for row in status

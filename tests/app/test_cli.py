@@ -1,11 +1,14 @@
 """The command line: what it prints, its exit codes, and that bad input is one line."""
 
 import json
+import os
 import pickle
 import re
+import signal
 import socket
 import subprocess
 import sys
+import time
 import urllib.request
 from collections.abc import Callable
 from dataclasses import replace
@@ -444,13 +447,39 @@ def test_a_misspelt_method_has_a_suggestion(capsys: pytest.CaptureFixture[str]) 
     assert err.strip().endswith("did you mean spectrum?")
 
 
-@pytest.mark.slow
-@pytest.mark.skipif(sys.platform == "win32", reason="SIGTERM ends a process of Windows without asking it")
-def test_a_dashboard_whose_output_nobody_reads_stops_when_it_is_told_to() -> None:
+def dashboard_words() -> tuple[list[str], int]:
+    """Return the command that starts a dashboard, and its port."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    words = [sys.executable, "-m", "app.cli.main", "dashboard", "--port", str(port), "--no-browser"]
+    return [sys.executable, "-m", "app.cli.main", "dashboard", "--port", str(port), "--no-browser"], port
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C is sent to a group of processes")
+def test_a_dashboard_compiles_its_code_at_the_first_start_and_says_only_where_it_is(tmp_path: Path) -> None:
+    words, port = dashboard_words()
+    home = {"HOME": str(tmp_path), "GEARSIG_CACHE": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "numba")}
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    for n_looks in (10, 1200):  # Ctrl-C at once, then when the code is compiled
+        with subprocess.Popen(words, env=os.environ | home, start_new_session=True, **pipes) as server:
+            assert server.stdout is not None
+            said = server.stdout.readline()
+            for _ in range(n_looks):
+                if list(tmp_path.glob("compiled/*")):
+                    break
+                time.sleep(0.1)
+            os.killpg(server.pid, signal.SIGINT)
+            _, errors = server.communicate(timeout=60)
+        assert f"http://localhost:{port} " in said
+        assert errors == ""
+    assert list(tmp_path.glob("compiled/*"))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="SIGTERM ends a process of Windows without asking it")
+def test_a_dashboard_whose_output_nobody_reads_stops_when_it_is_told_to() -> None:
+    words, port = dashboard_words()
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as server:
         assert server.stdout is not None
         server.stdout.readline()
@@ -463,6 +492,13 @@ def test_a_dashboard_whose_output_nobody_reads_stops_when_it_is_told_to() -> Non
             assert server.wait(20) == 0
         finally:
             server.kill()
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="Linux' /proc is a folder that nobody can write to")
+def test_a_demo_that_cannot_write_ends_before_its_work(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run(capsys, "demo", "-o", "/proc/report")
+    assert (code, out) == (2, "")
+    assert "-o" in err
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no device that is always full")

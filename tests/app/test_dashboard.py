@@ -61,6 +61,14 @@ def test_what_the_start_page_offers_first_is_compiled_first(monkeypatch) -> None
     assert done == [SAMPLES["damaged_tooth"].recording.name, "models"]
 
 
+def test_code_that_cannot_be_compiled_ahead_is_one_line(monkeypatch) -> None:
+    monkeypatch.setattr("signal.signal", lambda *_: None)  # this process keeps its own
+    monkeypatch.setattr(compiled, "compile_all", lambda: 1 / 0)
+    with pytest.raises(SystemExit, match=r"compiled ahead.*ZeroDivisionError") as caught:
+        compiled._compile_or_say()
+    assert "\n" not in str(caught.value)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name if name in OF_EACH_KIND else further(name) for name in sorted(SAMPLES)])
 def test_every_sample_opens_in_every_view(name: str) -> None:

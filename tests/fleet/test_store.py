@@ -67,8 +67,10 @@ def test_a_reference_is_a_file_that_is_there_or_a_run_in_it(make_recordings, tmp
 def test_a_result_under_a_wrong_name_is_replaced(make_recordings, tmp_path):
     data = make_recordings("pump 1", [1.0, 1.1])
     fleet = open_fleet(tmp_path / "store", create=True)
-    fleet.add(data, machine="pmup", n_processes=1)
-    fleet.add(data, pattern=PATTERN, n_processes=1)
+    wrong = fleet.add(data, machine="pmup", n_processes=1)
+    right = fleet.add(data, pattern=PATTERN, n_processes=1)
+    assert not any(added.replaced for added in wrong.added)
+    assert all(added.replaced.startswith("pmup, ") for added in right.added)
     for _ in range(2):
         assert set(fleet.recordings()["machine"]) == {"pump 1"}
         assert set(fleet.indicators()["machine"]) == {"pump 1"}
@@ -151,6 +153,7 @@ def test_an_unreadable_recording_is_kept_as_a_failure_until_it_changes(make_reco
     first = fleet.add(data, pattern=PATTERN, n_processes=1)
     assert [a.origin.path.name for a in first.failures] == ["DE_20260102.csv"]
     assert "abc" in first.failures[0].verdict
+    assert victim.name not in first.failures[0].verdict  # whoever prints it names the file
     assert not fleet.add(data, pattern=PATTERN, n_processes=1).added
     assert list(fleet.status()["n_failed"]) == [1]
     victim.write_bytes(whole)

@@ -113,7 +113,10 @@ def test_content_of_another_kind(tmp_path, extension, content, said):
 def test_names_that_are_no_files(tmp_path):
     (tmp_path / "recording.csv").write_text("a\n1\n2\n")
     assert "did you mean recording.csv?" in str(refused_missing(tmp_path / "recordng.csv"))
-    refused(tmp_path, "is a folder")
+    unlike = str(refused_missing(tmp_path / "machine12.csv"))
+    assert "did you mean" not in unlike
+    assert str(tmp_path) in unlike
+    refused(tmp_path, "is a folder.*gearsig report")
     os.mkfifo(tmp_path / "pipe.csv")
     refused(tmp_path / "pipe.csv", "no regular file")
     (tmp_path / "x.xyz").write_text("1,2\n")

@@ -300,6 +300,16 @@ class TestMat73AndHdf5:
         assert [(c.name, c.unit) for c in r.channels] == [("a", "m/s^2"), ("b", "")]
         assert r.sampling_rate_hz == 64
 
+    def test_a_program_error_does_not_blame_the_file(self, tmp_path, monkeypatch):
+        def broken(*_, **__):
+            raise AssertionError
+
+        with h5py.File(tmp_path / "x.h5", "w") as f:
+            f["a"] = X
+        monkeypatch.setattr(h5py, "File", broken)
+        with pytest.raises(AssertionError):
+            read_recording(tmp_path / "x.h5")
+
     def test_links_out_of_the_file_are_not_followed(self, tmp_path):
         with h5py.File(tmp_path / "secret.h5", "w") as f:
             f["s"] = X

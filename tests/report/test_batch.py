@@ -77,7 +77,9 @@ def test_a_mistyped_path_is_refused_before_anything_is_written(recordings, tmp_p
     (tmp_path / "no_recordings").mkdir()
     files = [tmp_path / wrong] if wrong == "no_recordings" else [recordings[0], tmp_path / wrong]
     message = (
-        r"there are no recordings \(allowed: .*\.csv.*\.wav" if wrong == "no_recordings" else "cannot be read .*check"
+        r"there are no recordings \(allowed: .*\.csv.*\.wav"
+        if wrong == "no_recordings"
+        else "cannot be read .*it was looked for in"
     )
     with pytest.raises(InputError, match=message):
         report_many(files, tmp_path / "out", n_processes=1)
