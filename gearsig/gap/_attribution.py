@@ -41,7 +41,7 @@ from gearsig.gap._report import (
 )
 from gearsig.gap._simulator import GapEffect, Twin
 from gearsig.gap._trials import TriedEffect, try_effects
-from gearsig.severity import OTHER, TOOTH_FAULTS
+from gearsig.severity import OTHER, SINGLE_TOOTH_FAULTS, TOOTH_FAULTS
 
 CALIBRATION_FILE = Path(__file__).with_name("calibration.json")
 
@@ -292,12 +292,13 @@ class Attribution(Generic[TriedT]):
     def outcome(
         self, probabilities: Mapping[str, float], known: Mapping[str, GapEffect] = MappingProxyType({})
     ) -> GapOutcome:
-        """Return the outcome, see `GapCalibration.outcome`; a gap within its floor that shows no cause is none.
+        """Return the outcome, see `GapCalibration.outcome`; a gap within its floor is none, if nothing is likelier.
 
-        Healthy machines differ by as much, whatever else is possible.
+        Healthy machines differ by as much.
         """
         outcome = self.calibration.outcome(probabilities, known)
-        return GapOutcome.NO_GAP if outcome is GapOutcome.UNDECIDED and self.size <= 1.0 else outcome
+        is_none = self.size <= 1.0 and probabilities[NONE] >= max(probabilities.values())
+        return GapOutcome.NO_GAP if outcome is GapOutcome.UNDECIDED and is_none else outcome
 
 
 MAX_TRIED, MIN_TRIED_PROBABILITY = 3, 0.06
@@ -321,7 +322,7 @@ def with_likelihoods(probabilities: Mapping[str, float], matches: Mapping[str, f
     """
     likelihoods = dict(matches)
     if OTHER in matches:
-        of_teeth = [value for name, value in matches.items() if name != OTHER] or [matches[OTHER]]
+        of_teeth = [value for name, value in matches.items() if name in SINGLE_TOOTH_FAULTS] or [matches[OTHER]]
         unknown = log(0.5 * (float(np.mean(np.exp(of_teeth))) + exp(matches[OTHER])))
         likelihoods = {**dict.fromkeys(probabilities, matches[OTHER]), UNKNOWN: unknown, **matches}
     counted = {name: value for name, value in likelihoods.items() if name in probabilities}

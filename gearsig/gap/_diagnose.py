@@ -502,14 +502,16 @@ def _encoder_evidence(
     conditions: Sequence[Condition], recordings: Sequence[Recording], references: Sequence[Recording]
 ) -> tuple[ToothErrorEvidence | None, list[str]]:
     """Return the evidence from encoders at all conditions with a reference, and what they show or why nothing."""
-    of = {recording.name: recording for recording in (*references, *recordings)}
+    of_name, reference_of_name = ({one.name: one for one in several} for several in (recordings, references))
     refusals: list[str] = []
-    evidences = [
-        answer_or_none(partial(tooth_error_evidence, of[c.facts.name], of[c.facts.reference]), c.facts.name, refusals)
-        for c in conditions
-        if c.facts.reference
-    ]
-    together = combined_evidence([evidence for evidence in evidences if evidence is not None])
+    evidences = []
+    for condition in conditions:
+        if condition.facts.reference:
+            both = of_name[condition.facts.name], reference_of_name[condition.facts.reference]
+            evidence = answer_or_none(partial(tooth_error_evidence, *both), condition.facts.name, refusals)
+            if evidence is not None:
+                evidences.append(evidence.with_load(condition.tooth_load_n_per_mm, condition.now.frame.teeth))
+    together = combined_evidence(evidences)
     shown = [] if together is None else [together.text]
     return together, [*shown, *(f"No evidence from the encoders: {refusal}." for refusal in refusals)]
 

@@ -7,15 +7,11 @@ damaged tooth; it was learned by `python -m app.studies.gap.tooth_errors`.
 
 from gearsig.severity._estimate import (
     LARGEST_TORQUE_CHANGE,
-    TEETH_COUNT,
     GearEvidence,
     estimate_crack,
     gear_evidence,
-    pair_facts,
     pair_lines,
-    percent_per_mm,
     reach_of,
-    root_thickness_mm,
 )
 from gearsig.severity._features import (
     FEATURES,
@@ -25,6 +21,7 @@ from gearsig.severity._features import (
     SHAPE,
     SHAPED,
     Conditions,
+    ReferenceRefusalError,
     ShaftLines,
     band_envelopes,
     band_signal,
@@ -53,6 +50,7 @@ from gearsig.severity._model import (
     OTHER_DAMAGE,
     RELIEF_KNOWN,
     SPALLED,
+    TEETH_COUNT,
     WITH_REFERENCE,
     Calibration,
     CrackEstimate,
@@ -60,10 +58,12 @@ from gearsig.severity._model import (
     KindModel,
     NoCrackSeen,
     ToothSearch,
+    UnlikeCracksError,
     kind_vector,
     load_calibration,
     segments,
 )
+from gearsig.severity._pair import pair_facts, percent_per_mm, root_thickness_mm
 from gearsig.severity._tooth_error import (
     CRACK,
     OTHER,
@@ -116,10 +116,12 @@ __all__ = [
     "KindModel",
     "KnownToothErrors",
     "NoCrackSeen",
+    "ReferenceRefusalError",
     "ShaftLines",
     "ToothErrorChange",
     "ToothErrorEvidence",
     "ToothSearch",
+    "UnlikeCracksError",
     "band_envelopes",
     "band_signal",
     "combined_evidence",

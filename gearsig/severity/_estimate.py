@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from math import cos, exp, hypot, log, pi, radians, sin, tan
-from typing import Any
+from math import exp, log
 
 import numpy as np
 
-from gearsig.checks import FloatArray, instance_of, listed, positive, within
-from gearsig.errors import InputError, RefusalError, answer_or_none
+from gearsig.checks import FloatArray, instance_of, listed, within
+from gearsig.errors import InputError, RefusalError
 from gearsig.formatting import percent
 from gearsig.prepared import PreparedRecording, prepare
 from gearsig.recording import Recording, check_recording
-from gearsig.rig import SIDES, GearPair, Rig
+from gearsig.rig import GearPair, Rig
+from gearsig.severity._encoders import with_assumption, with_encoders
 from gearsig.severity._features import (
     DB_OF_LOG_ENERGY,
     FEATURES,
@@ -43,29 +43,21 @@ from gearsig.severity._features import (
 )
 from gearsig.severity._model import (
     ALONE,
-    CHIPPED,
-    CRACKED,
-    KINDS,
-    NORMAL_90,
+    LARGEST_BOUND_PERCENT,
+    NO_MARK,
     RELIEF_KNOWN,
-    SPALLED,
+    TEETH_COUNT,
     WITH_REFERENCE,
     Calibration,
     CrackEstimate,
     DepthModel,
     NoCrackSeen,
     ToothSearch,
+    UnlikeCracksError,
     kind_vector,
     load_calibration,
 )
-from gearsig.severity._tooth_error import (
-    CLEARLY_A_TOOTH,
-    CRACK,
-    UNDECIDED,
-    ToothErrorEvidence,
-    load_known_tooth_errors,
-    tooth_error_evidence,
-)
+from gearsig.severity._pair import PairFacts, finite_element_percent, pair_facts, percent_per_mm
 
 MIN_HARMONICS = 4
 """Mesh harmonics needed below the highest order: with fewer, one resonance decides."""
@@ -204,80 +196,6 @@ def _check_harmonics(shaft: ShaftLines, whose: str = "the recording's") -> None:
         raise RefusalError("a channel holds no mesh vibration at all", remedy="leave the dead channel out")
 
 
-PRESSURE_ANGLE_DEG = 20.0
-"""Of every machine in the calibration."""
-
-
-@dataclass(frozen=True)
-class PairFacts:
-    """A spur gear pair for which all data that the calibration needs are known.
-
-    Parameters
-    ----------
-    pair : GearPair
-    driver_teeth, driven_teeth : int
-    module_mm, face_width_mm : float
-    load_mpa : float
-        Tangential force at the pitch circle per face width and module.
-    """
-
-    pair: GearPair
-    driver_teeth: int
-    driven_teeth: int
-    module_mm: float
-    face_width_mm: float
-    load_mpa: float
-
-
-def pair_facts(rig: Rig, torque_nm: float | None) -> PairFacts:
-    """Return the data of the rig's gear pair that the calibration needs.
-
-    Parameters
-    ----------
-    rig : Rig
-    torque_nm : float or None
-        On the shaft that the rig's operating point names; None: the operating point's torque.
-
-    Raises
-    ------
-    InputError
-        If the torque is not above zero.
-    RefusalError
-        If there is not exactly one pair, data are missing, or the pressure angle is not the calibration's.
-    """
-    if torque_nm is not None:
-        positive(torque_nm, "torque_nm", "N m")
-    if not rig.pairs:
-        raise RefusalError(
-            "no rig file describes a gear pair: teeth, module, face width and torque are needed",
-            remedy="give a rig file; `gearsig rig example` prints one to start from",
-        )
-    if len(rig.pairs) != 1:
-        raise RefusalError(
-            f"the rig has {len(rig.pairs)} gear pairs; crack severity is calibrated for one",
-            remedy="describe the pair in question alone, if the others are far away",
-        )
-    pair, torque = rig.pairs[0], torque_nm if torque_nm is not None else rig.operating_point.torque_nm
-    driver, driven, module_mm, width_mm = pair.driver_teeth, pair.driven_teeth, pair.module_mm, pair.face_width_mm
-    if not (driver and driven and module_mm and width_mm and torque):
-        known = {"driver_teeth": driver, "driven_teeth": driven, "module_mm": module_mm, "face_width_mm": width_mm}
-        missing = [name for name, value in (known | {"torque_nm of the operating point": torque}).items() if not value]
-        raise RefusalError(
-            f"the rig file does not give {', '.join(missing)}: the size of a crack's effect depends on it",
-            remedy="complete the rig file; the torque may be given with the call",
-        )
-    angle = pair.pressure_angle_deg
-    if angle is not None and abs(angle - PRESSURE_ANGLE_DEG) > 0.5:
-        raise RefusalError(
-            f"the pressure angle is {angle:g}°, the calibration has {PRESSURE_ANGLE_DEG:g}°",
-            remedy="make a calibration for such gears",
-        )
-    shaft = rig.operating_point.shaft or rig.reference_shaft
-    turns = rig.ratio(shaft, to=pair.driver) or 1.0  # same power: torque falls as speed rises
-    force_n = abs(torque) * turns / (0.5e-3 * module_mm * driver)
-    return PairFacts(pair, driver, driven, module_mm, width_mm, force_n / (width_mm * module_mm))
-
-
 def acceleration_channels(recording: Recording, chosen: tuple[str, ...], whose: str = "") -> tuple[str, ...]:
     """Return the chosen channels, or all acceleration channels; other quantities weight frequencies differently.
 
@@ -400,95 +318,6 @@ def share_of_the_recording(now: ShaftLines, difference: ShaftLines, event: Tooth
     return float(shares.mean()), float(shares.std() / np.sqrt(shares.size))
 
 
-def root_thickness_mm(teeth: int, module_mm: float, pressure_angle_deg: float = 20.0) -> float:
-    """Return the thickness of the tooth at the middle of its fillet, where cracks start.
-
-    The fillet is generated by the rack's tip rounding. The contact normal is at angle γ to the pitch line, here half
-    way between α and π/2. With the rounding's centre h below the pitch line and b₁ beside the tooth's centre:
-
-    φ = (h/tan γ + b₁)/r,  L = h/sin γ + ρ,  thickness = 2 (r sin φ − L cos(γ − φ))
-
-    Parameters
-    ----------
-    teeth : int
-    module_mm : float
-    pressure_angle_deg : float
-
-    Returns
-    -------
-    float
-        In mm. Without profile shift.
-
-    References
-    ----------
-    F. L. Litvin, A. Fuentes, *Gear Geometry and Applied Theory*, 2nd ed., 2004 (generation by a rack).
-
-    Examples
-    --------
-    >>> round(root_thickness_mm(55, 2.0), 2)
-    4.79
-    """
-    alpha = radians(pressure_angle_deg)
-    gamma = 0.5 * (pi / 2.0 + alpha)
-    tip_radius = 0.38  # of the standard rack, in modules, as its dedendum of 1.25 (ISO 53, profile A)
-    h = 1.25 - tip_radius
-    b1 = pi / 4.0 + h * tan(alpha) + tip_radius / cos(alpha)
-    r = 0.5 * teeth
-    phi = (h / tan(gamma) + b1) / r
-    reach = h / sin(gamma) + tip_radius
-    return 2.0 * module_mm * (r * sin(phi) - reach * cos(gamma - phi))
-
-
-def percent_per_mm(teeth: int, module_mm: float, pressure_angle_deg: float = 20.0) -> float:
-    """Return the percentage of the root's thickness that 1 mm of crack takes, 100 sin 45°/s_F.
-
-    The crack runs at 45° to the tooth's centre line.
-
-    Parameters
-    ----------
-    teeth : int
-    module_mm : float
-        Normal module, mm.
-    pressure_angle_deg : float
-        Normal pressure angle, degrees.
-
-    Returns
-    -------
-    float
-        Per cent per mm.
-    """
-    return 100.0 * sin(radians(45.0)) / root_thickness_mm(teeth, module_mm, pressure_angle_deg)
-
-
-TEETH_COUNT = "Teeth count from 1 at the mark in order of engagement; the place is good to about one tooth."
-"""Beside the number of a tooth."""
-
-NO_MARK = "There is no mark on this shaft: the angle holds for this record only, and names no tooth."
-ASSUMED = (
-    "The depth assumes a crack through the whole face width, in a tooth that gives way as those of the calibration do. "
-    "In finite-element teeth, which give way more, the same change is a crack of {depth_mm:.1f} mm; the interval holds "
-    "for both."
-)
-
-FINITE_ELEMENT_DEPTHS = np.array(
-    [[0.0, 10, 15, 20, 30, 40, 50, 60, 70, 100], [0.0, 8, 11.3, 13.3, 18.0, 23.1, 28.6, 34.7, 42.0, 60.0]]
-)
-"""Depths of cracks in percent of the root: in the calibration's teeth, and in finite-element teeth in which they change
-the static transmission error as much, within a tenth for gears of 19 to 62 teeth under 20 to 100 N/mm² per face width
-and module (`tests/benchmarks/cracked_teeth.py`; the first and the last are extrapolated)."""
-
-
-def finite_element_percent(percent: float) -> float:
-    """Return how deep a crack is, in percent of the root, if the tooth gives way as finite elements do.
-
-    Parameters
-    ----------
-    percent : float
-        If it gives way as those of the calibration do.
-    """
-    return float(np.interp(percent, *FINITE_ELEMENT_DEPTHS))
-
-
 SMALLEST_AGREEMENT = 0.4
 """Agreement of the tooth pattern with the reference's: other gears reach 0.38 once in a hundred cases; the right ones
 fall below it only where a deep crack dominates the pattern."""
@@ -498,9 +327,6 @@ CLEARLY_OF_THE_REFERENCE, STANDARD_ERRORS = -0.2, 3.0
 a visible crack, two came so low; with recording and reference exchanged, 54 of 68 did (seed 9158)."""
 
 WEAKER = "Something at one tooth stands out, but is weaker, over the mesh, than the calibration's shallowest cracks."
-
-LARGEST_BOUND_PERCENT = 50.0
-"""Percent of the root: "no crack seen, below 70 %" would be no answer."""
 
 CLEARLY_LARGER = log(1.3)
 """Logarithm of the ratio of both gears' prominences from which the gear counts as certain."""
@@ -596,38 +422,11 @@ def estimate_crack(
         within(tip_relief_um, "tip_relief_um", 0.0, round(max_relief_um), "µm", remedy=remedy)
     chosen = listed(channels, "channels", str)
     if reference is None:
-        return _by_vibration(prepared, None, facts, used, chosen, tip_relief_um)
+        return with_assumption(_by_vibration(prepared, None, facts, used, chosen, tip_relief_um))
     before = prepare(reference, prepared.rig)
     check_same_rig(prepared.rig, before.rig)
-    unseen: list[str] = []
-    ask = partial(tooth_error_evidence, prepared.recording, before.recording, prepared.rig)
-    encoders = answer_or_none(ask, "No evidence from the encoders", unseen, let_through=ReferenceRefusalError)
-
-    def by_encoders(evidence: ToothErrorEvidence, odds: float, shaft: str = "") -> CrackEstimate | None:
-        ask = partial(_by_encoders, evidence, prepared, before, facts, odds, shaft)
-        return answer_or_none(ask, "No estimate from the encoders", unseen)
-
-    answer: CrackEstimate | NoCrackSeen
-    try:
-        answer = _by_vibration(prepared, before, facts, used, chosen, tip_relief_um)
-    except ReferenceRefusalError:
-        raise
-    except RefusalError as refusal:
-        if encoders is None:
-            raise
-        alone: CrackEstimate | NoCrackSeen | None
-        alone = by_encoders(encoders, CLEARLY_A_TOOTH) if encoders.is_seen else _none_by_encoders(encoders, facts)
-        why = f"By the vibration there is no estimate: {refusal.reason}"
-        if alone is None:
-            both = f"{encoders.text} {why}"
-            raise RefusalError(both, remedy=refusal.remedy, looked_at=refusal.looked_at) from None
-        answer = replace(alone, reasons=(*alone.reasons, f"{why}."))
-    else:
-        # Where the vibration shows a damaged tooth, the encoders need not show it as clearly.
-        shown = (UNDECIDED, answer.shaft) if isinstance(answer, CrackEstimate) else (CLEARLY_A_TOOTH, "")
-        if encoders is not None:
-            answer = _together(answer, encoders, by_encoders(encoders, *shown), facts)
-    return replace(answer, reasons=(*answer.reasons, *(f"{reason}." for reason in unseen)))
+    by_vibration = partial(_by_vibration, prepared, before, facts, used, chosen, tip_relief_um)
+    return with_encoders(by_vibration, prepared, before, facts)
 
 
 def _by_vibration(
@@ -667,158 +466,6 @@ def _by_vibration(
     way = ALONE if before is None else WITH_REFERENCE
     answer = judge(evidence, used.models[way + ("" if tip_relief_um is None else RELIEF_KNOWN)], used, facts)
     return replace(answer, reasons=(*answer.reasons, *doubts)) if doubts else answer
-
-
-KIND_OF_FAULT = {CRACK: CRACKED, "chipped_tooth": CHIPPED, "tooth_spall": SPALLED}
-FAULT_PRIORS = {CRACKED: 0.5, CHIPPED: 0.25, SPALLED: 0.25}
-"""As in `KindModel`."""
-
-ASSUMED_BY_ENCODERS = (
-    "The depth by the encoders follows from the size of the change and the load, for a crack through the whole face "
-    "width; its interval holds for rack-shaped and for finite-element teeth."
-)
-
-
-def _by_encoders(
-    encoders: ToothErrorEvidence,
-    prepared: PreparedRecording,
-    before: PreparedRecording,
-    facts: PairFacts,
-    odds: float,
-    shaft: str = "",
-) -> CrackEstimate | None:
-    """Return the estimate from the transmission error; None below these odds of a damaged tooth.
-
-    Where both gears show the change, that on `shaft` is meant.
-
-    Raises
-    ------
-    RefusalError
-        If encoders are not known to show the depth at this load or with this gear.
-    """
-    if encoders.odds_of_a_tooth < odds:
-        return None
-    weights = {KIND_OF_FAULT[name]: p * FAULT_PRIORS[KIND_OF_FAULT[name]] for name, p in encoders.probabilities.items()}
-    is_driven = encoders.gear == SIDES[1] or (not encoders.gear and shaft == facts.pair.driven)
-    shaft, teeth = ((facts.pair.driver, facts.driver_teeth), (facts.pair.driven, facts.driven_teeth))[is_driven]
-    log_percent, half_width = _log_percent_by_encoders(encoders, facts, teeth)
-    place_rev, has_mark = encoders.places_rev[SIDES[is_driven]], prepared.has_mark(shaft)
-    doubts = [
-        f"{whose}{problem.text}; the encoders may be wrong for it."
-        for whose, of in (("", prepared), ("The reference: ", before))
-        for problem in of.grave_problems([c.name for c in of.recording.channels if c.quantity == "encoder"])
-    ]
-    return CrackEstimate(
-        shaft=shaft,
-        gear=f"{facts.pair.name}/{shaft}",
-        tooth=int(place_rev * teeth) % teeth + 1 if has_mark else None,
-        angle_deg=360.0 * place_rev,
-        gear_is_certain=bool(encoders.gear),
-        **_depth(log_percent, half_width, percent_per_mm(teeth, facts.module_mm)),
-        p_value=1.0 / encoders.odds_of_a_tooth,
-        with_reference=True,
-        reasons=(encoders.text, TEETH_COUNT if has_mark else NO_MARK, ASSUMED_BY_ENCODERS, *doubts),
-        kind_probabilities={kind: weights[kind] / sum(weights.values()) for kind in KINDS},
-    )
-
-
-def _none_by_encoders(encoders: ToothErrorEvidence, facts: PairFacts) -> NoCrackSeen | None:
-    """Return below which depth a crack would change the transmission error by less than its noise; None if too deep."""
-    limits = []
-    for teeth in (facts.driver_teeth, facts.driven_teeth):
-        try:
-            log_percent, half_width = _log_percent_by_encoders(encoders, facts, teeth)
-        except RefusalError:
-            return None
-        percent = exp(log_percent + half_width)  # 95 % of cracks that change it so little are less deep
-        limits.append((percent / percent_per_mm(teeth, facts.module_mm), percent))
-    below_mm, below_percent = max(limits)
-    if below_percent > LARGEST_BOUND_PERCENT:
-        return None
-    return NoCrackSeen(below_mm, below_percent, 1.0, True, reasons=(encoders.text, ASSUMED_BY_ENCODERS))
-
-
-def _log_percent_by_encoders(encoders: ToothErrorEvidence, facts: PairFacts, teeth: int) -> tuple[float, float]:
-    """Return ln of a crack's depth in percent of the root, and the half width of its 90 % interval.
-
-    Raises
-    ------
-    RefusalError
-        If the load or the number of teeth is beyond those of known cracks, or the depth would be.
-    """
-    known, normal_mpa = load_known_tooth_errors(), facts.load_mpa / cos(radians(PRESSURE_ANGLE_DEG))
-    log_percent, spread = known.log_percent(encoders.rms_um, normal_mpa * facts.module_mm, teeth)
-    known.check_reach(normal_mpa, teeth, exp(log_percent - spread))
-    return log_percent, NORMAL_90 * spread
-
-
-def _depth(log_percent: float, half_width: float, percent_per_mm: float) -> dict[str, Any]:
-    """Return the fields of a `CrackEstimate` that state the depth; the interval is of ln(percent)."""
-    low, percent, high = (min(exp(log_percent + n * half_width), 100.0) for n in (-1.0, 0.0, 1.0))
-    return {
-        "depth_mm": percent / percent_per_mm,
-        "depth_percent": percent,
-        "interval_mm": (low / percent_per_mm, high / percent_per_mm),
-        "interval_percent": (low, high),
-    }
-
-
-def _together(
-    answer: CrackEstimate | NoCrackSeen, encoders: ToothErrorEvidence, alone: CrackEstimate | None, facts: PairFacts
-) -> CrackEstimate | NoCrackSeen:
-    """Return the answer from vibration and encoders together.
-
-    Two estimates of ln(depth) are independent and weighted by their inverse variances; kinds are multiplied. Where they
-    name different teeth, or depths that exclude each other, the answer is that of the vibration.
-
-    Parameters
-    ----------
-    answer : CrackEstimate or NoCrackSeen
-        From the vibration.
-    encoders : ToothErrorEvidence
-    alone : CrackEstimate or None
-        From the encoders, on the gear of the vibration's answer where both gears show the change.
-    facts : PairFacts
-    """
-    if alone is None:
-        return replace(answer, reasons=(*answer.reasons, encoders.text))
-    by_vibration = f"By the vibration alone: {answer.text}"
-    if isinstance(answer, NoCrackSeen):
-        return replace(alone, reasons=(*alone.reasons, by_vibration))
-    if answer.shaft != alone.shaft and not answer.gear_is_certain:
-        return replace(alone, reasons=(*alone.reasons, by_vibration, *answer.reasons))
-    teeth = facts.driver_teeth if answer.shaft == facts.pair.driver else facts.driven_teeth
-    apart = 0 if answer.tooth is None or alone.tooth is None else abs(answer.tooth - alone.tooth)
-    is_same = answer.shaft == alone.shaft and min(apart, teeth - apart) <= NEIGHBOURS
-    if is_same:
-        # The middle of the interval lies between both kinds of teeth, as the encoders' depth does.
-        low, high = np.log(answer.interval_percent).tolist()
-        log_percent, half = 0.5 * (low + high), 0.5 * (high - low)
-        of_encoders, half_of_encoders = _log_percent_by_encoders(encoders, facts, teeth)
-        is_same = abs(log_percent - of_encoders) <= hypot(half, half_of_encoders)
-    if not is_same:
-        against = f"By the encoders alone: {alone.text} The vibration says otherwise, and its answer is given."
-        return replace(answer, reasons=(*answer.reasons, encoders.text, against))
-    weights = {
-        k: answer.kind_probabilities.get(k, FAULT_PRIORS[k]) * alone.kind_probabilities[k] / FAULT_PRIORS[k]
-        for k in KINDS
-    }
-    # An interval without width, as at the whole root, does not say how certain the vibration is.
-    precisions = [(width or half_of_encoders) ** -2.0 for width in (half, half_of_encoders)]
-    mean = (precisions[0] * log_percent + precisions[1] * of_encoders) / sum(precisions)
-    both = f"By the encoders alone: {alone.text} The depth combines both."
-    return replace(
-        answer,
-        gear_is_certain=answer.gear_is_certain or alone.gear_is_certain,
-        **_depth(mean, sum(precisions) ** -0.5, answer.depth_percent / answer.depth_mm),
-        p_value=answer.p_value * alone.p_value,
-        kind_probabilities={kind: weight / sum(weights.values()) for kind, weight in weights.items()},
-        reasons=(*answer.reasons, encoders.text, ASSUMED_BY_ENCODERS, both),
-    )
-
-
-NEIGHBOURS = 1
-"""Difference of tooth numbers up to which vibration and encoders name the same tooth: each is good to about one."""
 
 
 def reach_of(facts: PairFacts, mesh_hz: float) -> dict[str, float]:
@@ -931,7 +578,7 @@ def _crack_estimate(
             )
     unlike = model.unlike(features)
     if unlike:
-        raise RefusalError(
+        raise UnlikeCracksError(
             f"one tooth stands out on shaft {shaft!r}, but unlike the calibration's cracks ({unlike})",
             remedy="look at the tooth: it may be chipped or spalled, or the machine is unlike the calibration's",
         )
@@ -945,8 +592,7 @@ def _crack_estimate(
     per_mm = percent_per_mm(teeth, facts.module_mm)
     place = (best.event.centre_rev - calibration.lag_pitches / teeth) % 1.0
     further_prominences = [e.event.prominence for e in gears if e is not best]
-    assumed = ASSUMED.format(depth_mm=finite_element_percent(percent) / per_mm)
-    reasons += [TEETH_COUNT if best.shaft.has_mark else NO_MARK, assumed]
+    reasons.append(TEETH_COUNT if best.shaft.has_mark else NO_MARK)
     way = ALONE if best.agreement is None else WITH_REFERENCE
     return CrackEstimate(
         shaft=shaft,

@@ -307,10 +307,12 @@ class Calibration:
         for name, value in features.items():
             low, high = self.reach[name]
             if not low * (1 - 1e-9) <= value <= high * (1 + 1e-9):
-                outside.append(f"{REACH_WORDS.get(name, name)} is {value:.4g}, there {low:.4g} to {high:.4g}")
+                outside.append(
+                    f"{REACH_WORDS.get(name, name)} is {value:.4g}, the calibration has {low:.4g} to {high:.4g}"
+                )
         if outside:
             raise RefusalError(
-                "the calibration does not reach this machine or operating point: " + "; ".join(outside),
+                "the crack estimate is not calibrated for this machine or operating point: " + "; ".join(outside),
                 remedy="record at another speed or load, or make a calibration for such machines",
             )
 
@@ -329,6 +331,18 @@ REACH_WORDS = {
 def load_calibration() -> Calibration:
     """Return the calibration that comes with this version."""
     return Calibration.from_mapping(json.loads(FILE.read_text(encoding="utf-8")))
+
+
+class UnlikeCracksError(RefusalError):
+    """One tooth stands out, but unlike the calibration's cracks."""
+
+
+TEETH_COUNT = "Teeth count from 1 at the mark in order of engagement; the place is good to about one tooth."
+"""Beside the number of a tooth."""
+
+NO_MARK = "There is no mark on this shaft: the angle holds for this record only, and names no tooth."
+LARGEST_BOUND_PERCENT = 50.0
+"""Percent of the root: "no crack seen, below 70 %" would be no answer."""
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ torsion rings, is no evidence. If it is a crack, its depth follows from the size
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from itertools import pairwise
 from math import exp, gcd, hypot, inf, log, log10, pi, sqrt
@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.special import logsumexp, softmax
+from scipy.special import logsumexp, ndtr, softmax
 
 from gearsig.cache import read_arrays
 from gearsig.checks import FloatArray
@@ -42,13 +42,14 @@ SINGLE_TOOTH_FAULTS = (CRACK, "tooth_spall", "chipped_tooth")
 """Causes on a single tooth."""
 
 TOOTH_FAULTS = (*SINGLE_TOOTH_FAULTS, "pitch_error")
-"""Causes that each change one engagement with a characteristic profile, which waveforms and encoders distinguish. A
-pitch error may affect one tooth or all."""
+"""Causes that each change one engagement with a characteristic profile, which waveforms distinguish. A pitch error may
+affect one tooth or all."""
 
 OTHER = "other"
 """Any change that is no fault of single teeth: another load, wear, run-out or uneven pitch of all teeth, noise."""
 
 OF_ALL_TEETH = ("pitch_error", OTHER)
+"""Causes with one likelihood, see `KnownToothErrors.log_likelihoods`, although a pitch error may be of one tooth."""
 
 STEPS = 32
 """Steps per pitch."""
@@ -67,9 +68,8 @@ MIN_OVER_NOISE = 1.25
 """Minimum ratio of the event's RMS to the standard error of one value: the loudest window of noise alone, of which the
 band keeps half, reaches 0.9."""
 
-LATER, TOWARDS_TIP = 0.6, 0.3
-"""Distances in pitches of the middle of a crack's change from the middle of the tooth's pitch: later, and towards the
-tip. On three simulated pairs they leave −0.2 to 0.3."""
+TOWARDS_TIP = 0.3
+"""Distance in pitches of the middle of a crack's change from the middle of the tooth's contact, towards the tip."""
 
 MAX_SIZE_ERROR = 0.3
 """Largest standard error of the event's size over the revolutions, relative to it: an impact that does not turn with
@@ -99,7 +99,7 @@ class ToothErrorChange:
     pattern_um : array, (z, STEPS)
         The change, for each of its teeth in turn.
     mesh_um : array, (STEPS,)
-        The part common to all pairs of teeth when the machine was healthy.
+        The part common to all pairs of teeth, which one damaged tooth hardly changes.
     rms_um : float
         Within the window with the most energy.
     noise_um : float
@@ -127,11 +127,11 @@ class ToothErrorChange:
 
     @property
     def place_rev(self) -> float:
-        """Middle of the pitch of the tooth that shows it, in revolutions of its gear from angle zero, 0 to 1."""
+        """Middle of the contact of the tooth that shows it, in revolutions of its gear from angle zero, 0 to 1."""
         start, _ = _event(_banded(self.pattern_um, LOWEST_ORDER))
         size = np.abs(_straightened(np.roll(_banded(self.pattern_um, 0), -start)[:WINDOW]))
         centre = start + float(np.average(np.arange(WINDOW), weights=np.clip(size / size.max() - 0.5, 0.0, None)))
-        later = LATER + (TOWARDS_TIP if self.side == 0 else -TOWARDS_TIP)
+        later = TOWARDS_TIP if self.side == 0 else -TOWARDS_TIP
         return (centre - later * STEPS) / self.pattern_um.size % 1.0
 
 
@@ -142,13 +142,13 @@ def tooth_error_changes(now: TransmissionError, healthy: TransmissionError) -> l
     without an index pulse start anywhere. Where the teeth of one gear are a multiple of the other's, a change of the
     smaller gear also repeats on the larger one, while a change of the larger one is diluted on the smaller.
     """
-    changes = []
+    changes: list[ToothErrorChange] = []
     after_both, before_both = _patterns_um(now), _patterns_um(healthy)
     for side in (0, 1):
         (after, after_error_um), (before, before_error_um) = after_both[side], before_both[side]
         turn = _turn(before, after)
         pattern = after - np.roll(before, turn)
-        mesh_um = _resampled(healthy.mesh_um[None])[0]
+        mesh_um = _resampled(now.mesh_um[None])[0]  # the reference's angles may start elsewhere
         noise_um = hypot(after_error_um, before_error_um)
         size_error = hypot(_size_error(now, side, pattern, 0), _size_error(healthy, side, pattern, turn))
         changes.append(ToothErrorChange(side, pattern, mesh_um, event_rms_um(pattern), noise_um, size_error))
@@ -212,18 +212,18 @@ def _size_error(error: TransmissionError, side: int, pattern_um: FloatArray, tur
 
     The size in revolution p is ⟨x_p, e⟩/⟨e, e⟩ with the event e in its window and x_p the recording there.
     """
-    number = np.arange(len(error.cycles_um))
-    driver_um = error.driver_um[(error.first_pitch + number) % error.teeth[0]]
-    driven_um = error.driven_um[(error.first_driven_pitch + number) % error.teeth[1]]
-    rest = _resampled(error.cycles_um - error.mesh_um - driver_um - driven_um).ravel()
+    rest = _resampled(error.residual_um).ravel()
     wave, first = _banded(pattern_um, LOWEST_ORDER), (error.first_pitch, error.first_driven_pitch)[side]
     start, energy = _event(wave)
     begin = (start - turn - first * STEPS) % wave.size
     begins = np.arange(begin, rest.size - WINDOW + 1, wave.size)
-    if len(begins) < 2:
+    if len(begins) < 2 or energy == 0.0:
         return inf
     sizes = sliding_window_view(rest, WINDOW)[begins] @ np.roll(wave, -start)[:WINDOW] / energy
-    return float(np.std(sizes, ddof=1)) / sqrt(len(sizes))
+    # The residual of few revolutions is too small by what the patterns have fitted.
+    n_rows, n_fitted = len(error.cycles_um), sum(error.teeth) - gcd(*error.teeth)
+    fitted = sqrt(n_rows / max(n_rows - n_fitted, 1))
+    return fitted * float(np.std(sizes, ddof=1)) / sqrt(len(sizes))
 
 
 def _banded(pattern: FloatArray, lowest: int) -> FloatArray:
@@ -468,14 +468,17 @@ class ToothErrorEvidence:
     rms_um : float
         RMS of the change while the teeth that show it are in mesh; where nothing shows, the smallest that would.
     places_rev : mapping
-        "driver" or "driven" → middle of the pitch of the tooth that shows it, in revolutions of that gear from its
-        angle zero, 0 to 1; one gear, both where they show it alike, none where nothing shows.
+        "driver" or "driven" → middle of the contact of the tooth that shows it, in revolutions of that gear from its
+        encoder's zero, 0 to 1; one gear, both where they show it alike, none where nothing shows.
+    passes_s : mapping
+        The same gears → a time at which that place passes, by which other sources of the angle find it.
     """
 
     log_likelihoods: Mapping[str, float]
     weight: float
     rms_um: float
     places_rev: Mapping[str, float]
+    passes_s: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def probabilities(self) -> dict[str, float]:
@@ -507,19 +510,38 @@ class ToothErrorEvidence:
         """Whether the profile makes one fault of a tooth likelier than another."""
         return max(self.probabilities.values()) >= UNLIKE
 
+    def with_load(self, load_n_per_mm: float, teeth: Sequence[int]) -> ToothErrorEvidence:
+        """Return the evidence where load and teeth are known: a crack cannot be deeper than the root.
+
+        Parameters
+        ----------
+        load_n_per_mm : float
+            Normal force on the teeth per face width.
+        teeth : sequence of int
+            Of driver and driven gear.
+        """
+        if not (self.is_seen and load_n_per_mm > 0.0):
+            return self
+        known = load_known_tooth_errors()
+        depths = [known.log_percent(self.rms_um, load_n_per_mm, teeth[SIDES.index(gear)]) for gear in self.places_rev]
+        within = max(float(ndtr((log(100.0) - mean) / spread)) for mean, spread in depths)
+        crack = self.log_likelihoods[CRACK] + self.weight * log(max(within, 1.0 / ONE_IN))
+        return replace(self, log_likelihoods={**self.log_likelihoods, CRACK: crack})
+
     @property
     def text(self) -> str:
         """What the encoders show, in one sentence or two."""
         if not self.is_seen:
             finer = "Finer encoders, or a longer recording, show smaller changes."
-            return f"By the encoders, the transmission error changed by less than {self.rms_um:.2g} µm rms. {finer}"
+            changed = f"By the encoders, no tooth changed the transmission error by {self.rms_um:.2g} µm rms or more"
+            return f"{changed}. {finer}"
         where = {"driver": " on the driver", "driven": " on the driven gear"}.get(self.gear, "")
         changed = f"By the encoders, the transmission error changed by {self.rms_um:.2g} µm rms where it changed most"
         odds, other = self.odds_of_a_tooth, "wear, run-out, uneven pitch or another load"
         if 1.0 / UNDECIDED < odds < UNDECIDED and not self.distinguishes_faults:
-            return (
-                f"{changed}{where}, which at this speed does not distinguish faults: the drive oscillates too. {SLOWER}"
-            )
+            if self.weight >= 0.5:
+                return f"{changed}{where}, which resembles no known fault."
+            return f"{changed}{where}, which resembles no known fault: at this speed the drive oscillates too. {SLOWER}"
         if odds <= 1.0 / UNDECIDED:
             return f"{changed}{where}, {1.0 / odds:.0f} times as likely with {other} as with a damaged tooth."
         times = (
@@ -617,7 +639,16 @@ def tooth_error_evidence(
         weight,
         max(change.rms_um for change in changes),
         {SIDES[change.side]: change.place_rev for change in changes},
+        {SIDES[change.side]: _pass_s(now, change) for change in changes},
     )
+
+
+def _pass_s(error: TransmissionError, change: ToothErrorChange) -> float:
+    """Return the time, in the middle of the recording, at which the place of a change passes."""
+    teeth, first = error.teeth[change.side], (error.first_pitch, error.first_driven_pitch)[change.side]
+    row = (change.place_rev * teeth - 0.5 - first) % teeth
+    row += teeth * max(round((0.5 * len(error.time_s) - row) / teeth), 0)
+    return float(np.interp(row, np.arange(len(error.time_s)), error.time_s))
 
 
 def _check_direction(

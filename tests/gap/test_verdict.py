@@ -10,6 +10,7 @@ from gearsig.gap import (
     KIND_TITLES,
     NONE,
     UNKNOWN,
+    Attribution,
     ConditionFacts,
     GapCause,
     GapOutcome,
@@ -18,6 +19,7 @@ from gearsig.gap import (
     OperatingCondition,
     PlaceKind,
     inseparable_effects,
+    load_gap_calibration,
     names_single_effect,
     unbounded_fits,
     with_unknown_within_floor,
@@ -202,6 +204,18 @@ def test_a_gap_within_the_floor_has_no_unknown_cause() -> None:
         {NONE: 0.9, "unbalance": 0.1, UNKNOWN: 0.0}
     )
     assert with_unknown_within_floor(found, Interval(0.9, 0.7, 1.1)) == found
+
+
+@pytest.mark.parametrize(
+    ("none", "size", "expected"),
+    [(0.35, 0.7, GapOutcome.NO_GAP), (0.35, 1.2, GapOutcome.UNDECIDED), (0.1, 0.7, GapOutcome.UNDECIDED)],
+)
+def test_a_gap_within_the_floor_is_none_if_nothing_is_likelier(none: float, size: float, expected: GapOutcome) -> None:
+    """Of many unlikely causes none is named; a gap that healthy machines have as well needs none."""
+    others = dict.fromkeys(("unbalance", "misalignment", "tooth_wear", "backlash"), (0.9 - none) / 4.0)
+    found = {NONE: none, UNKNOWN: 0.1, **others}
+    attribution = Attribution({}, {}, load_gap_calibration(with_reference=True), size)
+    assert attribution.outcome(found) is expected
 
 
 def at(*points: tuple[float, float]) -> tuple[ConditionFacts, ...]:

@@ -115,7 +115,7 @@ def test_a_sensor_that_reads_the_other_way_round_than_the_reference_s_changes_no
     other_way = replace(healthy, samples=samples)
     expected, answer = (crack(estimate_crack(record(2.0), reference=r)) for r in (healthy, other_way))
     assert answer.depth_mm == pytest.approx(expected.depth_mm, rel=1e-9)
-    assert answer.reasons[-1].startswith(f"{healthy.channel_names[1]} reads the other way round")
+    assert f"{healthy.channel_names[1]} reads the other way round" in " ".join(answer.reasons)
     assert answer.reasons[:-1] == expected.reasons
 
 
@@ -155,7 +155,7 @@ def test_a_reference_of_another_machine_or_load_is_named_first(record: Record, h
     [
         ({"module_mm": None}, "module_mm"),
         ({"face_width_mm": None}, "face_width_mm"),
-        ({"module_mm": 30.0, "face_width_mm": 2.0}, "does not reach"),
+        ({"module_mm": 30.0, "face_width_mm": 2.0}, "not calibrated for"),
         ({"face_width_mm": 500.0}, "face width and module in MPa is"),
         ({"pressure_angle_deg": 25.0}, "pressure angle"),
     ],

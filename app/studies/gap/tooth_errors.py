@@ -475,10 +475,6 @@ OTHER_EFFECTS = ("eccentricity", "misalignment", "tooth_wear")
 """Effects of the independent rig that change the transmission error without a fault of a tooth."""
 
 
-OTHER_EFFECTS = ("eccentricity", "misalignment", "tooth_wear")
-"""Effects of the independent rig that change the transmission error without a fault of a tooth."""
-
-
 def name_blindly(n_each: int) -> None:
     """Identify faults of the independent rig's development gears by its encoders; print the share of right answers.
 
