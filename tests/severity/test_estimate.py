@@ -116,7 +116,7 @@ def test_a_sensor_that_reads_the_other_way_round_than_the_reference_s_changes_no
     expected, answer = (crack(estimate_crack(record(2.0), reference=r)) for r in (healthy, other_way))
     assert answer.depth_mm == pytest.approx(expected.depth_mm, rel=1e-9)
     assert f"{healthy.channel_names[1]} reads the other way round" in " ".join(answer.reasons)
-    assert answer.reasons[:-1] == expected.reasons
+    assert [reason for reason in answer.reasons if "the other way round" not in reason] == [*expected.reasons]
 
 
 @pytest.mark.parametrize("gain", [0.5, 2.0, 1 / 9.81])
