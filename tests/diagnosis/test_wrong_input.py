@@ -192,6 +192,17 @@ def test_tones_of_three_samples_per_cycle_are_no_overflow(tones_hz):
     assert "wrapped" not in {p.kind for p in find_problems(Recording(x[None], 20480.0, (TRUE.channels[0],)))}
 
 
+def test_steps_that_fall_short_of_what_is_expected_are_no_overflow():
+    """Tones below half the sampling rate, as of finite-element gears; overflowed samples go further than expected."""
+    rng, t = np.random.default_rng(2901), np.arange(30_000)
+    n = rng.integers(3, 8)
+    frequency, size, phase = rng.uniform(0.2, 0.45, n), rng.uniform(0.2, 1.0, n), rng.uniform(0.0, 6.28, n)
+    x = np.sum(size * np.cos(2.0 * np.pi * frequency * t[:, None] + phase), axis=1)
+    x = x + rng.uniform(0.0, 0.6) * rng.standard_normal(len(t))
+    x = x + rng.uniform(0.0, 0.15) * x**2
+    assert "wrapped" not in {p.kind for p in find_problems(Recording(x[None], 20480.0, (TRUE.channels[0],)))}
+
+
 @pytest.mark.parametrize("ring_hz", [900.0, 3000.0, 5900.0])
 def test_impacts_and_clicks_are_no_overflow(ring_hz):
     rng, time_s = np.random.default_rng(0), np.arange(1 << 15) / 12800
