@@ -64,9 +64,9 @@ STATIC_MESH_HZ = 500.0
 drive ring. Of 46 faults of the independent rig at 270 to 2700 Hz, 22 are identified correctly, two with a probability
 of 0.9 or more."""
 
-MIN_OVER_NOISE = 1.25
-"""Minimum ratio of the event's RMS to the standard error of one value: the loudest window of noise alone, of which the
-band keeps half, reaches 0.9."""
+MIN_OVER_NOISE = 2.3
+"""Minimum ratio of the event's RMS to the standard error of one value; the loudest windows of 1200 revolutions of white
+noise reach 1.7."""
 
 TOWARDS_TIP = 0.3
 """Distance in pitches of the middle of a crack's change from the middle of the tooth's contact, towards the tip."""
@@ -103,7 +103,7 @@ class ToothErrorChange:
     rms_um : float
         Within the window with the most energy.
     noise_um : float
-        Standard error of one value.
+        Standard error of one value, in the band in which events are searched.
     size_error : float
         Standard error of the event's size over the revolutions, relative to it.
     """
@@ -145,11 +145,11 @@ def tooth_error_changes(now: TransmissionError, healthy: TransmissionError) -> l
     changes: list[ToothErrorChange] = []
     after_both, before_both = _patterns_um(now), _patterns_um(healthy)
     for side in (0, 1):
-        (after, after_error_um), (before, before_error_um) = after_both[side], before_both[side]
+        after, before = after_both[side], before_both[side]
         turn = _turn(before, after)
         pattern = after - np.roll(before, turn)
         mesh_um = _resampled(now.mesh_um[None])[0]  # the reference's angles may start elsewhere
-        noise_um = hypot(after_error_um, before_error_um)
+        noise_um = hypot(_noise_um(now, side), _noise_um(healthy, side))
         size_error = hypot(_size_error(now, side, pattern, 0), _size_error(healthy, side, pattern, turn))
         changes.append(ToothErrorChange(side, pattern, mesh_um, event_rms_um(pattern), noise_um, size_error))
     largest_um = max(change.rms_um for change in changes)
@@ -160,23 +160,32 @@ def tooth_error_changes(now: TransmissionError, healthy: TransmissionError) -> l
     return similar
 
 
-def _patterns_um(error: TransmissionError) -> list[tuple[FloatArray, float]]:
-    """Return, for each gear, all that it repeats, (z, STEPS), and the standard error of one value.
+def _patterns_um(error: TransmissionError) -> list[FloatArray]:
+    """Return, for each gear, all that it repeats, (z, STEPS).
 
     What both gears repeat, because their teeth have a common divisor g, `TransmissionError` divides evenly. One damaged
     tooth is its cause, so that the other gear's part is added: its mean over every g-th tooth.
     """
-    patterns, error_um = (error.driver_um, error.driven_um), (error.driver_error_um, error.driven_error_um)
-    divisor, ahead = gcd(*error.teeth), error.first_driven_pitch - error.first_pitch
+    patterns, ahead = (error.driver_um, error.driven_um), error.first_driven_pitch - error.first_pitch
+    divisor = gcd(*error.teeth)
     repeated = [rows.reshape(-1, divisor, rows.shape[1]).mean(axis=0) for rows in patterns]
     complete = []
     for side, turned in ((0, -ahead), (1, ahead)):
         added = np.tile(np.roll(repeated[1 - side], turned, axis=0), (error.teeth[side] // divisor, 1))
-        # Halves of one measured pattern have the same error, which then is twice as large.
-        further = sqrt((divisor - 1) / error.teeth[1 - side])
-        noise_um = float(np.mean(error_um[side]) + further * np.mean(error_um[1 - side]))
-        complete.append((_resampled(patterns[side] + added), noise_um))
+        complete.append(_resampled(patterns[side] + added))
     return complete
+
+
+def _residual_um(error: TransmissionError) -> FloatArray:
+    """Return what no gear repeats, (n_cycles, STEPS), as large as if the patterns had not been fitted to it."""
+    n_rows, n_fitted = len(error.cycles_um), sum(error.teeth) - gcd(*error.teeth)
+    return _resampled(error.residual_um) * sqrt(n_rows / max(n_rows - n_fitted, 1))
+
+
+def _noise_um(error: TransmissionError, side: int) -> float:
+    """Return the standard error of one value of a gear's pattern, in the band in which events are searched."""
+    n_revolutions = len(error.cycles_um) / error.teeth[side]
+    return float(np.std(_banded(_residual_um(error), LOWEST_ORDER, n_revolutions))) / sqrt(n_revolutions)
 
 
 def event_rms_um(pattern_um: FloatArray) -> float:
@@ -212,7 +221,7 @@ def _size_error(error: TransmissionError, side: int, pattern_um: FloatArray, tur
 
     The size in revolution p is ⟨x_p, e⟩/⟨e, e⟩ with the event e in its window and x_p the recording there.
     """
-    rest = _resampled(error.residual_um).ravel()
+    rest = _residual_um(error).ravel()
     wave, first = _banded(pattern_um, LOWEST_ORDER), (error.first_pitch, error.first_driven_pitch)[side]
     start, energy = _event(wave)
     begin = (start - turn - first * STEPS) % wave.size
@@ -220,17 +229,15 @@ def _size_error(error: TransmissionError, side: int, pattern_um: FloatArray, tur
     if len(begins) < 2 or energy == 0.0:
         return inf
     sizes = sliding_window_view(rest, WINDOW)[begins] @ np.roll(wave, -start)[:WINDOW] / energy
-    # The residual of few revolutions is too small by what the patterns have fitted.
-    n_rows, n_fitted = len(error.cycles_um), sum(error.teeth) - gcd(*error.teeth)
-    fitted = sqrt(n_rows / max(n_rows - n_fitted, 1))
-    return fitted * float(np.std(sizes, ddof=1)) / sqrt(len(sizes))
+    return float(np.std(sizes, ddof=1)) / sqrt(len(sizes))
 
 
-def _banded(pattern: FloatArray, lowest: int) -> FloatArray:
-    """Return one revolution without its lowest orders and without what encoders cannot resolve, (z STEPS,)."""
+def _banded(pattern: FloatArray, lowest: int, n_revolutions: float = 1.0) -> FloatArray:
+    """Return revolutions without the lowest orders and without what encoders cannot resolve, (n_pitches STEPS,)."""
     lines = np.fft.rfft(pattern.ravel())
-    orders = np.arange(len(lines))
-    part = np.cos(0.5 * pi * np.clip(orders / len(pattern) / HIGHEST_PITCH_ORDER, 0.0, 1.0)) ** 2
+    orders = np.arange(len(lines)) / n_revolutions
+    per_pitch = np.arange(len(lines)) / len(pattern)
+    part = np.cos(0.5 * pi * np.clip(per_pitch / HIGHEST_PITCH_ORDER, 0.0, 1.0)) ** 2
     banded: FloatArray = np.fft.irfft(lines * np.where(orders < lowest, 0.0, part), pattern.size)
     return banded
 
@@ -544,14 +551,11 @@ class ToothErrorEvidence:
             return f"{changed}{where}, which resembles no known fault: at this speed the drive oscillates too. {SLOWER}"
         if odds <= 1.0 / UNDECIDED:
             return f"{changed}{where}, {1.0 / odds:.0f} times as likely with {other} as with a damaged tooth."
-        times = (
-            f"{odds:.0f} times as likely with a damaged tooth as"
-            if odds >= UNDECIDED
-            else "as likely with a damaged tooth as"
-        )
+        if odds < UNDECIDED:
+            return f"{changed}{where}, as likely with a damaged tooth as with {other}."
         faults = [f"{FAULT_WORDS[name]} {odds_text(p)}" for name, p in self.probabilities.items() if p >= 0.05]
         which = f" A damaged tooth would be {', '.join(faults)}." if self.distinguishes_faults else ""
-        return f"{changed}{where}, {times} with {other}.{which}"
+        return f"{changed}{where}, {odds:.0f} times as likely with a damaged tooth as with {other}.{which}"
 
 
 UNLIKE = 0.4
