@@ -508,9 +508,11 @@ def _encoder_evidence(
     for condition in conditions:
         if condition.facts.reference:
             both = of_name[condition.facts.name], reference_of_name[condition.facts.reference]
-            evidence = answer_or_none(partial(tooth_error_evidence, *both), condition.facts.name, refusals)
+            frame = condition.now.frame
+            ask = partial(tooth_error_evidence, *both, pair=frame.pair.name)
+            evidence = answer_or_none(ask, condition.facts.name, refusals)
             if evidence is not None:
-                evidences.append(evidence.with_load(condition.tooth_load_n_per_mm, condition.now.frame.teeth))
+                evidences.append(evidence.with_load(condition.tooth_load_n_per_mm, frame.teeth))
     together = combined_evidence(evidences)
     shown = [] if together is None else [together.text]
     return together, [*shown, *(f"No evidence from the encoders: {refusal}." for refusal in refusals)]

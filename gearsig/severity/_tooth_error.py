@@ -592,7 +592,7 @@ def combined_evidence(evidences: Sequence[ToothErrorEvidence]) -> ToothErrorEvid
 
 
 def tooth_error_evidence(
-    recording: Recording, reference: Recording, rig: Rig | None = None
+    recording: Recording, reference: Recording, rig: Rig | None = None, *, pair: str = ""
 ) -> ToothErrorEvidence | None:
     """Return the evidence from a change in transmission error; None where neither recording has encoders.
 
@@ -602,6 +602,8 @@ def tooth_error_evidence(
         The encoders must be the same, and not moved in between.
     rig : Rig or None
         Of both. None: each recording's own.
+    pair : str
+        Name of the gear pair; default: the first.
 
     Raises
     ------
@@ -617,7 +619,7 @@ def tooth_error_evidence(
         raise RefusalError(f"only the {which} has encoders on two shafts", remedy="record both with the same encoders")
     rigs = [rig or measured.rig for measured in (recording, reference)]
     now, healthy = (
-        transmission_error(measured, of, pair=of.pairs[0].name if of is not None and of.pairs else "")
+        transmission_error(measured, of, pair=pair or (of.pairs[0].name if of is not None and of.pairs else ""))
         for measured, of in zip((recording, reference), rigs, strict=True)
     )
     largest = tooth_error_changes(now, healthy)

@@ -13,6 +13,7 @@ from gearsig.errors import RefusalError
 from gearsig.motion import TransmissionError
 from gearsig.prepared import prepare
 from gearsig.recording import Recording
+from gearsig.rig import Shaft
 from gearsig.severity import (
     OTHER,
     SINGLE_TOOTH_FAULTS,
@@ -205,6 +206,14 @@ def test_encoders_identify_a_crack_at_low_speed() -> None:
     assert next(iter(said.probabilities)) == "root_crack"
     assert said.probabilities["root_crack"] > 0.7
     assert said.odds_of_a_tooth > 20.0
+    assert healthy.rig is not None
+    real = healthy.rig.pairs[0]
+    before = replace(real, name="before it", driver="motor", driven="input")
+    two_pairs = replace(healthy.rig, shafts=(Shaft("motor"), *healthy.rig.shafts), pairs=(before, real))
+    of_second = tooth_error_evidence(cracked, healthy, two_pairs, pair=real.name)
+    assert of_second == said
+    with pytest.raises(RefusalError, match="was not measured"):
+        tooth_error_evidence(cracked, healthy, two_pairs)
     halves = healthy.between(0.0, 2.5), healthy.between(2.5, 5.0)
     unchanged = tooth_error_evidence(*halves)
     assert unchanged is not None
