@@ -64,7 +64,7 @@ STATIC_MESH_HZ = 500.0
 drive ring. Of 46 faults of the independent rig at 270 to 2700 Hz, 22 are identified correctly, two with a probability
 of 0.9 or more."""
 
-MIN_OVER_NOISE = 2.3
+MIN_OVER_NOISE = 2.0
 """Minimum ratio of the event's RMS to the standard error of one value; the loudest windows of 1200 revolutions of white
 noise reach 1.7."""
 
