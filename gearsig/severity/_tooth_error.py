@@ -144,13 +144,17 @@ def tooth_error_changes(now: TransmissionError, healthy: TransmissionError) -> l
     """
     changes: list[ToothErrorChange] = []
     after_both, before_both = _patterns_um(now), _patterns_um(healthy)
+    residuals = _residual_um(now), _residual_um(healthy)
+    mesh_um = _resampled(now.mesh_um[None])[0]  # the reference's angles may start elsewhere
     for side in (0, 1):
         after, before = after_both[side], before_both[side]
         turn = _turn(before, after)
         pattern = after - np.roll(before, turn)
-        mesh_um = _resampled(now.mesh_um[None])[0]  # the reference's angles may start elsewhere
-        noise_um = hypot(_noise_um(now, side), _noise_um(healthy, side))
-        size_error = hypot(_size_error(now, side, pattern, 0), _size_error(healthy, side, pattern, turn))
+        noise_um = hypot(*(_noise_um(residual, now.teeth[side]) for residual in residuals))
+        first = [(t.first_pitch, t.first_driven_pitch)[side] * STEPS for t in (now, healthy)]
+        size_error = hypot(
+            _size_error(residuals[0], pattern, first[0]), _size_error(residuals[1], pattern, first[1] + turn)
+        )
         changes.append(ToothErrorChange(side, pattern, mesh_um, event_rms_um(pattern), noise_um, size_error))
     largest_um = max(change.rms_um for change in changes)
     similar = [change for change in changes if change.rms_um >= BOTH_GEARS * largest_um]
@@ -182,10 +186,10 @@ def _residual_um(error: TransmissionError) -> FloatArray:
     return _resampled(error.residual_um) * sqrt(n_rows / max(n_rows - n_fitted, 1))
 
 
-def _noise_um(error: TransmissionError, side: int) -> float:
+def _noise_um(residual_um: FloatArray, teeth: int) -> float:
     """Return the standard error of one value of a gear's pattern, in the band in which events are searched."""
-    n_revolutions = len(error.cycles_um) / error.teeth[side]
-    return float(np.std(_banded(_residual_um(error), LOWEST_ORDER, n_revolutions))) / sqrt(n_revolutions)
+    n_revolutions = len(residual_um) / teeth
+    return float(np.std(_banded(residual_um, LOWEST_ORDER, n_revolutions))) / sqrt(n_revolutions)
 
 
 def event_rms_um(pattern_um: FloatArray) -> float:
@@ -216,15 +220,15 @@ def _turn(before: FloatArray, after: FloatArray) -> int:
     return turns[best] if 2.0 * differences[best] < differences[0] else 0
 
 
-def _size_error(error: TransmissionError, side: int, pattern_um: FloatArray, turn: int) -> float:
+def _size_error(residual_um: FloatArray, pattern_um: FloatArray, first_step: int) -> float:
     """Return the standard error of an event's size over the revolutions of a recording, relative to it.
 
-    The size in revolution p is ⟨x_p, e⟩/⟨e, e⟩ with the event e in its window and x_p the recording there.
+    The size in revolution p is ⟨x_p, e⟩/⟨e, e⟩ with the event e in its window and x_p the recording there, whose first
+    value is at this step of the pattern.
     """
-    rest = _residual_um(error).ravel()
-    wave, first = _banded(pattern_um, LOWEST_ORDER), (error.first_pitch, error.first_driven_pitch)[side]
+    rest, wave = residual_um.ravel(), _banded(pattern_um, LOWEST_ORDER)
     start, energy = _event(wave)
-    begin = (start - turn - first * STEPS) % wave.size
+    begin = (start - first_step) % wave.size
     begins = np.arange(begin, rest.size - WINDOW + 1, wave.size)
     if len(begins) < 2 or energy == 0.0:
         return inf

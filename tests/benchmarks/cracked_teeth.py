@@ -12,24 +12,18 @@ from dataclasses import replace
 import numpy as np
 import typer
 
-from app.studies.gap.tooth_errors import CORNERS, table_with_corners
+from app.studies.gap.tooth_errors import CORNERS, element_gear, table_with_corners
 from gearsig.checks import FloatArray
 from gearsig.severity import event_rms_um, percent_per_mm
-from sims.fe_gear import GearBlank, MeshSize, ReducedGear, ReductionPlan, reduce_gear
-from sims.mesh import FlankDeviation, GearGeometry, GearMesh, PairGeometry, RootCrack, deepest_crack_mm, share_torque
+from sims.fe_gear import ReducedGear
+from sims.mesh import FlankDeviation, GearMesh, PairGeometry, RootCrack, deepest_crack_mm, share_torque
 from sims.reduced_fe import mesh_maps, static_table
 
-PAIRS, MODULE_MM = ((19, 31), (22, 44), (31, 52), (44, 62), (62, 74)), 2.0
+PAIRS = ((19, 31), (22, 44), (31, 52), (44, 62), (62, 74))
 LOADS_N_PER_MM = (40.0, 80.0, 200.0)
 PARTS_OF_DEEPEST = np.linspace(0.12, 0.85, 13)
 STEPS = 32
 DEPTHS_PERCENT = (15, 20, 30, 40, 50, 60, 70)
-
-
-def reduced(teeth: int) -> ReducedGear:
-    geometry = GearGeometry(teeth, MODULE_MM, bore_radius_mm=0.4 * teeth)
-    size = MeshSize(n_across=2, n_gap=1, n_up=6, n_rim=1, n_body=2, n_along=4)
-    return reduce_gear(GearBlank(geometry), ReductionPlan(size, n_modes=4))
 
 
 def changes_um(
@@ -37,7 +31,7 @@ def changes_um(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Depths in percent of the root, and the change with the calibration's teeth and with finite elements."""
     driver, driven = (gear.blank.geometry for gear in gears)
-    flank = FlankDeviation(tip_relief_um=0.8 * load_n_per_mm / 14.0, tip_relief_length_mm=MODULE_MM)
+    flank = FlankDeviation(tip_relief_um=0.8 * load_n_per_mm / 14.0, tip_relief_length_mm=driver.module_mm)
     healthy = GearMesh(PairGeometry(driver, driven), flank_1=flank, flank_2=flank, contact_law="load-dependent")
     torque = load_n_per_mm * healthy.pair.face_width_mm * healthy.pair.driver.base_radius_mm * 1e-3
     cycles = (np.arange(driver.teeth * STEPS) + 0.5) / STEPS
@@ -53,14 +47,14 @@ def changes_um(
         after = errors_um(replace(healthy, cracks_1=(RootCrack(float(depth), tooth=5),)))
         rows.append([event_rms_um((a - b).reshape(-1, STEPS)) for a, b in zip(after, before, strict=True)])
     columns = np.array(rows).T
-    return depths * percent_per_mm(driver.teeth, MODULE_MM), columns[0], columns[1]
+    return depths * percent_per_mm(driver.teeth, driver.module_mm), columns[0], columns[1]
 
 
 def main() -> None:
     """Print the equivalent depths."""
     equivalent = []
     for teeth in PAIRS:
-        gears = reduced(teeth[0]), reduced(teeth[1])
+        gears = element_gear(teeth[0]), element_gear(teeth[1])
         for load in LOADS_N_PER_MM:
             percent, calibration_um, elements_um = changes_um(gears, load)
             change_um = np.interp(DEPTHS_PERCENT, percent, calibration_um)

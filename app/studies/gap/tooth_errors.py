@@ -144,7 +144,7 @@ def finite_elements(fault: str, rng: np.random.Generator) -> DrawnChange:
     RefusalError
         If no contact is found.
     """
-    gears = _element_gear(int(rng.choice(ELEMENT_TEETH))), _element_gear(int(rng.choice(ELEMENT_TEETH)))
+    gears = element_gear(int(rng.choice(ELEMENT_TEETH))), element_gear(int(rng.choice(ELEMENT_TEETH)))
     driver, driven = (gear.blank.geometry for gear in gears)
     healthy, load = _loaded(PairGeometry(driver, driven), rng)
     side = int(rng.integers(2))
@@ -180,7 +180,8 @@ ELEMENT_TEETH = (19, 22, 26, 31, 37, 44, 52, 62, 74)
 
 
 @cache
-def _element_gear(teeth: int) -> ReducedGear:
+def element_gear(teeth: int) -> ReducedGear:
+    """Return a finite-element gear of 2 mm module, coarse except at its flanks."""
     geometry = GearGeometry(teeth, 2.0, bore_radius_mm=0.4 * teeth)
     size = MeshSize(n_across=2, n_gap=1, n_up=6, n_rim=1, n_body=2, n_along=4)
     return reduce_gear(GearBlank(geometry), ReductionPlan(size, n_modes=4))
